@@ -1,0 +1,1 @@
+"""Gateware: from switch samples to bytes on a serial line."""

@@ -1,0 +1,1 @@
+"""Host side: read contact zones from a sheet of switches."""

@@ -1,0 +1,1 @@
+"""Golden model, scenes, virtual board and co-simulation."""
