@@ -1,1 +1,5 @@
-"""Host side: read contact zones from a sheet of switches."""
+"""Contact zones of a switch-matrix skin, from an FPGA to Python."""
+
+from contactfpga.skin import Skin, SkinError
+
+__all__ = ["Skin", "SkinError"]

@@ -1,0 +1,156 @@
+"""Everything that follows from a Skin: clocks, widths and depths, computed in this one place."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+HELLO_PERIOD_US = 500_000
+"""The board says hello this often, so that one can be late behind a frame and still come every second."""
+
+STUCK_MAX = 15
+"""The stuck-line counter stops here."""
+
+
+class Derived:
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+
+    # ---- times, in clocks unless named otherwise
+
+    @property
+    def clocks_per_us(self) -> int:
+        return self.skin.clock_hz // 1_000_000
+
+    @property
+    def settle_clocks(self) -> int:
+        return _whole(self.skin.settle_us * self.clocks_per_us)
+
+    @property
+    def release_clocks(self) -> int:
+        return _whole(self.skin.release_us * self.clocks_per_us)
+
+    @property
+    def row_clocks(self) -> int:
+        return self.settle_clocks + self.release_clocks
+
+    @property
+    def frame_clocks(self) -> int:
+        return self.row_clocks * self.skin.rows
+
+    @property
+    def bit_clocks(self) -> int:
+        return round(self.skin.clock_hz / self.skin.baud)
+
+    @property
+    def min_row_clocks(self) -> int:
+        """A row must last until debounce and labeller are done with the one before it, and a frame until
+        its records are packed."""
+        packing = self.zone_capacity * self.record_bytes + 32 if self.skin.report == "moments" else 0
+        return max(self.skin.columns + 6, 10, math.ceil(packing / self.skin.rows))
+
+    @property
+    def keep_alive_frames(self) -> int:
+        """A frame is sent at the latest after this many scans."""
+        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / self.frame_clocks)
+
+    @property
+    def hello_frames(self) -> int:
+        """A hello is due after this many scans."""
+        return max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks))
+
+    @property
+    def press_scans(self) -> int:
+        """Scan periods that last at least debounce_press_us."""
+        return _whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
+
+    @property
+    def release_scans(self) -> int:
+        """Scan periods that last at least debounce_release_us."""
+        return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
+
+    # ---- widths in bits and sizes in bytes
+
+    @property
+    def cells(self) -> int:
+        return self.skin.rows * self.skin.columns
+
+    @property
+    def zone_capacity(self) -> int:
+        assert self.skin.zone_capacity is not None
+        return self.skin.zone_capacity
+
+    @property
+    def area_bits(self) -> int:
+        return self.cells.bit_length()
+
+    @property
+    def sum_x_bits(self) -> int:
+        return max(1, (self.skin.rows * math.comb(self.skin.columns, 2)).bit_length())
+
+    @property
+    def sum_y_bits(self) -> int:
+        return max(1, (self.skin.columns * math.comb(self.skin.rows, 2)).bit_length())
+
+    @property
+    def zones_bits(self) -> int:
+        return self.skin.max_zones().bit_length()
+
+    @property
+    def record_bytes(self) -> int:
+        """Bytes of one zone on the wire."""
+        return math.ceil((self.area_bits + self.sum_x_bits + self.sum_y_bits) / 8)
+
+    @property
+    def bitmap_row_bytes(self) -> int:
+        """Bytes of one row on the wire with ``report = "cells"``."""
+        return math.ceil(self.skin.columns / 8)
+
+    @property
+    def trailer_bytes(self) -> int:
+        """Bytes that close a frame, before its CRC."""
+        return math.ceil((24 + 8 + 8 + 3 + 4 + self.area_bits + self.zones_bits) / 8)
+
+    @property
+    def item_bytes(self) -> int:
+        """Bytes of one item of a frame: a zone or a bitmap row."""
+        return self.record_bytes if self.skin.report == "moments" else self.bitmap_row_bytes
+
+    @property
+    def max_items(self) -> int:
+        return self.zone_capacity if self.skin.report == "moments" else self.skin.rows
+
+    @property
+    def max_frame_bytes(self) -> int:
+        """The longest frame on the wire: kind, items, trailer, CRC, stuffed, with its delimiter."""
+        plain = 1 + self.max_items * self.item_bytes + self.trailer_bytes + 2
+        return plain + math.ceil(plain / 254) + 1
+
+    # ---- sizes of tables
+
+    @functools.cached_property
+    def open_zones(self) -> int:
+        """The most zones two adjacent rows can hold between them: C/2 with 8-connectivity, C with 4."""
+        return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
+
+    @functools.cached_property
+    def record_backlog(self) -> int:
+        """Records that can wait for the packer.
+
+        Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
+        them takes longer than two rows the rest adds up, over at most the capacity of two frames.
+        """
+        busy = self.open_zones * self.record_bytes
+        late = max(0.0, 1 - 2 * self.row_clocks / busy)
+        return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
+
+
+def _whole(value: float) -> int:
+    """The next whole number upwards, not counting what a float's rounding added."""
+    return math.ceil(value - 1e-9)

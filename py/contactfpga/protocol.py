@@ -1,0 +1,245 @@
+"""What travels on the wire: packets, their fields and their framing (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import binascii
+import dataclasses
+import struct
+
+import numpy as np
+
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+
+VERSION = 1
+DELIMITER = 0
+
+KIND_HELLO = 1
+KIND_ZONES = 2
+KIND_CELLS = 3
+
+FLAGS = ("overflow", "mismatch", "requested")
+"""Names of a frame's flags, lowest bit first."""
+
+TIME_BITS = 24
+COUNTER_BITS = 8
+FLAG_BITS = len(FLAGS)
+STUCK_BITS = 4
+
+_HELLO = struct.Struct("<BBBHfff8s")
+_OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
+
+
+class PacketError(ValueError):
+    """Bytes that are not a whole, valid packet; ``reason`` is a key of the driver's counters."""
+
+    def __init__(self, reason: str, message: str):
+        super().__init__(message)
+        self.reason = reason
+
+
+def lead_byte(kind: int) -> int:
+    """First byte of every packet: version in the upper five bits, kind in the lower three. Never zero."""
+    return VERSION << 3 | kind
+
+
+@dataclasses.dataclass(frozen=True)
+class Hello:
+    """What the board says of itself: all that decoding its frames needs."""
+
+    rows: int
+    columns: int
+    connectivity: int
+    report: str
+    send: str
+    zone_capacity: int
+    pitch_x_mm: float
+    pitch_y_mm: float
+    radius_mm: float | None
+    fingerprint: bytes
+
+    @classmethod
+    def of(cls, skin: Skin) -> Hello:
+        assert skin.zone_capacity is not None
+        shared = {field.name for field in dataclasses.fields(cls)}
+        return cls(**{name: getattr(skin, name) for name in shared})
+
+    def skin(self) -> Skin:
+        """A Skin with this hello's facts: it decodes the board's frames; its clock and scan times are unknown."""
+        slow = {"clock_hz": 400_000_000, "settle_us": 10_000.0}  # what the host does not know must not refuse
+        return Skin(
+            **{name: getattr(self, name) for name in _FACTS},
+            surface="plane" if self.radius_mm is None else "cylinder",
+            **slow,
+        )
+
+
+_FACTS = (
+    *("rows", "columns", "connectivity", "report", "zone_capacity"),
+    *("pitch_x_mm", "pitch_y_mm", "radius_mm"),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """One frame as it came over the wire."""
+
+    sequence: int
+    """Frames sent before this one, modulo 256."""
+    time_us: int
+    """Device time of the first row's sample, modulo 2^24 us."""
+    flags: frozenset[str]
+    overwritten: int
+    """Complete frames that a newer one replaced before they were sent, modulo 256."""
+    stuck: int
+    """Columns that read pressed while no row was driven; 15 stands for 15 or more."""
+    zones: int
+    """Zones on the sheet, also those beyond the capacity; 0 with ``report = "cells"``."""
+    cells: int
+    """Pressed switches."""
+    moments: np.ndarray
+    """(n, 3) int64: area, sum x, sum y of each zone the frame carries."""
+    bitmap: np.ndarray | None
+    """(rows, columns) bool with ``report = "cells"``, else None."""
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Consistent Overhead Byte Stuffing (Cheshire and Baker, 1999), without the delimiter."""
+    out = bytearray()
+    for index, block in enumerate(blocks := data.split(b"\0")):
+        while len(block) > 254 or (len(block) == 254 and index < len(blocks) - 1):
+            out += b"\xff" + block[:254]
+            block = block[254:]
+        out += bytes([len(block) + 1]) + block
+    return bytes(out)
+
+
+def cobs_decode(data: bytes) -> bytes:
+    """Undo :func:`cobs_encode`; raises :class:`PacketError` where the blocks do not fit the length."""
+    out = bytearray()
+    position = 0
+    while position < len(data):
+        code = data[position]
+        end = position + code
+        if code == 0 or end > len(data):
+            raise PacketError("framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes")
+        out += data[position + 1 : end]
+        position = end
+        if code < 255 and position < len(data):
+            out.append(0)
+    return bytes(out)
+
+
+def seal(plain: bytes) -> bytes:
+    """A packet's bytes on the wire: CRC-16/IBM-3740 appended, stuffed, delimiter last."""
+    crc = binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "big")
+    return cobs_encode(plain + crc) + bytes([DELIMITER])
+
+
+def unseal(packet: bytes) -> bytes:
+    """Undo :func:`seal` for a packet without its delimiter; raises :class:`PacketError`."""
+    plain = cobs_decode(packet)
+    if len(plain) < 3:
+        raise PacketError("framing", f"packet of {len(plain)} bytes; the shortest has 3")
+    if binascii.crc_hqx(plain, 0xFFFF) != 0:
+        raise PacketError("crc", f"CRC of a packet of {len(plain)} bytes does not match")
+    if plain[0] >> 3 != VERSION:
+        raise PacketError("version", f"packet of protocol version {plain[0] >> 3}; this host speaks {VERSION}")
+    return plain[:-2]
+
+
+def encode_hello(skin: Skin) -> bytes:
+    """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
+    facts = Hello.of(skin)
+    options = sum(choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
+    plain = struct.pack("B", lead_byte(KIND_HELLO)) + _HELLO.pack(
+        facts.rows,
+        facts.columns,
+        options,
+        facts.zone_capacity,
+        facts.pitch_x_mm,
+        facts.pitch_y_mm,
+        facts.radius_mm or 0.0,
+        facts.fingerprint,
+    )
+    return seal(plain)
+
+
+def decode_hello(plain: bytes) -> Hello:
+    """Read an unsealed hello."""
+    if plain[0] & 7 != KIND_HELLO or len(plain) != 1 + _HELLO.size:
+        raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
+    rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[1:])
+    chosen = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
+    return Hello(
+        rows=rows,
+        columns=columns,
+        zone_capacity=capacity,
+        pitch_x_mm=_shortest(pitch_x),
+        pitch_y_mm=_shortest(pitch_y),
+        radius_mm=_shortest(radius) or None,
+        fingerprint=fingerprint,
+        **chosen,
+    )
+
+
+def decode_frame(plain: bytes, derived: Derived) -> Frame:
+    """Read an unsealed frame of the Skin behind ``derived``; its length must agree with its zone count."""
+    skin = derived.skin
+    kind = KIND_ZONES if skin.report == "moments" else KIND_CELLS
+    if plain[0] & 7 != kind:
+        raise PacketError("kind", f"packet of kind {plain[0] & 7}; report = {skin.report!r} sends kind {kind}")
+    body = len(plain) - 1 - derived.trailer_bytes
+    items, rest = divmod(body, derived.item_bytes)
+    if body < 0 or rest:
+        raise PacketError("length", f"frame of {len(plain)} bytes holds no whole number of items")
+    trailer = int.from_bytes(plain[1 + body :], "little")
+    time_us, sequence, overwritten, flag_bits, stuck, cells, zones, beyond = _split(
+        trailer,
+        *(TIME_BITS, COUNTER_BITS, COUNTER_BITS, FLAG_BITS, STUCK_BITS, derived.area_bits, derived.zones_bits),
+    )
+    flags = frozenset(name for bit, name in enumerate(FLAGS) if flag_bits >> bit & 1)
+    expected = skin.rows if skin.report == "cells" else zones
+    carried_short = "overflow" in flags and items < expected and items == derived.zone_capacity
+    if beyond or cells > derived.cells or not (items == expected or carried_short):
+        raise PacketError("length", f"frame carries {items} items and states {expected}")
+    data = plain[1 : 1 + body]
+    return Frame(
+        sequence=sequence,
+        time_us=time_us,
+        flags=flags,
+        overwritten=overwritten,
+        stuck=stuck,
+        zones=zones,
+        cells=cells,
+        moments=_moments(data, items, derived) if skin.report == "moments" else np.zeros((0, 3), np.int64),
+        bitmap=_bitmap(data, derived) if skin.report == "cells" else None,
+    )
+
+
+def _moments(data: bytes, zones: int, derived: Derived) -> np.ndarray:
+    raw = np.frombuffer(data, np.uint8).reshape(zones, derived.record_bytes).astype(np.int64)
+    word = (raw << (8 * np.arange(derived.record_bytes, dtype=np.int64))).sum(axis=1)
+    area = word & (1 << derived.area_bits) - 1
+    sum_x = word >> derived.area_bits & (1 << derived.sum_x_bits) - 1
+    sum_y = word >> (derived.area_bits + derived.sum_x_bits)
+    return np.stack([area, sum_x, sum_y], axis=1)
+
+
+def _bitmap(data: bytes, derived: Derived) -> np.ndarray:
+    raw = np.frombuffer(data, np.uint8).reshape(derived.skin.rows, derived.bitmap_row_bytes)
+    return np.unpackbits(raw, axis=1, bitorder="little")[:, : derived.skin.columns].astype(bool)
+
+
+def _split(word: int, *widths: int) -> list[int]:
+    """Fields of a word, lowest first, and what is left above them."""
+    fields = []
+    for width in widths:
+        fields.append(word & (1 << width) - 1)
+        word >>= width
+    return [*fields, word]
+
+
+def _shortest(value: float) -> float:
+    """The decimal number that a 32-bit float was made from."""
+    return float(f"{value:.7g}")
