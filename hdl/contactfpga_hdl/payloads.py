@@ -1,0 +1,47 @@
+"""What the stages hand to each other."""
+
+from amaranth.lib import data
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+
+
+def row_layout(derived: Derived) -> data.StructLayout:
+    """A sampled row: one bit a column, and whether it is the frame's last."""
+    return data.StructLayout({"cells": derived.skin.columns, "last": 1})
+
+
+def moments_layout(derived: Derived) -> data.StructLayout:
+    """Exact moments of a set of cells; as bits, lowest first, this is a zone record on the wire."""
+    return data.StructLayout(
+        {"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits}
+    )
+
+
+def record_layout(derived: Derived) -> data.StructLayout:
+    """A zone, or with ``end`` the mark behind a frame's last one."""
+    return data.StructLayout({"zone": moments_layout(derived), "end": 1})
+
+
+def item_layout(derived: Derived) -> data.StructLayout:
+    """A part of a frame that is packed as it comes: a zone record or a bitmap row, or the mark behind the last."""
+    return data.StructLayout({"data": 8 * derived.item_bytes, "end": 1})
+
+
+def tag_layout() -> data.StructLayout:
+    """What the scanner knows of a frame besides its cells."""
+    return data.StructLayout({"time": protocol.TIME_BITS, "stuck": protocol.STUCK_BITS, "requested": 1})
+
+
+def summary_layout(derived: Derived) -> data.StructLayout:
+    """What a frame's trailer says of it, valid when its end mark is packed."""
+    return data.StructLayout(
+        {
+            "tag": tag_layout(),
+            "cells": derived.area_bits,
+            "zones": derived.zones_bits,
+            "overflow": 1,
+            "mismatch": 1,
+            "changed": 1,
+        }
+    )
