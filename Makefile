@@ -1,0 +1,99 @@
+# contactfpga: `make` lists what can be asked for. Everything is installed into .venv in this folder, nothing elsewhere.
+# Written for GNU make 3.81 too, which is what macOS has.
+
+VENV := .venv
+PY   := $(VENV)/bin/python
+HERE := $(CURDIR)
+, := ,
+
+# Passed on: make sim ARGS="--help", make test ARGS="-k labeller -x"
+ARGS ?=
+# Processes that `make test` uses; `auto` is one a core, 0 runs the tests in one process.
+JOBS ?= auto
+
+# The shell that called make may have another environment active, or settings that would send pip or Python elsewhere,
+# drop the asserts of the tests, or point at another Verilator. MAKEFLAGS would reach the makefiles of Verilator.
+unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PYTHONUSERBASE PYTHONOPTIMIZE PYTHONWARNINGS
+unexport PYTHONSAFEPATH PYTHONPLATLIBDIR PYTHONINSPECT PYTHONEXECUTABLE __PYVENV_LAUNCHER__
+unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_REQUIRE_VIRTUALENV PIP_NO_DEPS PIP_DRY_RUN
+unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
+
+.NOTPARALLEL:
+.PHONY: default help check sim test campaign lint format docs clean distclean compiler FORCE
+
+default: help check
+
+help: ## list the targets
+	@echo "contactfpga: contact zones from a sheet of switches"
+	@echo
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@echo
+
+check: ## look for Python and a C++ compiler, and say what to install
+	@sh scripts/check
+
+sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model and draw the scenes
+	$(PY) -m contactfpga_sim.demo $(ARGS)
+
+test: $(VENV)/.stamp-test | compiler ## run the tests
+	$(PY) -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+# The check of the verification page goes here, after the tests whose results it reads.
+
+campaign: $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
+	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
+
+lint: $(VENV)/.stamp-lint ## check style and types
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+
+format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
+	$(PY) -m ruff check --fix
+	$(PY) -m ruff format
+
+docs: $(VENV)/.stamp-docs ## build the pages into build/docs
+	$(PY) -m sphinx -W --keep-going -b html docs build/docs
+
+clean: ## delete what was built; keep .venv
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find py hdl sim tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean ## delete .venv too
+	rm -rf $(VENV)
+
+compiler:
+	@sh scripts/check compiler
+
+# .venv holds absolute paths: in a copied or moved clone it would still run the code of the old folder.
+ifneq ($(shell cat $(VENV)/.folder 2>/dev/null),$(HERE))
+$(VENV)/.stamp-venv: FORCE
+endif
+
+$(VENV)/.stamp-venv:
+	@python=`sh scripts/check python` && \
+	    echo ">>> Creating $(VENV) with $$python" && \
+	    "$$python" -m venv --clear $(VENV)
+	@printf '%s\n' "$(HERE)" > $(VENV)/.folder
+	@touch $@
+
+# $(call install,extras,what it costs). The constraints hold for the packages that build packages, too; pip reads
+# those from the second variable since 25.3, and from the first one before.
+define install
+@echo ">>> Installing contactfpga[$(1)] into $(VENV): $(2)"
+PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt \
+    $(PY) -m pip install --disable-pip-version-check --editable '.[$(1)]'
+@touch $@
+endef
+
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+	$(call install,sim,downloads about 85 MB unless pip has it cached)
+
+$(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+	$(call install,sim$(,)test,downloads about 180 MB unless installed or cached)
+	@touch $(VENV)/.stamp-sim
+
+$(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+	$(call install,cli$(,)lint,downloads about 45 MB unless installed or cached)
+
+$(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+	$(call install,cli$(,)docs,downloads about 35 MB unless installed or cached)
