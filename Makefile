@@ -29,7 +29,7 @@ help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 	@echo
 
-check: ## look for Python and a C++ compiler, and say what to install
+check: ## look for Python and a C++ compiler; say what to install
 	@sh scripts/check
 
 sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model and draw the scenes
@@ -96,4 +96,4 @@ $(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml constraints.txt
 	$(call install,cli$(,)lint,downloads about 45 MB unless installed or cached)
 
 $(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml constraints.txt
-	$(call install,cli$(,)docs,downloads about 35 MB unless installed or cached)
+	$(call install,cli$(,)docs,downloads about 40 MB unless installed or cached)

@@ -23,7 +23,7 @@ SHARED_WITH_GATEWARE = {"contactfpga.skin", "contactfpga.derived", "contactfpga.
 
 
 class Import(NamedTuple):
-    """One imported name. ``at_load``: it runs when the file is imported, not only when a function is called."""
+    """A name that is imported; ``at_load``: when the file is imported, not only when a function is called."""
 
     name: str
     line: int
