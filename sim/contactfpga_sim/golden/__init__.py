@@ -1,0 +1,22 @@
+"""Golden model: zones by flood fill, time by the rules of docs/timing.md.
+
+It shares no code with the gateware or with the host's protocol, never imports Amaranth, and reads only the
+declared fields of a Skin.
+"""
+
+from contactfpga_sim.golden.predict import predict
+from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
+from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_steps
+from contactfpga_sim.golden.zones import zones
+
+__all__ = [
+    "BOUNDARIES",
+    "Departures",
+    "Timeline",
+    "Trace",
+    "all_departures",
+    "last_record_clocks",
+    "predict",
+    "row_steps",
+    "zones",
+]

@@ -1,0 +1,147 @@
+"""Clocks, widths and fixed bytes by docs/timing.md and docs/protocol.md, from a Skin's declared fields.
+
+Worked out here a second time, in exact fractions, so that a slip in the gateware's own table cannot hide.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+def exact(value: float) -> Fraction:
+    """The decimal number that was written into the Skin, without its binary rounding."""
+    return Fraction(repr(value))
+
+
+@dataclasses.dataclass(frozen=True)
+class Facts:
+    """What the rules call R, C, M, S, L, T, D, P and Q, and the widths of the fields on the wire."""
+
+    skin: Skin
+
+    @property
+    def rows(self) -> int:
+        return self.skin.rows
+
+    @property
+    def columns(self) -> int:
+        return self.skin.columns
+
+    @functools.cached_property
+    def mask(self) -> np.ndarray:
+        """(R, C) bool: True where there is no switch to read."""
+        mask = np.zeros((self.rows, self.columns), bool)
+        for row, column in self.skin.mask:
+            mask[row, column] = True
+        return mask
+
+    @functools.cached_property
+    def clocks_per_us(self) -> int:
+        return self.skin.clock_hz // 1_000_000
+
+    @functools.cached_property
+    def settle(self) -> int:
+        return math.ceil(exact(self.skin.settle_us) * self.clocks_per_us)
+
+    @functools.cached_property
+    def row_clocks(self) -> int:
+        return self.settle + math.ceil(exact(self.skin.release_us) * self.clocks_per_us)
+
+    @functools.cached_property
+    def scan_clocks(self) -> int:
+        """Clocks of one whole scan."""
+        return self.rows * self.row_clocks
+
+    @functools.cached_property
+    def bit_clocks(self) -> int:
+        return round(Fraction(self.skin.clock_hz, self.skin.baud))
+
+    @property
+    def debounced(self) -> bool:
+        return self.skin.debounce != "none"
+
+    @functools.cached_property
+    def press_scans(self) -> int:
+        return math.ceil(self._scans(exact(self.skin.debounce_press_us)))
+
+    @functools.cached_property
+    def release_scans(self) -> int:
+        return math.ceil(self._scans(exact(self.skin.debounce_release_us)))
+
+    @functools.cached_property
+    def keep_alive_scans(self) -> int:
+        return math.floor(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+
+    @functools.cached_property
+    def hello_scans(self) -> int:
+        return max(1, math.floor(self._scans(Fraction(500_000))))
+
+    def _scans(self, microseconds: Fraction) -> Fraction:
+        return microseconds * self.clocks_per_us / self.scan_clocks
+
+    @property
+    def moments(self) -> bool:
+        """True when the items of a frame are zone records, False when they are bitmap rows."""
+        return self.skin.report == "moments"
+
+    @property
+    def capacity(self) -> int:
+        """Items a frame can carry."""
+        if not self.moments:
+            return self.rows
+        assert self.skin.zone_capacity is not None
+        return self.skin.zone_capacity
+
+    @functools.cached_property
+    def area_bits(self) -> int:
+        return bits(self.rows * self.columns)
+
+    @functools.cached_property
+    def sum_x_bits(self) -> int:
+        return bits(self.rows * sum(range(self.columns)))
+
+    @functools.cached_property
+    def sum_y_bits(self) -> int:
+        return bits(self.columns * sum(range(self.rows)))
+
+    @functools.cached_property
+    def zones_bits(self) -> int:
+        if self.skin.connectivity == 8:
+            return bits(-(-self.rows // 2) * -(-self.columns // 2))
+        return bits(-(-self.rows * self.columns // 2))
+
+    @functools.cached_property
+    def item_bytes(self) -> int:
+        """Bytes of one zone record or one bitmap row."""
+        width = self.area_bits + self.sum_x_bits + self.sum_y_bits if self.moments else self.columns
+        return -(-width // 8)
+
+    @functools.cached_property
+    def fingerprint(self) -> bytes:
+        canonical = json.dumps(dataclasses.asdict(self.skin), sort_keys=True)
+        return hashlib.sha256(canonical.encode()).digest()[:8]
+
+
+def bits(largest: int) -> int:
+    """Least width, at least one bit, that holds 0 to ``largest``."""
+    width = 1
+    while 2**width <= largest:
+        width += 1
+    return width
+
+
+@functools.lru_cache(maxsize=64)
+def facts(skin: Skin) -> Facts:
+    """The facts of ``skin``, worked out once."""
+    return Facts(skin)

@@ -1,0 +1,61 @@
+"""Link: hellos and frames take turns on the wire; the newest complete frame waits."""
+
+from __future__ import annotations
+
+
+class Link:
+    """Who takes the wire when. Time only moves forward, by :meth:`advance`."""
+
+    def __init__(self, hello: bytes, bit_clocks: int):
+        self.bytes: list[tuple[int, int]] = []
+        """(cycle, value) of every byte handed to the UART so far."""
+        self.sent = 0
+        """Frames the wire has taken so far."""
+        self._hello = hello
+        self._byte_clocks = 10 * bit_clocks
+        self._hellos: list[int] = []
+        self._frame: tuple[int, bytes] | None = None
+        self._idle_from = 0
+        self._uart_from = 0
+
+    def want_hello(self, cycle: int) -> None:
+        """A hello waits from ``cycle`` on; one hello answers all that wait when it is taken."""
+        self._hellos.append(cycle)
+
+    def offer(self, cycle: int, packet: bytes) -> None:
+        """A complete frame waits from ``cycle`` on."""
+        assert self._frame is None, "a waiting frame must be dropped first"
+        self._frame = (cycle, packet)
+
+    def drop(self) -> bool:
+        """Drop the frame that waits; tells whether there was one."""
+        waited = self._frame is not None
+        self._frame = None
+        return waited
+
+    def advance(self, cycle: int) -> None:
+        """Let the wire take what it takes up to and including ``cycle``."""
+        while True:
+            waits = [*self._hellos, *([self._frame[0]] if self._frame else [])]
+            if not waits:
+                return
+            taken = max(self._idle_from, min(waits))
+            if taken > cycle:
+                return
+            if self._hellos and min(self._hellos) <= taken:
+                self._hellos = [wait for wait in self._hellos if wait > taken]
+                self._send(taken, self._hello)
+            else:
+                assert self._frame
+                packet = self._frame[1]
+                self._frame = None
+                self.sent += 1
+                self._send(taken, packet)
+
+    def _send(self, taken: int, packet: bytes) -> None:
+        cycle = max(taken + 2, self._uart_from)
+        for value in packet:
+            self.bytes.append((cycle, value))
+            cycle += self._byte_clocks
+        self._uart_from = cycle
+        self._idle_from = cycle - self._byte_clocks + 1

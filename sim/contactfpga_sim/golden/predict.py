@@ -1,0 +1,76 @@
+"""The stages put together: from a Skin and the cells over time to the events at every boundary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contactfpga_sim.golden import debounce, label, scan, serial
+from contactfpga_sim.golden.facts import Facts, facts
+from contactfpga_sim.golden.frame import Items, Packer, hello, join
+from contactfpga_sim.golden.link import Link
+from contactfpga_sim.golden.trace import Timeline, Trace
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
+    """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
+    known = facts(skin)
+    received = serial.received(timeline.requests, known.bit_clocks)
+    scanned = scan.scans(known, timeline, received, cycles // known.scan_clocks + 1)
+    counted = debounce.debounced(
+        np.array([one.cells for one in scanned]), skin.debounce, known.press_scans, known.release_scans
+    )
+    trace = Trace(cycles)
+    link = Link(hello(known), known.bit_clocks)
+    for cycle in (0, *(cycle + 1 for cycle in received)):
+        link.want_hello(cycle)
+    packer = Packer(known, link)
+    handed = Labeller(known, trace)
+    for one, cells in zip(scanned, counted, strict=True):
+        packer.take(handed.take(one, cells))
+    link.advance(cycles)
+    trace.bytes = link.bytes
+    trace.line = serial.line(link.bytes, known.bit_clocks)
+    trace.contact = scan.contact(known, scanned)
+    return trace.until(cycles)
+
+
+class Labeller:
+    """Hands rows over and lets records out, noting both in a trace."""
+
+    def __init__(self, facts: Facts, trace: Trace):
+        self._facts = facts
+        self._trace = trace
+        self._free = 0
+
+    def take(self, one: scan.Scan, cells: np.ndarray) -> Items:
+        """Work one frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
+        facts = self._facts
+        late = facts.columns + 3 if facts.debounced else 0
+        words = [int(np.sum(1 << np.nonzero(row)[0].astype(object))) for row in cells]
+        work = label.labelling(cells, facts.skin.connectivity)
+        handed = []
+        for row, offered in enumerate(one.offered):
+            last = row == facts.rows - 1
+            cycle = max(offered + late, self._free)
+            handed.append(cycle)
+            self._trace.rows.append((cycle, words[row], last))
+            if facts.moments:
+                self._free = cycle + (work.steps[row] + 1 if last else max(1, work.steps[row]))
+        if facts.moments:
+            records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
+            end = handed[-1] + work.steps[-1] + 3
+        else:
+            records = list(zip(handed, words, strict=True))
+            end = handed[-1] + 1
+        self._trace.records += [(cycle, data, False) for cycle, data in records] + [(end, 0, True)]
+        return Items(one, cells, records, end)
+
+    def _record(self, zone: label.Departure) -> int:
+        facts = self._facts
+        fields = (zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (zone.sum_y, facts.sum_y_bits)
+        return join(fields)[0]

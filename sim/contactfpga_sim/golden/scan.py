@@ -1,0 +1,93 @@
+"""Scanner: which cells are sampled when, the contact pin, stuck columns, device time and requests."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.trace import Timeline
+
+
+@dataclasses.dataclass(frozen=True)
+class Scan:
+    """One scan of the sheet, which becomes one frame."""
+
+    cells: np.ndarray
+    """(R, C) bool: raw samples, masked switches removed."""
+    offered: list[int]
+    """Cycle at which each row is offered to the next stage."""
+    stuck: int
+    """Columns that read pressed while no row was driven."""
+    time_us: int
+    """Device time of the first row's strobe, unbounded."""
+    requested: bool
+    """A byte came in since the scan before began."""
+
+
+def strobe(facts: Facts, slot: int) -> int:
+    """The cycle in which the sample of a row slot has come through the synchronisers."""
+    return slot * facts.row_clocks + facts.settle + 1
+
+
+def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int) -> list[Scan]:
+    """The first ``count`` scans. ``received``: cycles at which a byte was received."""
+    requests = sorted(received)
+    result = []
+    for index in range(count):
+        slots = range(index * facts.rows, (index + 1) * facts.rows)
+        begin = strobe(facts, slots[0])
+        before = strobe(facts, slots[0] - facts.rows) if index else 0
+        result.append(
+            Scan(
+                cells=np.array([_sample(facts, timeline, slot) for slot in slots]),
+                offered=[strobe(facts, slot) + 1 for slot in slots],
+                stuck=_stuck(facts, timeline, slots),
+                time_us=begin // facts.clocks_per_us,
+                requested=any(before <= cycle < begin for cycle in requests),
+            )
+        )
+    return result
+
+
+def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
+    """(cycle, level) of every change of the contact pin."""
+    changes = []
+    level = 0
+    for scan in scanned:
+        for row, cycle in enumerate(scan.offered):
+            last = row == facts.rows - 1
+            if scan.cells[row].any():
+                new = 1
+            elif last and not scan.cells.any():
+                new = 0
+            else:
+                new = level
+            if new != level:
+                changes.append((cycle, new))
+            level = new
+    return changes
+
+
+def _sample(facts: Facts, timeline: Timeline, slot: int) -> np.ndarray:
+    row = slot % facts.rows
+    cells, stuck = timeline.at(strobe(facts, slot) - 2)
+    columns = np.zeros(facts.columns, bool)
+    if cells is not None:
+        columns |= np.asarray(cells[row], bool)
+    if stuck is not None:
+        columns |= np.asarray(stuck, bool)
+    return columns & ~facts.mask[row]
+
+
+def _stuck(facts: Facts, timeline: Timeline, slots: range) -> int:
+    columns = np.zeros(facts.columns, bool)
+    for slot in range(slots[0] - 1, slots[-1]):
+        if slot < 0:
+            continue
+        _, stuck = timeline.at((slot + 1) * facts.row_clocks - 1)
+        if stuck is not None:
+            columns |= np.asarray(stuck, bool)
+    return int(np.sum(columns & ~facts.mask.all(axis=0)))

@@ -1,0 +1,87 @@
+"""What goes in and what comes out: cells over time, and events at the stage boundaries."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga_sim.golden.facts import facts
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+BOUNDARIES = ("rows", "records", "bytes", "line", "contact")
+"""Where model and gateware are compared, in the order the data takes."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Timeline:
+    """What happens at the pins of the board, from cycle 0 on.
+
+    ``pieces`` are (start cycle, cells, stuck): from that cycle on the (R, C) bool array ``cells`` is pressed,
+    and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven.
+    Starts rise; before the first one nothing is pressed. ``requests`` are the cycles at which the start bit
+    of a byte begins at the receive pin, rising and at least one byte apart.
+    """
+
+    pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
+    requests: Sequence[int] = ()
+
+    def __post_init__(self) -> None:
+        starts = [piece[0] for piece in self.pieces]
+        if any(late <= early for early, late in itertools.pairwise(starts)):
+            raise ValueError("pieces must start at rising cycles")
+        if any(late <= early for early, late in itertools.pairwise(self.requests)):
+            raise ValueError("requests must be at rising cycles")
+        object.__setattr__(self, "_starts", starts)
+
+    @classmethod
+    def frames(
+        cls,
+        skin: Skin,
+        frames: Iterable[np.ndarray],
+        stuck: Iterable[np.ndarray | None] | None = None,
+        requests: Sequence[int] = (),
+    ) -> Timeline:
+        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan."""
+        held = [np.asarray(cells, bool) for cells in frames]
+        lines = list(stuck) if stuck is not None else [None] * len(held)
+        scan = facts(skin).scan_clocks
+        pieces = [(i * scan, cells, line) for i, (cells, line) in enumerate(zip(held, lines, strict=True))]
+        return cls(pieces, requests)
+
+    def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Cells and stuck columns in ``cycle``; None stands for none pressed."""
+        index = bisect.bisect_right(self._starts, cycle) - 1  # type: ignore[attr-defined]
+        return (None, None) if index < 0 else (self.pieces[index][1], self.pieces[index][2])
+
+
+@dataclasses.dataclass
+class Trace:
+    """Events at every boundary in cycles 0 to ``cycles`` - 1, each list in rising order of cycles."""
+
+    cycles: int
+    rows: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
+    """(cycle, cells, last): a row handed to the labeller, bit c is column c; last row of its frame."""
+    records: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
+    """(cycle, data, end): an item of a frame, its bit fields packed as on the wire, or the end mark."""
+    bytes: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    """(cycle, value): a byte handed to the UART."""
+    line: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    """(cycle, level): a change of the transmit pin, which is high before cycle 0."""
+    contact: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    """(cycle, level): a change of the contact pin, which is low before cycle 0."""
+
+    def events(self, boundary: str) -> list[tuple[Any, ...]]:
+        """The events of one of :data:`BOUNDARIES`."""
+        return getattr(self, boundary)
+
+    def until(self, cycles: int) -> Trace:
+        """The same trace, ended before ``cycles``."""
+        kept = {name: [event for event in self.events(name) if event[0] < cycles] for name in BOUNDARIES}
+        return Trace(min(cycles, self.cycles), **kept)

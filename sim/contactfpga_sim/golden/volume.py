@@ -1,0 +1,133 @@
+"""Zones and labeller timing of very many frames at once, for volume tests.
+
+The same rules as :mod:`zones` and :mod:`label`, written for arrays: (N, R, C) bool frames go in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+_AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
+
+
+@dataclasses.dataclass(frozen=True)
+class Departures:
+    """Zones of N frames, n in all: frame i owns the places ``offsets[i]`` to ``offsets[i + 1] - 1``."""
+
+    offsets: np.ndarray
+    """(N + 1,) int64."""
+    row: np.ndarray
+    """(n,) int64: the row that is worked while the zone leaves."""
+    step: np.ndarray
+    """(n,) int64: the step of that row, from 1, with which it leaves."""
+    moments: np.ndarray
+    """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave."""
+
+    def sorted_moments(self) -> np.ndarray:
+        """The moments, sorted by area, sum x, sum y within each frame instead."""
+        area, sum_x, sum_y = self.moments.T
+        return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
+
+    @property
+    def frame(self) -> np.ndarray:
+        """(n,) int64: the frame of each zone."""
+        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
+
+
+def all_departures(frames: np.ndarray, connectivity: int) -> Departures:
+    """Every zone of (N, R, C) bool frames, and when it leaves."""
+    frames = np.asarray(frames, bool)
+    count, rows, columns = frames.shape
+    chunk = max(1, _AT_ONCE // (rows * columns))
+    parts = [_departures(frames[i : i + chunk], connectivity) for i in range(0, count, chunk)]
+    numbers = [np.diff(part.offsets) for part in parts]
+    return Departures(
+        offsets=np.concatenate([[0], np.cumsum(np.concatenate(numbers or [np.zeros(0, int)]))]),
+        row=np.concatenate([np.zeros(0, int), *(part.row for part in parts)]),
+        step=np.concatenate([np.zeros(0, int), *(part.step for part in parts)]),
+        moments=np.concatenate([np.zeros((0, 3), int), *(part.moments for part in parts)]),
+    )
+
+
+def row_steps(frames: np.ndarray, connectivity: int) -> np.ndarray:
+    """(N, R) int64: steps the labeller takes for each row of (N, R, C) bool frames."""
+    return _strips(np.asarray(frames, bool), connectivity)[1]
+
+
+def last_record_clocks(frames: np.ndarray, connectivity: int) -> np.ndarray:
+    """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
+    found = all_departures(frames, connectivity)
+    result = np.zeros(len(frames), int)
+    final = found.row == frames.shape[1] - 1
+    np.maximum.at(result, found.frame[final], found.step[final] + 2)
+    return result
+
+
+def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
+    """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1.
+
+    The least label spreads to neighbours until nothing changes; after every round each cell also takes the
+    label of the cell its label names, which doubles the distance that labels travel.
+    """
+    count, rows, columns = frames.shape
+    index = np.arange(frames.size).reshape(frames.shape)
+    nothing = frames.size
+    padded = np.full((count, rows + 2, columns + 2), nothing)
+    inner = padded[:, 1:-1, 1:-1]
+    inner[...] = np.where(frames, index, nothing)
+    steps = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if connectivity == 8 or dy == 0 or dx == 0]
+    while True:
+        around = [padded[:, 1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns] for dy, dx in steps]
+        least = np.where(frames, np.minimum.reduce(around), nothing)
+        if np.array_equal(least, inner):
+            return np.where(frames, inner, -1)
+        inner[...] = np.append(least.ravel(), nothing)[least]
+
+
+def _departures(frames: np.ndarray, connectivity: int) -> Departures:
+    count, rows, columns = frames.shape
+    labels = min_labels(frames, connectivity)
+    roots, zone = np.unique(labels[frames], return_inverse=True)
+    frame, y, x = np.nonzero(frames)
+    total = len(roots)
+    last_row = np.zeros(total, int)
+    np.maximum.at(last_row, zone, y)
+    leaves = np.minimum(last_row + 1, rows - 1)
+    last_step, _ = _strips(frames, connectivity)
+    step = np.zeros(total, int)
+    for place in (0, 1):  # the zone's cells in the row before the one worked, and in that row itself
+        near = y == leaves[zone] - 1 + place
+        np.maximum.at(step, zone[near], last_step[frame[near], leaves[zone[near]], x[near]])
+    moments = np.stack([np.bincount(zone, weight, total) for weight in (np.ones(len(y)), x, y)], axis=1)
+    owner = roots // (rows * columns)
+    order = np.lexsort((step, leaves, owner))
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
+    return Departures(offsets, leaves[order], step[order], moments.astype(int)[order])
+
+
+def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
+    """(N, R, C): last step of the cluster each column of a row lies in; (N, R): all steps of a row."""
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    taken = frames | before
+    none = np.zeros(taken.shape[:2], bool)
+    steps, begun = np.zeros(none.shape, int), np.zeros(none.shape, int)
+    above, new = begun.copy(), begun.copy()
+    reached = np.zeros(frames.shape, int)
+    joins = []
+    for column in range(frames.shape[2]):
+        a, b, here = before[..., column], frames[..., column], taken[..., column]
+        a_left, b_left, here_left = (
+            array[..., column - 1] if column else none for array in (before, frames, taken)
+        )
+        joined = here & here_left if connectivity == 8 else (a & a_left) | (b & b_left)
+        joins.append(joined)
+        begun = np.where(joined, begun, steps)
+        above = np.where(joined, above, 0) + (a & ~a_left)
+        new = np.where(joined, new, 0) + (b & ~b_left)
+        steps = np.where(here, begun + np.maximum(above, new), steps)
+        reached[..., column] = steps
+    for column in range(frames.shape[2] - 2, -1, -1):
+        reached[..., column] = np.where(joins[column + 1], reached[..., column + 1], reached[..., column])
+    return reached, steps
