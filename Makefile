@@ -28,6 +28,8 @@ help: ## list the targets
 	@echo
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 	@echo
+	@echo "  make sim PYTHON=/path/to/python3.12   chooses the Python with which .venv is created (make distclean to change it)"
+	@echo
 
 check: ## look for Python and a C++ compiler; say what to install
 	@sh scripts/check
