@@ -301,9 +301,7 @@ class _Merge(wiring.Component):
         passed = step.has_before & ~self._later  # the zone's last run: its moments come in
         m.d.comb += [
             group.eq(joined),
-            group.open.eq(
-                joined.open + (step.has_before & ~self._earlier & self._later) - (passed & self._earlier)
-            ),
+            group.open.eq(joined.open + (step.has_before & ~self._earlier & self._later) - (passed & self._earlier)),
         ]
         with m.If(step.has_run):
             m.d.comb += [

@@ -13,9 +13,7 @@ def row_layout(derived: Derived) -> data.StructLayout:
 
 def moments_layout(derived: Derived) -> data.StructLayout:
     """Exact moments of a set of cells; as bits, lowest first, this is a zone record on the wire."""
-    return data.StructLayout(
-        {"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits}
-    )
+    return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
 
 
 def record_layout(derived: Derived) -> data.StructLayout:

@@ -140,12 +140,15 @@ class Derived:
         return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
 
     @functools.cached_property
-    def record_backlog(self) -> int:
-        """Records that can wait for the packer.
+    def backlog(self) -> int:
+        """Items that can wait for the packer.
 
         Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
-        them takes longer than two rows the rest adds up, over at most the capacity of two frames.
+        them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
+        are packed before the next one comes.
         """
+        if self.skin.report == "cells":
+            return 4
         busy = self.open_zones * self.record_bytes
         late = max(0.0, 1 - 2 * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2

@@ -1,0 +1,67 @@
+"""UART: 8 data bits, no parity, one stop bit, lowest bit first."""
+
+from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+
+class Transmitter(wiring.Component):
+    """Bytes in, line level out. A byte takes ten bits of ``bit_clocks``; the next one follows without a gap."""
+
+    def __init__(self, bit_clocks: int):
+        self.bit_clocks = bit_clocks
+        super().__init__({"bytes": In(stream.Signature(8)), "pin": Out(1, init=1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        clock = Signal(range(self.bit_clocks))
+        bits_left = Signal(range(11))
+        shift = Signal(9, init=0x1FF)
+        bit_ends = clock == 0
+        m.d.comb += self.bytes.ready.eq((bits_left == 0) | (bits_left == 1) & bit_ends)
+        with m.If(self.bytes.valid & self.bytes.ready):
+            m.d.sync += [
+                Cat(self.pin, shift).eq(Cat(Const(0, 1), self.bytes.payload, Const(1, 1))),
+                clock.eq(self.bit_clocks - 1),
+                bits_left.eq(10),
+            ]
+        with m.Elif(bits_left != 0):
+            m.d.sync += clock.eq(clock - 1)
+            with m.If(bit_ends):
+                m.d.sync += [
+                    Cat(self.pin, shift).eq(Cat(shift, Const(1, 1))),
+                    clock.eq(self.bit_clocks - 1),
+                    bits_left.eq(bits_left - 1),
+                ]
+        return m
+
+
+class Receiver(wiring.Component):
+    """Line level in; ``received`` is high for one clock in the middle of a good stop bit.
+
+    The board takes any byte as the same request, so the bits between are not kept.
+    """
+
+    def __init__(self, bit_clocks: int):
+        self.bit_clocks = bit_clocks
+        super().__init__({"pin": In(1, init=1), "received": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        level = Signal(init=1)
+        m.submodules.sync_pin = FFSynchronizer(self.pin, level, init=1)
+        half = self.bit_clocks // 2
+        clock = Signal(range(self.bit_clocks))
+        bits_left = Signal(range(11))  # counting the start bit; 0: waiting for one
+        with m.If(bits_left == 0):
+            with m.If(~level):
+                m.d.sync += [bits_left.eq(10), clock.eq(half - 1)]
+        with m.Elif(clock != 0):
+            m.d.sync += clock.eq(clock - 1)
+        with m.Else():
+            m.d.sync += [bits_left.eq(bits_left - 1), clock.eq(self.bit_clocks - 1)]
+            with m.If((bits_left == 10) & level):
+                m.d.sync += bits_left.eq(0)  # no start bit, only noise
+            m.d.comb += self.received.eq((bits_left == 1) & level)
+        return m

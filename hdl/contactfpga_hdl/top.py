@@ -1,0 +1,110 @@
+"""The whole chain for one Skin; wiring only."""
+
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_hdl.audit import Audit, Bitmap
+from contactfpga_hdl.debounce import Debounce
+from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.link import Link
+from contactfpga_hdl.scan import Scanner
+from contactfpga_hdl.serial import Receiver, Transmitter
+
+
+class Top(wiring.Component):
+    """Row and column pins in, UART and ``contact`` pins out.
+
+    With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
+    labeller, zone records (or with ``report = "cells"`` bitmap rows), and bytes.
+    """
+
+    def __init__(self, skin: Skin, probes: bool = False):
+        self.skin = skin
+        self.probes = probes
+        derived = Derived(skin)
+        ports = {
+            "rows": Out(skin.rows),
+            "columns": In(skin.columns),
+            "tx": Out(1, init=1),
+            "rx": In(1, init=1),
+            "contact": Out(1),
+        }
+        if probes:
+            ports |= {
+                "row_transfer": Out(1),
+                "row_cells": Out(skin.columns),
+                "row_last": Out(1),
+                "record_transfer": Out(1),
+                "record_data": Out(8 * derived.item_bytes),
+                "record_end": Out(1),
+                "byte_transfer": Out(1),
+                "byte_data": Out(8),
+            }
+        super().__init__(ports)
+
+    def elaborate(self, platform):
+        m = Module()
+        bit_clocks = Derived(self.skin).bit_clocks
+        m.submodules.scan = scan = Scanner(self.skin)
+        m.submodules.link = link = Link(self.skin)
+        m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
+        m.submodules.receiver = receiver = Receiver(bit_clocks)
+        rows = self._debounced(m, scan)
+        if self.skin.report == "moments":
+            self._zones(m, rows, scan, link)
+        else:
+            self._cells(m, rows, scan, link)
+        wiring.connect(m, link.bytes, transmitter.bytes)
+        m.d.comb += [
+            self.rows.eq(scan.pins.rows),
+            scan.pins.columns.eq(self.columns),
+            self.contact.eq(scan.contact),
+            self.tx.eq(transmitter.pin),
+            receiver.pin.eq(self.rx),
+            scan.request.eq(receiver.received),
+            link.received.eq(receiver.received),
+        ]
+        if self.probes:
+            self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
+            self._probe(m, "byte", link.bytes, data=link.bytes.payload)
+        return m
+
+    def _debounced(self, m, scan):
+        if self.skin.debounce == "none":
+            return scan.rows
+        m.submodules.debounce = debounce = Debounce(self.skin)
+        wiring.connect(m, scan.rows, debounce.raw)
+        return debounce.rows
+
+    def _zones(self, m, rows, scan, link):
+        m.submodules.label = label = RunLabeller(self.skin)
+        m.submodules.audit = audit = Audit(self.skin)
+        wiring.connect(m, rows, label.rows)
+        wiring.connect(m, label.records, audit.records)
+        wiring.connect(m, audit.items, link.items)
+        m.d.comb += [
+            audit.taken.eq(rows.valid & rows.ready),
+            audit.row.eq(rows.payload),
+            audit.tag.eq(scan.tag),
+            link.summary.eq(audit.summary),
+        ]
+        if self.probes:
+            record = label.records.payload
+            self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+
+    def _cells(self, m, rows, scan, link):
+        m.submodules.bitmap = bitmap = Bitmap(self.skin)
+        wiring.connect(m, rows, bitmap.rows)
+        wiring.connect(m, bitmap.items, link.items)
+        m.d.comb += [bitmap.tag.eq(scan.tag), link.summary.eq(bitmap.summary)]
+        if self.probes:
+            item = bitmap.items.payload
+            self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
+
+    def _probe(self, m, name, boundary, **fields):
+        m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
+        for field, value in fields.items():
+            m.d.comb += getattr(self, f"{name}_{field}").eq(value)
