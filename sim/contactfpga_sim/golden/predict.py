@@ -66,7 +66,7 @@ class Labeller:
             end = handed[-1] + work.steps[-1] + 3
         else:
             records = list(zip(handed, words, strict=True))
-            end = handed[-1] + 1
+            end = handed[-1] + 3
         self._trace.records += [(cycle, data, False) for cycle, data in records] + [(end, 0, True)]
         return Items(one, cells, records, end)
 

@@ -118,9 +118,7 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
     joins = []
     for column in range(frames.shape[2]):
         a, b, here = before[..., column], frames[..., column], taken[..., column]
-        a_left, b_left, here_left = (
-            array[..., column - 1] if column else none for array in (before, frames, taken)
-        )
+        a_left, b_left, here_left = (array[..., column - 1] if column else none for array in (before, frames, taken))
         joined = here & here_left if connectivity == 8 else (a & a_left) | (b & b_left)
         joins.append(joined)
         begun = np.where(joined, begun, steps)

@@ -1,0 +1,199 @@
+"""The golden model's zones and labeller timing: third opinions, known shapes, and the rule worked by hand."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from contactfpga_sim import golden
+from contactfpga_sim.golden.label import labelling
+
+CONNECTIVITIES = (4, 8)
+SHAPES = [
+    (1, 1),
+    (1, 2),
+    (1, 17),
+    (17, 1),
+    (2, 2),
+    (3, 64),
+    (64, 3),
+    (5, 7),
+    (16, 16),
+    (13, 6),
+    (33, 20),
+    (64, 64),
+]
+
+SPIRAL = """
+#########
+........#
+#######.#
+#.....#.#
+#.###.#.#
+#.#...#.#
+#.#####.#
+#.......#
+#########
+"""
+COMB = """
+#.#.#.#.#
+#.#.#.#.#
+#########
+"""
+NESTED_U = """
+#.#.#.#
+#.#.#.#
+#.#.#.#
+#.###.#
+#.....#
+#######
+"""
+RINGS = """
+#######
+#.....#
+#.###.#
+#.#.#.#
+#.###.#
+#.....#
+#######
+"""
+
+
+def drawn(art: str) -> np.ndarray:
+    return np.array([[mark == "#" for mark in line] for line in art.split()])
+
+
+def random_frames(rng: np.random.Generator, shape: tuple[int, int], count: int) -> np.ndarray:
+    density = rng.random((count, 1, 1))
+    return rng.random((count, *shape)) < density
+
+
+def scipy_zones(frames: np.ndarray, connectivity: int) -> list[tuple[int, int, int, int]]:
+    """Sorted (frame, area, sum x, sum y) of (N, R, C) frames, found in one call."""
+    structure = np.zeros((3, 3, 3), int)
+    structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    labels, count = ndimage.label(frames, structure)
+    index = np.arange(1, count + 1)
+    frame, y, x = np.indices(frames.shape)
+    columns = [ndimage.minimum(frame, labels, index)] if count else [np.zeros(0)]
+    columns += [ndimage.sum_labels(weight, labels, index) for weight in (np.ones_like(x), x, y)]
+    return sorted(map(tuple, np.array(columns).T.astype(int).tolist()))
+
+
+def cv2_zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
+    _, _, stats, centres = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=connectivity)
+    found = [
+        (int(area), *np.rint(centre * area).astype(int).tolist())
+        for area, centre in zip(stats[1:, cv2.CC_STAT_AREA], centres[1:], strict=True)
+    ]
+    return sorted(found)
+
+
+def vector_zones(frames: np.ndarray, connectivity: int) -> list[tuple[int, int, int, int]]:
+    found = golden.all_departures(frames, connectivity)
+    return list(map(tuple, np.column_stack([found.frame, found.sorted_moments()]).tolist()))
+
+
+def every_frame(rows: int, columns: int) -> np.ndarray:
+    numbers = np.arange(2 ** (rows * columns))[:, None]
+    return (numbers >> np.arange(rows * columns) & 1).astype(bool).reshape(-1, rows, columns)
+
+
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_flood_fill_agrees_with_scipy_and_opencv(shape, connectivity):
+    rng = np.random.default_rng([*shape, connectivity])
+    for cells in random_frames(rng, shape, 12):
+        found = golden.zones(cells, connectivity)
+        assert found == cv2_zones(cells, connectivity)
+        assert found == [zone[1:] for zone in scipy_zones(cells[None], connectivity)]
+
+
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+def test_every_4x4_frame_agrees_with_scipy(connectivity):
+    frames = every_frame(4, 4)
+    assert vector_zones(frames, connectivity) == scipy_zones(frames, connectivity)
+
+
+@pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_many_frames_at_once_agree_with_flood_fill_and_step_rule(shape, connectivity):
+    rng = np.random.default_rng([*shape, connectivity, 1])
+    frames = random_frames(rng, shape, 6 if shape == (64, 64) else 40)
+    found = golden.all_departures(frames, connectivity)
+    steps = golden.row_steps(frames, connectivity)
+    clocks = golden.last_record_clocks(frames, connectivity)
+    for index, cells in enumerate(frames):
+        one = labelling(cells, connectivity)
+        own = slice(found.offsets[index], found.offsets[index + 1])
+        table = np.column_stack([found.row[own], found.step[own], found.moments[own]]).tolist()
+        assert table == [[zone.row, zone.step, zone.area, zone.sum_x, zone.sum_y] for zone in one.departures]
+        assert steps[index].tolist() == list(one.steps)
+        final = [zone.step + 2 for zone in one.departures if zone.row == shape[0] - 1]
+        assert clocks[index] == max(final, default=0)
+
+
+def test_frames_beyond_one_portion_keep_their_places():
+    rng = np.random.default_rng(5)
+    few = random_frames(rng, (32, 32), 50)
+    many = np.concatenate([few] * 60)  # more cells than are worked at once
+    one, all_found = golden.all_departures(few, 8), golden.all_departures(many, 8)
+    assert np.array_equal(all_found.moments, np.concatenate([one.moments] * 60))
+    assert np.array_equal(np.diff(all_found.offsets), np.tile(np.diff(one.offsets), 60))
+
+
+@pytest.mark.parametrize(
+    ("art", "connectivity", "zones"),
+    [
+        (SPIRAL, 8, [(49, 198, 198)]),
+        (COMB, 8, [(19, 76, 23)]),
+        (NESTED_U, 4, [(9, 27, 15), (17, 51, 55)]),
+        (RINGS, 8, [(8, 24, 24), (24, 72, 72)]),
+        ("#. .#", 8, [(2, 1, 1)]),
+        ("#. .#", 4, [(1, 0, 0), (1, 1, 1)]),
+        ("#.#.# .#.#. #.#.#", 8, [(8, 16, 8)]),
+        ("#.#.# .#.#. #.#.#", 4, sorted((1, x, y) for y in range(3) for x in range(5) if (x + y) % 2 == 0)),
+        ("... ...", 8, []),
+    ],
+)
+def test_known_shapes(art, connectivity, zones):
+    cells = drawn(art)
+    assert golden.zones(cells, connectivity) == zones
+    assert vector_zones(cells[None], connectivity) == [(0, *zone) for zone in zones]
+
+
+@pytest.mark.parametrize(
+    ("art", "connectivity", "steps", "departures"),
+    [
+        # one run above, none below: a step lets it out with the next row
+        ("#.. ... ...", 8, (1, 1, 0), [(1, 1)]),
+        # the last row lets out what it touches too
+        ("... ... #.#", 8, (0, 0, 2), [(2, 1), (2, 2)]),
+        # two runs joined by one: max(2, 1) steps, and the zone leaves with the last of them
+        ("#.# ###", 8, (2, 2), [(1, 2)]),
+        ("#.# ###", 4, (2, 2), [(1, 2)]),
+        # three above one below, and one run that ends: 3 + 1 steps
+        ("#.#.#.# #####..", 8, (4, 4), [(1, 3), (1, 4)]),
+        # corners join with 8 and part with 4
+        ("#. .#", 8, (1, 1), [(1, 1)]),
+        ("#. .#", 4, (1, 2), [(1, 1), (1, 2)]),
+        # a zone in two clusters of the last strip leaves with the one on the right
+        ("##### #...# #....", 8, (1, 2, 2), [(2, 2)]),
+        # a single row
+        ("#.##.#", 8, (3,), [(0, 1), (0, 2), (0, 3)]),
+    ],
+)
+def test_step_rule_by_hand(art, connectivity, steps, departures):
+    work = labelling(drawn(art), connectivity)
+    assert work.steps == steps
+    assert [(zone.row, zone.step) for zone in work.departures] == departures
+
+
+@pytest.mark.parametrize(("connectivity", "worst"), [(8, max(4 + 2, 6)), (4, max(2 * 4 + 2, 8))])
+def test_rule_keeps_the_latency_bound_for_every_4x4_frame(connectivity, worst):
+    frames = every_frame(4, 4)
+    clocks = golden.last_record_clocks(frames, connectivity)
+    assert 0 < clocks.max() <= worst
+    final = np.pad(frames[:, 2:], ((0, 0), (0, 0), (1, 0)))
+    runs = (final[:, :, 1:] & ~final[:, :, :-1]).sum(axis=(1, 2))
+    assert clocks[runs <= 4].max() <= 8
