@@ -5,6 +5,7 @@ from __future__ import annotations
 import binascii
 import dataclasses
 import struct
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Hello:
 
     def skin(self) -> Skin:
         """A Skin with this hello's facts: it decodes the board's frames; its clock and scan times are unknown."""
-        slow = {"clock_hz": 400_000_000, "settle_us": 10_000.0}  # what the host does not know must not refuse
+        slow: dict[str, Any] = {"clock_hz": 400_000_000, "settle_us": 10_000.0}  # what the host does not know must not refuse
         return Skin(
             **{name: getattr(self, name) for name in _FACTS},
             surface="plane" if self.radius_mm is None else "cylinder",
@@ -170,7 +171,7 @@ def decode_hello(plain: bytes) -> Hello:
     if plain[0] & 7 != KIND_HELLO or len(plain) != 1 + _HELLO.size:
         raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
     rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[1:])
-    chosen = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
+    chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
     return Hello(
         rows=rows,
         columns=columns,

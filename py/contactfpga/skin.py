@@ -230,8 +230,9 @@ class Skin:
                 raise SkinError(f"{name} is {getattr(self, name)}; it must be at least one clock, {1 / megahertz:g} us")
         if derived.row_clocks < derived.min_row_clocks:
             raise SkinError(
-                f"settle_us + release_us is {derived.row_clocks} clocks; {self.columns} columns need "
-                f"{derived.min_row_clocks} clocks ({derived.min_row_clocks / megahertz:g} us)"
+                f"settle_us + release_us is {derived.row_clocks} clocks; {self.columns} columns and "
+                f"{self.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
+                f"({derived.min_row_clocks / megahertz:g} us)"
             )
         if self.send == "on_change" and derived.keep_alive_frames < 1:
             raise SkinError(
