@@ -77,56 +77,56 @@ class Derived:
 
     # ---- widths in bits and sizes in bytes
 
-    @property
+    @functools.cached_property
     def cells(self) -> int:
         return self.skin.rows * self.skin.columns
 
-    @property
+    @functools.cached_property
     def zone_capacity(self) -> int:
         assert self.skin.zone_capacity is not None
         return self.skin.zone_capacity
 
-    @property
+    @functools.cached_property
     def area_bits(self) -> int:
         return self.cells.bit_length()
 
-    @property
+    @functools.cached_property
     def sum_x_bits(self) -> int:
         return max(1, (self.skin.rows * math.comb(self.skin.columns, 2)).bit_length())
 
-    @property
+    @functools.cached_property
     def sum_y_bits(self) -> int:
         return max(1, (self.skin.columns * math.comb(self.skin.rows, 2)).bit_length())
 
-    @property
+    @functools.cached_property
     def zones_bits(self) -> int:
         return self.skin.max_zones().bit_length()
 
-    @property
+    @functools.cached_property
     def record_bytes(self) -> int:
         """Bytes of one zone on the wire."""
         return math.ceil((self.area_bits + self.sum_x_bits + self.sum_y_bits) / 8)
 
-    @property
+    @functools.cached_property
     def bitmap_row_bytes(self) -> int:
         """Bytes of one row on the wire with ``report = "cells"``."""
         return math.ceil(self.skin.columns / 8)
 
-    @property
+    @functools.cached_property
     def trailer_bytes(self) -> int:
         """Bytes that close a frame, before its CRC."""
         return math.ceil((24 + 8 + 8 + 3 + 4 + self.area_bits + self.zones_bits) / 8)
 
-    @property
+    @functools.cached_property
     def item_bytes(self) -> int:
         """Bytes of one item of a frame: a zone or a bitmap row."""
         return self.record_bytes if self.skin.report == "moments" else self.bitmap_row_bytes
 
-    @property
+    @functools.cached_property
     def max_items(self) -> int:
         return self.zone_capacity if self.skin.report == "moments" else self.skin.rows
 
-    @property
+    @functools.cached_property
     def max_frame_bytes(self) -> int:
         """The longest frame on the wire: kind, items, trailer, CRC, stuffed, with its delimiter."""
         plain = 1 + self.max_items * self.item_bytes + self.trailer_bytes + 2

@@ -32,11 +32,15 @@ _OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("al
 
 
 class PacketError(ValueError):
-    """Bytes that are not a whole, valid packet; ``reason`` is a key of the driver's counters."""
+    """Bytes that are not a whole, valid packet.
 
-    def __init__(self, reason: str, message: str):
+    ``reason`` is a key of the driver's counters; ``lead`` the first byte of a packet of another version.
+    """
+
+    def __init__(self, reason: str, message: str, lead: int = 0):
         super().__init__(message)
         self.reason = reason
+        self.lead = lead
 
 
 def lead_byte(kind: int) -> int:
@@ -67,7 +71,10 @@ class Hello:
 
     def skin(self) -> Skin:
         """A Skin with this hello's facts: it decodes the board's frames; its clock and scan times are unknown."""
-        slow: dict[str, Any] = {"clock_hz": 400_000_000, "settle_us": 10_000.0}  # what the host does not know must not refuse
+        slow: dict[str, Any] = {
+            "clock_hz": 400_000_000,
+            "settle_us": 10_000.0,
+        }  # what the host does not know must not refuse
         return Skin(
             **{name: getattr(self, name) for name in _FACTS},
             surface="plane" if self.radius_mm is None else "cylinder",
@@ -123,7 +130,9 @@ def cobs_decode(data: bytes) -> bytes:
         code = data[position]
         end = position + code
         if code == 0 or end > len(data):
-            raise PacketError("framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes")
+            raise PacketError(
+                "framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes"
+            )
         out += data[position + 1 : end]
         position = end
         if code < 255 and position < len(data):
@@ -145,14 +154,17 @@ def unseal(packet: bytes) -> bytes:
     if binascii.crc_hqx(plain, 0xFFFF) != 0:
         raise PacketError("crc", f"CRC of a packet of {len(plain)} bytes does not match")
     if plain[0] >> 3 != VERSION:
-        raise PacketError("version", f"packet of protocol version {plain[0] >> 3}; this host speaks {VERSION}")
+        message = f"packet of protocol version {plain[0] >> 3}; this host speaks {VERSION}"
+        raise PacketError("version", message, plain[0])
     return plain[:-2]
 
 
 def encode_hello(skin: Skin) -> bytes:
     """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
     facts = Hello.of(skin)
-    options = sum(choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
+    options = sum(
+        choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items())
+    )
     plain = struct.pack("B", lead_byte(KIND_HELLO)) + _HELLO.pack(
         facts.rows,
         facts.columns,
@@ -171,7 +183,13 @@ def decode_hello(plain: bytes) -> Hello:
     if plain[0] & 7 != KIND_HELLO or len(plain) != 1 + _HELLO.size:
         raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
     rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[1:])
-    chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
+    if options >> len(_OPTIONS):
+        raise PacketError(
+            "content", f"hello with options {options:#x}; this version knows {len(_OPTIONS)} of them"
+        )
+    chosen: dict[str, Any] = {
+        name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())
+    }
     return Hello(
         rows=rows,
         columns=columns,
@@ -185,11 +203,17 @@ def decode_hello(plain: bytes) -> Hello:
 
 
 def decode_frame(plain: bytes, derived: Derived) -> Frame:
-    """Read an unsealed frame of the Skin behind ``derived``; its length must agree with its zone count."""
+    """Read an unsealed frame of the Skin behind ``derived``.
+
+    Raises :class:`PacketError` unless its length agrees with its zone count and, where the board does not itself
+    flag a mismatch, its cells with its zones.
+    """
     skin = derived.skin
     kind = KIND_ZONES if skin.report == "moments" else KIND_CELLS
     if plain[0] & 7 != kind:
-        raise PacketError("kind", f"packet of kind {plain[0] & 7}; report = {skin.report!r} sends kind {kind}")
+        raise PacketError(
+            "kind", f"packet of kind {plain[0] & 7}; report = {skin.report!r} sends kind {kind}"
+        )
     body = len(plain) - 1 - derived.trailer_bytes
     items, rest = divmod(body, derived.item_bytes)
     if body < 0 or rest:
@@ -197,15 +221,26 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
     trailer = int.from_bytes(plain[1 + body :], "little")
     time_us, sequence, overwritten, flag_bits, stuck, cells, zones, beyond = _split(
         trailer,
-        *(TIME_BITS, COUNTER_BITS, COUNTER_BITS, FLAG_BITS, STUCK_BITS, derived.area_bits, derived.zones_bits),
+        *(
+            TIME_BITS,
+            COUNTER_BITS,
+            COUNTER_BITS,
+            FLAG_BITS,
+            STUCK_BITS,
+            derived.area_bits,
+            derived.zones_bits,
+        ),
     )
-    flags = frozenset(name for bit, name in enumerate(FLAGS) if flag_bits >> bit & 1)
+    flags = _FLAG_SETS[flag_bits]
     expected = skin.rows if skin.report == "cells" else zones
-    carried_short = "overflow" in flags and items < expected and items == derived.zone_capacity
-    if beyond or cells > derived.cells or not (items == expected or carried_short):
-        raise PacketError("length", f"frame carries {items} items and states {expected}")
-    data = plain[1 : 1 + body]
-    return Frame(
+    carried = min(expected, derived.max_items)
+    if items != carried or ("overflow" in flags) != (carried < expected):
+        raise PacketError(
+            "length", f"frame carries {items} items, states {expected} and the flags {sorted(flags)}"
+        )
+    if beyond or zones > (skin.max_zones() if skin.report == "moments" else 0):
+        raise PacketError("content", f"frame states {zones} zones and fills its trailer up with {beyond}")
+    frame = Frame(
         sequence=sequence,
         time_us=time_us,
         flags=flags,
@@ -213,23 +248,65 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
         stuck=stuck,
         zones=zones,
         cells=cells,
-        moments=_moments(data, items, derived) if skin.report == "moments" else np.zeros((0, 3), np.int64),
-        bitmap=_bitmap(data, derived) if skin.report == "cells" else None,
+        moments=_moments(plain[1 : 1 + body], items, derived) if skin.report == "moments" else _NO_MOMENTS,
+        bitmap=_bitmap(plain[1 : 1 + body], derived) if skin.report == "cells" else None,
     )
+    if "mismatch" not in flags:
+        _check_sums(frame, derived)
+    return frame
+
+
+_NO_MOMENTS = np.zeros((0, 3), np.int64)
+_NO_MOMENTS.flags.writeable = False
+_FLAG_SETS = [
+    frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << FLAG_BITS)
+]
+
+
+def _check_sums(frame: Frame, derived: Derived) -> None:
+    """Zones and cells of one sheet agree; raises :class:`PacketError`."""
+    skin = derived.skin
+    if frame.bitmap is not None:
+        carried = int(frame.bitmap.sum())
+        possible = carried == frame.cells
+    else:
+        area, sum_x, sum_y = frame.moments.T.tolist()
+        carried = sum(area)
+        possible = (
+            all(area)
+            and all(
+                x <= a * (skin.columns - 1) and y <= a * (skin.rows - 1)
+                for a, x, y in zip(area, sum_x, sum_y)
+            )
+            and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
+        )
+    if not possible or frame.cells > derived.cells:
+        raise PacketError(
+            "content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be"
+        )
 
 
 def _moments(data: bytes, zones: int, derived: Derived) -> np.ndarray:
-    raw = np.frombuffer(data, np.uint8).reshape(zones, derived.record_bytes).astype(np.int64)
-    word = (raw << (8 * np.arange(derived.record_bytes, dtype=np.int64))).sum(axis=1)
-    area = word & (1 << derived.area_bits) - 1
-    sum_x = word >> derived.area_bits & (1 << derived.sum_x_bits) - 1
-    sum_y = word >> (derived.area_bits + derived.sum_x_bits)
-    return np.stack([area, sum_x, sum_y], axis=1)
+    if not zones:
+        return _NO_MOMENTS
+    size, area_bits, sum_x_bits = derived.record_bytes, derived.area_bits, derived.sum_x_bits
+    area_mask, sum_x_mask, shift = (1 << area_bits) - 1, (1 << sum_x_bits) - 1, area_bits + sum_x_bits
+    rows = []
+    for start in range(0, len(data), size):
+        word = int.from_bytes(data[start : start + size], "little")
+        rows.append((word & area_mask, word >> area_bits & sum_x_mask, word >> shift))
+    moments = np.array(rows, np.int64)
+    if max(row[2] for row in rows) >> derived.sum_y_bits:
+        raise PacketError("content", "a zone record is filled up with something other than zeros")
+    return moments
 
 
 def _bitmap(data: bytes, derived: Derived) -> np.ndarray:
     raw = np.frombuffer(data, np.uint8).reshape(derived.skin.rows, derived.bitmap_row_bytes)
-    return np.unpackbits(raw, axis=1, bitorder="little")[:, : derived.skin.columns].astype(bool)
+    bits = np.unpackbits(raw, axis=1, bitorder="little")
+    if bits[:, derived.skin.columns :].any():
+        raise PacketError("content", "a bitmap row is filled up with something other than zeros")
+    return bits[:, : derived.skin.columns].astype(bool)
 
 
 def _split(word: int, *widths: int) -> list[int]:

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from contactfpga.errors import ContactFPGAError
+
 MAX_LINES = 64
 MAX_BAUD_ERROR = 0.015
 MAX_KEEP_ALIVE_MS = 100.0
@@ -27,7 +29,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 }
 
 
-class SkinError(ValueError):
+class SkinError(ContactFPGAError, ValueError):
     """A Skin that cannot work; the message names the field, its value and the limit."""
 
 

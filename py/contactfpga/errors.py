@@ -1,0 +1,53 @@
+"""Everything this package raises on purpose. Each message names what was met and the next step."""
+
+from __future__ import annotations
+
+
+class ContactFPGAError(Exception):
+    """Base of every error of this package."""
+
+
+class PortNotFound(ContactFPGAError):
+    """No port, or no single one, could be chosen or opened."""
+
+
+class PortLost(ContactFPGAError):
+    """The port was there and is gone: unplugged, or its other end closed it."""
+
+
+class ReadTimeout(ContactFPGAError, TimeoutError):
+    """The board answered, but no complete frame came in time."""
+
+
+class BoardSilent(ReadTimeout):
+    """Not one byte came in time."""
+
+
+class OnlyNoise(ReadTimeout):
+    """Bytes came, and not one valid packet among them."""
+
+
+class ReplayEnded(ContactFPGAError, EOFError):
+    """A recording holds no further frame."""
+
+
+class SkinMismatch(ContactFPGAError):
+    """The board was built from another Skin than the one given or the one it had before."""
+
+
+class VersionMismatch(ContactFPGAError):
+    """The board speaks another version of the protocol."""
+
+
+class MissingExtra(ContactFPGAError, ImportError):
+    """A command needs a part of contactfpga that is not installed."""
+
+    def __init__(self, what: str, extra: str):
+        super().__init__(f"{what} needs more than is installed; install it with: pip install 'contactfpga[{extra}]'")
+
+
+class MissingTool(ContactFPGAError):
+    """A program outside Python is missing."""
+
+    def __init__(self, what: str, tool: str, command: str):
+        super().__init__(f"{what} needs {tool}, which is not on the PATH; install it with: {command}")

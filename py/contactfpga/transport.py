@@ -1,0 +1,204 @@
+"""Where bytes come from: a serial port, the simulated board, or a recording. All look alike to the driver."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from typing import Any, Protocol
+from urllib.parse import parse_qsl, urlsplit
+
+from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
+from contactfpga.skin import Skin
+
+CHUNK = 65_536
+"""Most bytes one read returns."""
+
+SIM_SLICE_S = 0.0005
+"""The simulated board runs this long at a time while a read waits for it."""
+
+
+class Transport(Protocol):
+    """Bytes to and from a board."""
+
+    name: str
+    """What the user called it."""
+    live: bool
+    """Whether a board is at the other end that can be asked."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
+
+        Raises :class:`PortLost` when nothing can come any more, :class:`ReplayEnded` at the end of a recording.
+        """
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``; raises :class:`PortLost`."""
+
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts run on; simulated seconds for the simulated board."""
+
+    def close(self) -> None:
+        """Give the port back; may be called twice."""
+
+
+class SerialTransport:
+    """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
+
+    live = True
+
+    def __init__(self, name: str, baud: int):
+        from serialx import (
+            PinState,
+            Serial,
+            SerialException,
+        )  # 0.1 s that `contactfpga --help` need not wait for
+
+        self.name = name
+        self._errors: tuple[type[Exception], ...] = (OSError, SerialException)
+        alone = PinState.UNDEFINED
+        self._buffer = bytearray(CHUNK)
+        self._port = Serial(
+            path=name,
+            baudrate=baud,
+            exclusive=True,
+            **dict.fromkeys(("dtr_on_open", "rts_on_open", "dtr_on_close", "rts_on_close"), alone),
+        )
+        try:
+            self._port.open()
+        except self._errors as error:
+            raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            count = self._port.readinto(self._buffer, timeout=max(0.0, timeout_s))
+        except self._errors as error:
+            raise self._lost(error) from None
+        return bytes(self._buffer[:count])
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data, timeout=1.0)
+        except self._errors as error:
+            raise self._lost(error) from None
+
+    def clock(self) -> float:
+        return time.monotonic()
+
+    def close(self) -> None:
+        with contextlib.suppress(*self._errors):  # gone already, which is what closing wants
+            self._port.close()
+
+    def _lost(self, error: Exception) -> PortLost:
+        return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
+
+
+class SimTransport:
+    """The virtual board, simulated while it is read: ``sim://?scene=NAME&skin=FILE``."""
+
+    live = True
+
+    def __init__(self, name: str):
+        self.name = name
+        options = dict(parse_qsl(urlsplit(name).query, keep_blank_values=True))
+        unknown = sorted(set(options) - {"scene", "skin"})
+        if unknown or urlsplit(name).netloc or urlsplit(name).path:
+            raise PortNotFound(f"{name}: it reads sim://, with ?scene=NAME and &skin=FILE where wanted")
+        skin = Skin.load(options["skin"]) if "skin" in options else None
+        try:
+            from contactfpga_sim.board import VirtualBoard
+        except ImportError as error:
+            raise MissingExtra(f"sim:// ({error})", "sim") from None
+        self._board: Any = VirtualBoard(skin=skin, scene=options.get("scene"))
+
+    def read(self, timeout_s: float) -> bytes:
+        end = self._board.clock() + max(0.0, timeout_s)
+        data = bytes(self._board.read(0.0))
+        while not data and (left := end - self._board.clock()) > 1e-9:
+            data = bytes(self._board.read(min(left, SIM_SLICE_S)))
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._board.write(data)
+
+    def clock(self) -> float:
+        return float(self._board.clock())
+
+    def close(self) -> None:
+        self._board.close()
+
+
+class ReplayTransport:
+    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``."""
+
+    live = False
+
+    def __init__(self, name: str):
+        self.name = name
+        path = Path(name.removeprefix("replay://")).expanduser()
+        try:
+            self._file = open(path, "rb")  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; is the path right?") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        data = self._file.read(4096)
+        if not data:
+            raise ReplayEnded(f"{self.name} ends here")
+        return data
+
+    def write(self, data: bytes) -> None:
+        raise ContactFPGAError(f"{self.name} is a recording; it cannot be asked for anything")
+
+    def clock(self) -> float:
+        return 0.0  # a recording has no times of its own, and nothing in it is waited for
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class Recorder:
+    """Passes everything on and writes each byte that is read to a file."""
+
+    def __init__(self, transport: Transport, path: str | Path):
+        self._transport = transport
+        self.name = transport.name
+        self.live = transport.live
+        self.write = transport.write
+        self.clock = transport.clock
+        try:
+            self._file = open(path, "wb")  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise ContactFPGAError(f"{path} cannot be written: {_reason(error)}") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        data = self._transport.read(timeout_s)
+        self._file.write(data)
+        return data
+
+    def close(self) -> None:
+        self._file.close()
+        self._transport.close()
+
+
+def connect(name: str, baud: int) -> Transport:
+    """Open the transport that ``name`` asks for."""
+    if name.startswith("sim:"):
+        return SimTransport(name)
+    if name.startswith("replay:"):
+        return ReplayTransport(name)
+    return SerialTransport(name, baud)
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+
+
+def _next_step(error: Exception, name: str) -> str:
+    if isinstance(error, PermissionError):
+        return "add yourself to the group that owns it (often `dialout`), or see `contactfpga doctor`"
+    if isinstance(error, FileNotFoundError):
+        return "is the board plugged in? `contactfpga doctor` lists the ports"
+    if "locked" in str(error):
+        return "another program reads this port; close it first"
+    return f"`contactfpga doctor {name}` may say why"

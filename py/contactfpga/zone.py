@@ -1,0 +1,170 @@
+"""What a frame says of the sheet: contact zones in cells, in mm, and on the link's surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from typing import overload
+
+import numpy as np
+
+from contactfpga.protocol import Frame
+from contactfpga.skin import Skin
+
+Vector = tuple[float, float, float]
+
+DTYPE = np.dtype(
+    [
+        ("area_cells", np.int64),
+        ("sum_x", np.int64),
+        ("sum_y", np.int64),
+        ("area_mm2", np.float64),
+        ("x_mm", np.float64),
+        ("y_mm", np.float64),
+        ("point_mm", np.float64, 3),
+        ("normal", np.float64, 3),
+    ]
+)
+"""Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Zone:
+    """One contact zone."""
+
+    area_cells: int
+    """Pressed cells."""
+    sum_x: int
+    """Sum of the cells' columns, exact."""
+    sum_y: int
+    """Sum of the cells' rows, exact."""
+    area_mm2: float
+    """Area of the cells in mm2, measured on the sheet."""
+    x_mm: float
+    """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0."""
+    y_mm: float
+    """Barycenter along the rows in mm; row 0 lies at 0."""
+    point_mm: Vector
+    """Barycenter in the link's frame in mm; it lies on the surface."""
+    normal: Vector
+    """Outward unit normal at that point."""
+
+
+class Zones(Sequence[Zone]):
+    """The zones of one frame, sorted by y, x and area; not to be changed."""
+
+    def __init__(self, frame: Frame, skin: Skin, time_us: int | None = None):
+        self.frame = frame
+        """The frame as it came over the wire."""
+        self.skin = skin
+        """The board's Skin, as far as its hello tells it."""
+        self.time_us = frame.time_us if time_us is None else time_us
+        """Device time of the sample of the frame's first row in us, without the wire's wrap at 2^24 us."""
+        self.flags: frozenset[str] = frame.flags
+        """Names from :data:`contactfpga.protocol.FLAGS`."""
+
+    @property
+    def sequence(self) -> int:
+        """Frames the board sent before this one, modulo 256."""
+        return self.frame.sequence
+
+    @property
+    def overwritten(self) -> int:
+        """Frames that the board replaced by newer ones before they were sent, modulo 256."""
+        return self.frame.overwritten
+
+    @property
+    def stuck(self) -> int:
+        """Columns that read pressed while no row was driven; 15 stands for 15 or more."""
+        return self.frame.stuck
+
+    @property
+    def total_zones(self) -> int:
+        """Zones on the sheet, also those the frame had no room for; 0 with ``report = "cells"``."""
+        return self.frame.zones
+
+    @property
+    def pressed(self) -> int:
+        """Pressed cells on the whole sheet."""
+        return self.frame.cells
+
+    @property
+    def cells(self) -> np.ndarray | None:
+        """(rows, columns) bool with ``report = "cells"``, else None: then the board sends zones only."""
+        return self.frame.bitmap
+
+    @functools.cached_property
+    def array(self) -> np.ndarray:
+        """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones."""
+        array = np.array([dataclasses.astuple(zone) for zone in self._zones], DTYPE)
+        array.flags.writeable = False
+        return array
+
+    @functools.cached_property
+    def _zones(self) -> tuple[Zone, ...]:
+        # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
+        zones = [self._zone(*moments) for moments in self.frame.moments.tolist()]
+        zones.sort(key=lambda zone: (zone.y_mm, zone.x_mm, zone.area_cells))
+        return tuple(zones)
+
+    def _zone(self, area: int, sum_x: int, sum_y: int) -> Zone:
+        skin = self.skin
+        # Only a frame that is flagged `mismatch` may hold an area of 0.
+        x_mm = sum_x / area * skin.pitch_x_mm if area else math.nan
+        y_mm = sum_y / area * skin.pitch_y_mm if area else math.nan
+        area_mm2 = area * (skin.pitch_x_mm * skin.pitch_y_mm)
+        point_mm, normal = on_surface(x_mm, y_mm, skin.radius_mm)
+        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal)
+
+    @overload
+    def __getitem__(self, index: int) -> Zone: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Zone, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Zone | tuple[Zone, ...]:
+        return self._zones[index]
+
+    def __len__(self) -> int:
+        return len(self.frame.moments)
+
+    def __iter__(self) -> Iterator[Zone]:
+        return iter(self._zones)
+
+    def __repr__(self) -> str:
+        what = f"{len(self)} zones" if self.cells is None else "bitmap"
+        flags = "".join(f", {flag}" for flag in sorted(self.flags))
+        when = f"frame {self.sequence} at {self.time_us / 1e6:.6f} s"
+        head = f"<Zones: {what}, {self.pressed} cells pressed, {when}{flags}"
+        lines = [
+            f"  {zone.area_cells} cells, {zone.area_mm2:g} mm2 at x {zone.x_mm:.2f} mm, y {zone.y_mm:.2f} mm"
+            for zone in self
+        ]
+        return "\n".join([head, *lines]) + ">"
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        values: dict[str, object] = {
+            name: getattr(self, name)
+            for name in ("sequence", "time_us", "overwritten", "stuck", "total_zones", "pressed")
+        }
+        values["flags"] = sorted(self.flags)
+        values["zones"] = [dataclasses.asdict(zone) for zone in self]
+        if self.cells is not None:
+            values["cells"] = [[int(cell) for cell in row] for row in self.cells]
+        return values
+
+
+def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
+    """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
+
+    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis towards the y axis, and y
+    along it; ``x_mm`` is the arc length.
+    """
+    if radius_mm is None:
+        return (x_mm, y_mm, 0.0), (0.0, 0.0, 1.0)
+    angle = x_mm / radius_mm
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return (radius_mm * cosine, radius_mm * sine, y_mm), (cosine, sine, 0.0)
