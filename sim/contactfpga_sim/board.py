@@ -1,0 +1,187 @@
+"""The virtual board: the gateware of a Skin as native code, in a sheet of switches, at the end of a UART line."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_sim import native, scenes
+from contactfpga_sim.cells import to_words
+
+if TYPE_CHECKING:
+    import argparse
+
+BOUNDARIES = ("rows", "records", "bytes", "line", "contact", "received")
+"""What a board notes: transfers of rows, zone records and bytes, changes of the transmit and of the contact pin,
+and bytes decoded from the line. The order is that of the driver."""
+
+EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
+"""An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
+wire, the byte or the level; and for a row whether it is the frame's last, for a record whether it is the end mark."""
+
+CHUNK_S = 0.2e-3
+"""Simulated time between two looks at the scene and at the line."""
+
+
+class Board:
+    """A compiled board, stepped by the clock. Cycle 0 is the first after power-up, as in docs/timing.md.
+
+    ``capture`` names the :data:`BOUNDARIES` to note, besides ``received``. The first Board of a Skin takes some
+    seconds to build (:mod:`contactfpga_sim.native`, also for what can go wrong).
+    """
+
+    def __init__(self, skin: Skin, capture: Iterable[str] = ()):
+        self.skin = skin
+        self._library = _library(skin)
+        self._board = ctypes.c_void_p(self._library.board_new())
+        captured = sum(1 << BOUNDARIES.index(name) for name in set(capture))
+        self._library.board_capture(self._board, ctypes.c_uint(captured))
+
+    @property
+    def cycle(self) -> int:
+        """The cycle that runs next."""
+        return self._library.board_cycle(self._board)
+
+    @property
+    def broken(self) -> int:
+        """Bytes on the line that came without a stop bit."""
+        return self._library.board_broken(self._board)
+
+    def press(self, cells: np.ndarray) -> None:
+        """From the next cycle on these (rows, columns) bool cells are pressed."""
+        self.hold(cells[None], 0)
+
+    def stick(self, columns: np.ndarray | None) -> None:
+        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
+        word = 0 if columns is None else int(to_words(np.asarray(columns, bool)))
+        self._library.board_stick(self._board, ctypes.c_uint64(word))
+
+    def run(self, cycles: int) -> None:
+        """Run this many clock cycles. Other Python threads run meanwhile."""
+        self._library.board_run(self._board, ctypes.c_uint64(cycles))
+
+    def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
+        """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
+        if frames.shape[1:] != (self.skin.rows, self.skin.columns):
+            raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
+        words = np.ascontiguousarray(to_words(frames))
+        self._library.board_hold(
+            self._board,
+            words.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_size_t(len(words)),
+            ctypes.c_uint64(Derived(self.skin).frame_clocks if cycles is None else cycles),
+        )
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
+        self._library.board_send(self._board, data, ctypes.c_size_t(len(data)))
+
+    def take(self, boundary: str) -> np.ndarray:
+        """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
+        index = ctypes.c_uint(BOUNDARIES.index(boundary))
+        count = ctypes.c_size_t()
+        address = self._library.board_events(self._board, index, ctypes.byref(count))
+        events = native.array_at(address, count.value, EVENT)
+        self._library.board_forget(self._board, index)
+        return events
+
+    def receive(self) -> bytes:
+        """The bytes decoded from the line since they were taken last."""
+        return self.take("received")["data"].astype(np.uint8).tobytes()
+
+    def close(self) -> None:
+        """Free the model; the board cannot be used any more."""
+        if self._board:
+            self._library.board_free(self._board)
+            self._board = ctypes.c_void_p()
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class VirtualBoard:
+    """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
+
+    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes.
+    """
+
+    def __init__(self, skin: Skin | None = None, scene: str | Path | np.ndarray | scenes.Scene | None = None):
+        self.skin = skin or Skin()
+        self._scene = scenes.scene(self.skin, scene)
+        self._board = Board(self.skin)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+        self._board.send(data)
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        left = round(seconds * self.skin.clock_hz)
+        while True:
+            if (data := self._board.receive()) or left <= 0:
+                return data
+            cycles = min(left, max(1, round(CHUNK_S * self.skin.clock_hz)))
+            self.advance(cycles)
+            left -= cycles
+
+    def advance(self, cycles: int) -> None:
+        """Run clock cycles with the scene as it is now."""
+        self._board.press(self._scene(self.clock()))
+        self._board.run(cycles)
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+        return self._board.cycle / self.skin.clock_hz
+
+    def close(self) -> None:
+        """Free the board."""
+        self._board.close()
+
+    def __enter__(self) -> VirtualBoard:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def main(args: argparse.Namespace) -> int:
+    """``contactfpga board``: args.skin (path or None), args.scene (name, path or None), args.link (path or None)."""
+    from contactfpga_sim.pty_board import PtyBoard
+
+    skin = Skin.load(args.skin) if args.skin else Skin()
+    return PtyBoard(skin, args.scene, link=args.link).serve()
+
+
+def _library(skin: Skin) -> ctypes.CDLL:
+    def elaborate() -> Any:
+        from contactfpga_hdl.top import Top
+
+        return Top(skin, probes=True)
+
+    model = native.Model(
+        title=f"the {skin.rows}x{skin.columns} board",
+        driver="board.cpp",
+        key=native.skin_key(skin),
+        elaborate=elaborate,
+        defines={
+            "ROWS": skin.rows,
+            "COLUMNS": skin.columns,
+            "COL2ROW": int(skin.diodes == "col2row"),
+            "BIT_CLOCKS": Derived(skin).bit_clocks,
+        },
+    )
+    library = native.load(model)
+    library.board_new.restype = ctypes.c_void_p
+    library.board_cycle.restype = ctypes.c_uint64
+    library.board_broken.restype = ctypes.c_uint64
+    library.board_events.restype = ctypes.c_void_p
+    return library

@@ -1,0 +1,170 @@
+// A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
+// Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS.
+#include <deque>
+
+#include "clocked.h"
+
+enum Boundary { ROW, RECORD, BYTE, LINE, CONTACT, RECEIVED, BOUNDARIES };
+
+struct Event {
+    uint64_t cycle, data, mark;
+};
+
+constexpr uint64_t mask(unsigned bits) { return bits == 64 ? ~0ull : (1ull << bits) - 1; }
+
+// A pressed switch passes the selecting level of its row to its column, and nothing else: the diode sees to that.
+class Matrix {
+public:
+    uint64_t pressed[ROWS] = {};
+    uint64_t stuck = 0;
+
+    uint64_t levels(uint64_t row_pins) const {
+        uint64_t selected = (COL2ROW ? ~row_pins : row_pins) & mask(ROWS);
+        uint64_t reads = stuck;
+        for (; selected; selected &= selected - 1)
+            reads |= pressed[__builtin_ctzll(selected)];
+        return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
+    }
+};
+
+// Sends bytes to the board, back to back from the cycle they are handed in.
+class Sender {
+public:
+    std::deque<uint8_t> bytes;
+
+    bool level() {
+        if (clocks_ == 0) {
+            if (bytes.empty())
+                return true;
+            frame_ = 1u << 9 | bytes.front() << 1;
+            bytes.pop_front();
+            clocks_ = 10 * BIT_CLOCKS;
+        }
+        return frame_ >> (10 - (clocks_-- + BIT_CLOCKS - 1) / BIT_CLOCKS) & 1;
+    }
+
+private:
+    unsigned frame_ = 0, clocks_ = 0;
+};
+
+// Reads the board's line as a UART does: in the middle of each bit after a falling edge.
+class Reader {
+public:
+    uint64_t broken = 0;  // bytes without a stop bit
+
+    // True when a byte is complete; its stop bit then has `rest` clocks to go.
+    bool take(bool level, uint8_t &byte) {
+        if (clock_ < 0) {
+            if (level || !last_) {
+                last_ = level;
+                return false;
+            }
+            clock_ = 0;
+        }
+        last_ = level;
+        const int bit = clock_ / BIT_CLOCKS;
+        const bool middle = clock_ % BIT_CLOCKS == BIT_CLOCKS / 2;
+        clock_++;
+        if (!middle)
+            return false;
+        if (bit == 0 && level)
+            clock_ = -1;  // too short for a start bit
+        if (bit >= 1 && bit <= 8)
+            byte_ = byte_ >> 1 | level << 7;
+        if (bit < 9)
+            return false;
+        clock_ = -1;
+        broken += !level;
+        byte = byte_;
+        return level;
+    }
+
+    static constexpr unsigned rest = BIT_CLOCKS - BIT_CLOCKS / 2;
+
+private:
+    int clock_ = -1;
+    bool last_ = true;
+    uint8_t byte_ = 0;
+};
+
+class Board {
+public:
+    Matrix matrix;
+    Sender sender;
+    Reader reader;
+    uint64_t cycle = 0;
+    unsigned captured = 1u << RECEIVED;
+    std::vector<Event> events[BOUNDARIES];
+
+    void run(uint64_t cycles) {
+        for (const uint64_t end = cycle + cycles; cycle < end; cycle++) {
+            put(model_.top.p_rx, sender.level());
+            model_.settle();
+            const auto rows = static_cast<uint64_t>(get(model_.top.p_rows));
+            const uint64_t levels = matrix.levels(rows);
+            if (levels != levels_) {
+                // Columns enter flip-flops only, so the second evaluation changes nothing but what those take.
+                put(model_.top.p_columns, levels_ = levels);
+                model_.settle();
+            }
+            watch();
+            model_.finish();
+        }
+    }
+
+private:
+    Clocked model_;
+    uint64_t levels_ = 0;
+    bool line_ = true, contact_ = false;
+
+    void watch() {
+        auto &top = model_.top;
+        const bool line = get(top.p_tx);
+        uint8_t byte;
+        if (reader.take(line, byte))
+            note(RECEIVED, byte, 0, cycle + Reader::rest);
+        if (line != line_)
+            note(LINE, line_ = line, 0, cycle);
+        const bool contact = get(top.p_contact);
+        if (contact != contact_)
+            note(CONTACT, contact_ = contact, 0, cycle);
+        if (get(top.p_row__transfer))
+            note(ROW, static_cast<uint64_t>(get(top.p_row__cells)), get(top.p_row__last), cycle);
+        if (get(top.p_record__transfer))
+            note(RECORD, static_cast<uint64_t>(get(top.p_record__data)), get(top.p_record__end), cycle);
+        if (get(top.p_byte__transfer))
+            note(BYTE, static_cast<uint64_t>(get(top.p_byte__data)), 0, cycle);
+    }
+
+    void note(Boundary boundary, uint64_t data, uint64_t mark, uint64_t at) {
+        if (captured >> boundary & 1)
+            events[boundary].push_back({at, data, mark});
+    }
+};
+
+EXPORT Board *board_new() { return new Board; }
+EXPORT void board_free(Board *board) { delete board; }
+EXPORT uint64_t board_cycle(Board *board) { return board->cycle; }
+EXPORT uint64_t board_broken(Board *board) { return board->reader.broken; }
+EXPORT void board_capture(Board *board, unsigned boundaries) { board->captured = boundaries | 1u << RECEIVED; }
+EXPORT void board_stick(Board *board, uint64_t columns) { board->matrix.stuck = columns; }
+EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
+
+// Each of `frames` sheets is pressed for `cycles`.
+EXPORT void board_hold(Board *board, const uint64_t *cells, size_t frames, uint64_t cycles) {
+    for (; frames--; cells += ROWS) {
+        for (unsigned row = 0; row < ROWS; row++)
+            board->matrix.pressed[row] = cells[row];
+        board->run(cycles);
+    }
+}
+
+EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
+    board->sender.bytes.insert(board->sender.bytes.end(), bytes, bytes + count);
+}
+
+EXPORT const Event *board_events(Board *board, unsigned boundary, size_t *count) {
+    *count = board->events[boundary].size();
+    return board->events[boundary].data();
+}
+EXPORT void board_forget(Board *board, unsigned boundary) { board->events[boundary].clear(); }

@@ -1,0 +1,147 @@
+"""Patterns that break labellers, for any size: each function gives (rows, columns) bool cells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+
+def spiral(rows: int, columns: int) -> np.ndarray:
+    """One arm, one cell wide, wound inwards with a gap of one cell: merged only at its very end."""
+    cells = np.zeros((rows, columns), bool)
+    y, x, dy, dx = 0, 0, 0, 1
+    cells[0, 0] = True
+    turns = 0
+    while turns < 2:
+        ahead, beyond = (y + dy, x + dx), (y + 2 * dy, x + 2 * dx)
+        blocked = _inside(cells, beyond) and cells[beyond]
+        if _inside(cells, ahead) and not cells[ahead] and not blocked:
+            y, x = ahead
+            cells[y, x] = True
+            turns = 0
+        else:
+            dy, dx = dx, -dy
+            turns += 1
+    return cells
+
+
+def _inside(cells: np.ndarray, place: tuple[int, int]) -> bool:
+    return 0 <= place[0] < cells.shape[0] and 0 <= place[1] < cells.shape[1]
+
+
+def comb(rows: int, columns: int) -> np.ndarray:
+    """Teeth in every second column, joined by the last row: all of them merge at the very end."""
+    cells = np.zeros((rows, columns), bool)
+    cells[:, ::2] = True
+    cells[-1] = True
+    return cells
+
+
+def checkerboard(rows: int, columns: int) -> np.ndarray:
+    """Every second cell: one zone with 8-connectivity, the most zones there can be with 4."""
+    y, x = np.indices((rows, columns))
+    return (y + x) % 2 == 0
+
+
+def nested_u(rows: int, columns: int) -> np.ndarray:
+    """Cups in one another, open at the top: the most zones that wait at once, the inner ones closed first."""
+    y, x = np.indices((rows, columns))
+    depth = np.minimum(np.minimum(x, columns - 1 - x), rows - 1 - y)
+    return depth % 2 == 0
+
+
+def nested_arch(rows: int, columns: int) -> np.ndarray:
+    """The same upside down: the outer ones closed first."""
+    return nested_u(rows, columns)[::-1]
+
+
+def ladder(rows: int, columns: int) -> np.ndarray:
+    """Rails in every second column with rungs shifted from gap to gap: holes, and merges in every row."""
+    y, x = np.indices((rows, columns))
+    return (x % 2 == 0) | ((y + x // 2) % 2 == 0)
+
+
+def tree(rows: int, columns: int) -> np.ndarray:
+    """Single cells that merge in pairs, the pairs in pairs, and so on downwards."""
+    cells = np.zeros((rows, columns), bool)
+    stems = list(range(0, columns, 2))
+    y = 0
+    while y < rows:
+        height = max(1, rows // (2 * max(1, columns.bit_length())))
+        cells[y : y + height, stems] = True
+        y += height
+        if y >= rows:
+            break
+        merged = []
+        for left, right in zip(stems[::2], stems[1::2], strict=False):
+            cells[y, left : right + 1] = True
+            merged.append((left + right) // 2)
+        if len(stems) % 2:
+            cells[y, stems[-1]] = True
+            merged.append(stems[-1])
+        stems = merged
+        y += 1
+    return cells
+
+
+def rings(rows: int, columns: int) -> np.ndarray:
+    """Closed rings in one another, one cell apart."""
+    y, x = np.indices((rows, columns))
+    depth = np.minimum(np.minimum(x, columns - 1 - x), np.minimum(y, rows - 1 - y))
+    return depth % 2 == 0
+
+
+def dots(rows: int, columns: int) -> np.ndarray:
+    """Single cells in every second row and column: the most zones there can be with 8-connectivity."""
+    y, x = np.indices((rows, columns))
+    return (y % 2 == 0) & (x % 2 == 0)
+
+
+def stripes(rows: int, columns: int) -> np.ndarray:
+    """Every second row."""
+    cells = np.zeros((rows, columns), bool)
+    cells[::2] = True
+    return cells
+
+
+def diagonals(rows: int, columns: int) -> np.ndarray:
+    """Diagonal lines, two free cells apart: zones with 8-connectivity, dust with 4."""
+    y, x = np.indices((rows, columns))
+    return (y + x) % 3 == 0
+
+
+def zigzag(rows: int, columns: int) -> np.ndarray:
+    """Lines that run down and up again: every turn at the top is a new zone that merges later."""
+    y, x = np.indices((rows, columns))
+    wave = np.abs(x % 6 - 3)
+    return (y - wave) % 4 == 0
+
+
+def full(rows: int, columns: int) -> np.ndarray:
+    """Every cell."""
+    return np.ones((rows, columns), bool)
+
+
+SHAPES: dict[str, Callable[[int, int], np.ndarray]] = {
+    shape.__name__: shape
+    for shape in (
+        *(spiral, comb, checkerboard, nested_u, nested_arch, ladder, tree),
+        *(rings, dots, stripes, diagonals, zigzag, full),
+    )
+}
+"""Every shape by its name."""
+
+
+def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
+    """(name, (rows, columns) bool) of every shape in all eight flips and transposes that differ."""
+    for name, shape in SHAPES.items():
+        seen = set()
+        for transposed in (False, True):
+            cells = shape(columns, rows).T if transposed else shape(rows, columns)
+            for flipped in ("", "y", "x", "xy"):
+                turned = cells[:: -1 if "y" in flipped else 1, :: -1 if "x" in flipped else 1]
+                if turned.tobytes() not in seen:
+                    seen.add(turned.tobytes())
+                    suffix = ("-t" if transposed else "") + (f"-{flipped}" if flipped else "")
+                    yield name + suffix, np.ascontiguousarray(turned)
