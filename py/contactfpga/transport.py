@@ -14,9 +14,6 @@ from contactfpga.skin import Skin
 CHUNK = 65_536
 """Most bytes one read returns."""
 
-SIM_SLICE_S = 0.0005
-"""The simulated board runs this long at a time while a read waits for it."""
-
 
 class Transport(Protocol):
     """Bytes to and from a board."""
@@ -107,16 +104,16 @@ class SimTransport:
         skin = Skin.load(options["skin"]) if "skin" in options else None
         try:
             from contactfpga_sim.board import VirtualBoard
-        except ImportError as error:
+
+            self._board: Any = VirtualBoard(skin=skin, scene=options.get("scene"))
+        except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
-        self._board: Any = VirtualBoard(skin=skin, scene=options.get("scene"))
+        except ValueError as error:  # a scene that is not known, or that does not fit the sheet
+            raise PortNotFound(f"{name}: {error}") from None
 
     def read(self, timeout_s: float) -> bytes:
-        end = self._board.clock() + max(0.0, timeout_s)
-        data = bytes(self._board.read(0.0))
-        while not data and (left := end - self._board.clock()) > 1e-9:
-            data = bytes(self._board.read(min(left, SIM_SLICE_S)))
-        return data
+        # Not less than a clock: time that rounds to none would not pass, and the deadline never come.
+        return bytes(self._board.read(max(timeout_s, 1e-6) if timeout_s > 0 else 0.0))
 
     def write(self, data: bytes) -> None:
         self._board.write(data)

@@ -1,0 +1,104 @@
+"""The command `contactfpga`. Nothing heavy is imported until a command needs it."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.metadata
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from contactfpga.errors import ContactFPGAError, MissingExtra
+
+_COMMANDS = {
+    "zones": "contactfpga.commands.zones",
+    "wire": "contactfpga.commands.wire",
+    "doctor": "contactfpga.commands.doctor",
+    "board": "contactfpga_sim.board",
+    "replay": "contactfpga_sim.replay",
+}
+"""Module of each command; its ``main(args)`` returns the exit status."""
+
+_PORT = "device path, sim://, replay://FILE; none: the one supported board that is plugged in"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status; errors print one line that names the next step."""
+    args = _parser().parse_args(arguments)
+    try:
+        return _load(args.command).main(args) or 0
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
+        sys.stderr.close()
+        return 0
+    except (ContactFPGAError, ValueError, OSError) as error:
+        print(f"contactfpga: {error}", file=sys.stderr)
+        return 1
+
+
+def _load(command: str) -> ModuleType:
+    try:
+        return importlib.import_module(_COMMANDS[command])
+    except ModuleNotFoundError as error:
+        extra = "cli" if (error.name or "").split(".")[0] == "rich" else "sim"
+        raise MissingExtra(f"`contactfpga {command}` ({error})", extra) from None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="contactfpga",
+        description="Contact zones of a switch-matrix skin.",
+        epilog="Without a board: contactfpga zones sim://",
+    )
+    parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _zones(commands.add_parser("zones", help="show the contact zones, live"))
+    _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))
+    _board(commands.add_parser("board", help="run the virtual board on a pseudo-terminal"))
+    _doctor(commands.add_parser("doctor", help="say what is wrong between this computer and the board"))
+    _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
+    return parser
+
+
+def _connection(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("port", nargs="?", metavar="PORT", help=_PORT)
+    parser.add_argument("--skin", metavar="FILE", help="Skin the board must be built from; its baud rate is taken")
+    parser.add_argument("--baud", type=int, help="bits a second (that of the Skin, else 3000000)")
+    parser.add_argument("--timeout", type=float, default=1.0, help="seconds to wait for the board (default: 1)")
+
+
+def _zones(parser: argparse.ArgumentParser) -> None:
+    _connection(parser)
+    parser.add_argument("--once", action="store_true", help="ask for one frame, show it and end")
+    parser.add_argument("--json", action="store_true", help="one JSON object a frame and line, every frame")
+    parser.add_argument("--record", metavar="FILE", help="write every byte received to this file, for replay://FILE")
+
+
+def _wire(parser: argparse.ArgumentParser) -> None:
+    _connection(parser)
+    parser.add_argument("--once", action="store_true", help="ask for one frame, show it and end")
+
+
+def _board(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--skin", metavar="FILE", help="Skin of the board (default: the reference Skin)")
+    parser.add_argument("--scene", metavar="NAME", help="what touches the sheet: a scene's name or a .npy file")
+    parser.add_argument("--link", metavar="PATH", help="symbolic link to make to the pseudo-terminal")
+
+
+def _doctor(parser: argparse.ArgumentParser) -> None:
+    _connection(parser)
+    parser.add_argument("--seconds", type=float, default=1.0, help="how long frames are counted (default: 1)")
+
+
+def _replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("frames", metavar="FRAMES.npy", help="array (frames, rows, columns), bool or numbers")
+    parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help="default: 8")
+    parser.add_argument("--threshold", type=float, help="cells above this count as pressed; needed for numbers")
+    parser.add_argument("--pitch-mm", type=float, default=10.0, help="distance of rows and columns (default: 10)")
+    parser.add_argument("--json", action="store_true", help="one JSON object a frame and line")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The commands of `contactfpga`, one file each; loaded when called."""

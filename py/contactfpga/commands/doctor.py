@@ -1,0 +1,136 @@
+"""`contactfpga doctor`: looks at everything between this computer and the board, and says what to do."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from contactfpga import driver, ports
+from contactfpga.driver import Board
+from contactfpga.errors import ContactFPGAError
+
+USB_SERIAL = Path("/sys/bus/usb-serial/devices")
+RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
+
+LATENCY_MS = 1
+EVENT_CHAR = 0x100
+"""Byte 0, the delimiter, and bit 8, which enables it: the chip hands over what it has when that byte comes."""
+
+Finding = tuple[str, str]
+"""("ok", "note" or "fault", sentence)."""
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the command; status 1 when a fault was found."""
+    faults = 0
+    for verdict, sentence in _findings(args):
+        print(f"{verdict:5} {sentence}", flush=True)
+        faults += verdict == "fault"
+    return min(faults, 1)
+
+
+def _findings(args: argparse.Namespace) -> Iterator[Finding]:
+    port = args.port
+    if port is None:
+        found = ports.candidates()
+        for candidate in found:
+            yield "note", f"{candidate} may be a board"
+        if len(found) == 1:
+            port = found[0].device
+    if port is not None and "://" not in port:
+        yield from rights(port)
+        yield from ftdi(port)
+    try:
+        board = driver.open(port, args.skin, baud=args.baud, timeout=args.timeout)
+    except (ContactFPGAError, ValueError) as error:
+        yield "fault", str(error)
+        return
+    with board:
+        yield from hello(board)
+        yield from count(board, args.seconds, args.timeout)
+
+
+def rights(port: str) -> Iterator[Finding]:
+    """Whether this user may read and write the port."""
+    if sys.platform == "win32":
+        return
+    if not os.path.exists(port):
+        yield "fault", f"{port} does not exist; is the board plugged in?"
+    elif os.access(port, os.R_OK | os.W_OK):
+        yield "ok", f"{port} may be read and written"
+    else:
+        yield "fault", f"{port} may not be read and written; add yourself to its group: {_group_command(port)}"
+
+
+def _group_command(port: str) -> str:
+    import grp
+
+    group = os.stat(port).st_gid
+    return f"sudo usermod -aG {grp.getgrgid(group).gr_name} $USER, then log in again"
+
+
+def ftdi(port: str, folder: Path = USB_SERIAL) -> Iterator[Finding]:
+    """The FTDI chip's latency timer, and the udev rule that sets it and the event character."""
+    device = folder / Path(port).resolve().name
+    timer = device / "latency_timer"
+    if not timer.exists():
+        return
+    latency_ms = int(timer.read_text())
+    if latency_ms > LATENCY_MS:
+        yield "fault", f"{port}: FTDI latency timer is {latency_ms} ms, it should be {LATENCY_MS} ms; {_advice()}"
+    else:
+        yield "ok", f"{port}: FTDI latency timer is {latency_ms} ms"
+    yield (
+        "note",
+        f"{port}: the event character, which sends each frame on at its last byte, cannot be read back; {_advice()}",
+    )
+
+
+def udev_rule() -> str:
+    """The rule that sets latency timer and event character of all supported boards."""
+    return "\n".join(
+        f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTRS{{idVendor}}=="{usb.vid:04x}", '
+        f'ATTRS{{idProduct}}=="{usb.pid:04x}", ATTR{{latency_timer}}="{LATENCY_MS}", '
+        f'ATTR{{event_char}}="{EVENT_CHAR}"'
+        for usb in ports.SUPPORTED
+    )
+
+
+def _advice() -> str:
+    return f"put this into {RULE_FILE} and plug the board in again:\n{udev_rule()}"
+
+
+def hello(board: Board) -> Iterator[Finding]:
+    """What the board says of itself."""
+    skin = board.skin
+    surface = "plane" if skin.radius_mm is None else f"cylinder of radius {skin.radius_mm:g} mm"
+    facts = (
+        f"{skin.rows}x{skin.columns}, pitch {skin.pitch_x_mm:g} x {skin.pitch_y_mm:g} mm, {surface}, "
+        f"connectivity {skin.connectivity}, report {skin.report!r}, fingerprint {board.fingerprint.hex()}"
+    )
+    yield "ok", f"{board.port} says hello: {facts}"
+
+
+def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
+    """Frames and losses over some seconds of device time."""
+    first = board.next(timeout)
+    zones = first
+    while zones.time_us - first.time_us < seconds * 1e6 and zones.time_us >= first.time_us:
+        zones = board.next(timeout)
+    stats = board.stats
+    yield "ok", f"{stats.frames} frames, {stats.hellos} hellos in {(zones.time_us - first.time_us) / 1e6:.2f} s"
+    if stats.overwritten:
+        yield (
+            "note",
+            f"{stats.overwritten} frames overwritten on the board: the line is slower than the scan, a hello too",
+        )
+    faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
+    told = ", ".join(f"{number} {name}" for name, number in faults.items())
+    yield ("fault" if any(faults.values()) else "ok", told)
+    if zones.stuck:
+        yield "fault", f"{zones.stuck} columns read pressed while no row is driven; look for a short circuit there"
+    for flag in sorted(zones.flags - {"requested"}):
+        yield "fault", f"the last frame is flagged {flag!r}"
