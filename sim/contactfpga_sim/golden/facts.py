@@ -24,6 +24,11 @@ def exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
+def upwards(value: Fraction) -> int:
+    """The next whole number upwards. A billionth above one does not count: 37/12 us is 37 clocks of 12 MHz."""
+    return math.ceil(value - Fraction(1, 10**9))
+
+
 @dataclasses.dataclass(frozen=True)
 class Facts:
     """What the rules call R, C, M, S, L, T, D, P and Q, and the widths of the fields on the wire."""
@@ -52,11 +57,11 @@ class Facts:
 
     @functools.cached_property
     def settle(self) -> int:
-        return math.ceil(exact(self.skin.settle_us) * self.clocks_per_us)
+        return upwards(exact(self.skin.settle_us) * self.clocks_per_us)
 
     @functools.cached_property
     def row_clocks(self) -> int:
-        return self.settle + math.ceil(exact(self.skin.release_us) * self.clocks_per_us)
+        return self.settle + upwards(exact(self.skin.release_us) * self.clocks_per_us)
 
     @functools.cached_property
     def scan_clocks(self) -> int:
@@ -73,11 +78,11 @@ class Facts:
 
     @functools.cached_property
     def press_scans(self) -> int:
-        return math.ceil(self._scans(exact(self.skin.debounce_press_us)))
+        return upwards(self._scans(exact(self.skin.debounce_press_us)))
 
     @functools.cached_property
     def release_scans(self) -> int:
-        return math.ceil(self._scans(exact(self.skin.debounce_release_us)))
+        return upwards(self._scans(exact(self.skin.debounce_release_us)))
 
     @functools.cached_property
     def keep_alive_scans(self) -> int:

@@ -1,0 +1,42 @@
+"""The gateware top in Amaranth's own simulator, recorded as a trace."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from amaranth.hdl import Cat
+from amaranth.sim import Simulator
+
+from contactfpga_hdl.top import Top
+from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.record import LEVELS, PAYLOADS, OutOfTime, Recorder, Stimulus
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> Trace:
+    """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds."""
+    top = Top(skin, probes=True)
+    simulator = Simulator(top)
+    simulator.add_clock(1e-6)
+    recorder = Recorder(cycles)
+    stimulus = Stimulus(skin, timeline)
+    levels = Cat(*(getattr(top, name) for name in LEVELS))
+    payloads = [getattr(top, name) for name in PAYLOADS]
+    deadline = time.monotonic() + limit_s
+
+    async def bench(ctx):
+        for cycle in range(cycles):
+            columns, rx = stimulus.pins(cycle, ctx.get(top.rows))
+            ctx.set(top.columns, columns)
+            ctx.set(top.rx, rx)
+            _, _, level, *values = await ctx.tick().sample(levels, *payloads)
+            recorder.note(cycle, level, dict(zip(PAYLOADS, values, strict=True)).__getitem__)
+            if cycle % 256 == 0 and time.monotonic() > deadline:
+                raise OutOfTime(f"{cycle} of {cycles} cycles simulated in {limit_s:g} s")
+
+    simulator.add_testbench(bench)
+    simulator.run()
+    return recorder.trace

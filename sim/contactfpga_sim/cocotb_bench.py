@@ -1,0 +1,46 @@
+"""The test that cocotb runs inside the simulator: drive the pins, record the probes."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import time
+from pathlib import Path
+
+import cocotb
+from cocotb.clock import Clock
+from cocotb.triggers import FallingEdge, Timer
+
+from contactfpga_sim.record import LEVELS, PAYLOADS, Recorder, Stimulus
+
+
+@cocotb.test()
+async def record(dut) -> None:
+    """Every cycle is looked at in its second half, when all of the design has settled."""
+    job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
+    recorder = Recorder(job["cycles"])
+    stimulus = Stimulus(job["skin"], job["timeline"])
+    levels = [getattr(dut, name) for name in LEVELS]
+    payloads = {name: getattr(dut, name) for name in PAYLOADS}
+    deadline = time.monotonic() + job["limit_s"]
+    driven = stimulus.pins(0, 0)
+
+    dut.rst.value = 0
+    dut.rx.value = 1
+    dut.columns.value = 0
+    dut.clk.value = 0
+    await Timer(1, "ns")
+    falling = FallingEdge(dut.clk)
+    for cycle in range(job["cycles"]):
+        if cycle == 1:
+            Clock(dut.clk, 10, "ns", impl="gpi").start(start_high=True)
+        if cycle:
+            await falling
+        pins = stimulus.pins(cycle, int(dut.rows.value))
+        if pins != driven:
+            dut.columns.value, dut.rx.value = driven = pins
+        level = sum(int(handle.value) << place for place, handle in enumerate(levels))
+        recorder.note(cycle, level, lambda name: int(payloads[name].value))
+        if cycle % 256 == 0 and time.monotonic() > deadline:
+            raise TimeoutError(f"{cycle} of {job['cycles']} cycles simulated in {job['limit_s']:g} s")
+    Path(job["trace"]).write_bytes(pickle.dumps(recorder.trace))

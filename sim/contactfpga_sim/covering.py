@@ -1,0 +1,129 @@
+"""Skins and stimuli for co-simulation: a set of Skins that covers every pair of choices."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from typing import Any
+
+import numpy as np
+
+from contactfpga.skin import Skin, SkinError
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Timeline
+
+CHOICES: dict[str, tuple[Any, ...]] = {
+    "sheet": ((1, 1), (1, 9), (9, 1), (5, 7), (12, 4), (16, 16), (3, 33)),
+    "connectivity": (8, 4),
+    "diodes": ("col2row", "row2col"),
+    "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
+    "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
+    "report": ("moments", "cells"),
+    "send": ("always", "on_change"),
+    "mask": ("none", "cells", "column"),
+    "capacity": ("default", "one", "half"),
+    "surface": ("plane", "cylinder"),
+    "link": ((12, 3_000_000), (12, 4_000_000), (1, 500_000), (50, 5_500_000)),
+    "row_time": ("tight", "uneven", "long"),
+    "keep_alive_scans": (1, 3, 1000),
+}
+
+
+def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
+    """A small list of assignments in which every pair of values of two choices occurs; the same for a seed."""
+    names = list(choices)
+    pick = random.Random(seed)
+    open_pairs = {
+        (a, i, b, j)
+        for a, b in itertools.combinations(range(len(names)), 2)
+        for i in range(len(choices[names[a]]))
+        for j in range(len(choices[names[b]]))
+    }
+    rows = []
+    while open_pairs:
+        candidates = [_candidate(choices, names, open_pairs, pick) for _ in range(20)]
+        best = max(candidates, key=lambda row: len(_pairs(row) & open_pairs))
+        open_pairs -= _pairs(best)
+        rows.append({name: choices[name][value] for name, value in zip(names, best, strict=True)})
+    return rows
+
+
+def _candidate(choices, names, open_pairs, pick) -> list[int]:
+    """One open pair, then value by value what closes most of the rest."""
+    row: list[int | None] = [None] * len(names)
+    a, i, b, j = pick.choice(sorted(open_pairs))
+    row[a], row[b] = i, j
+    for place in pick.sample(range(len(names)), len(names)):
+        if row[place] is not None:
+            continue
+        values = pick.sample(range(len(choices[names[place]])), len(choices[names[place]]))
+        row[place] = max(values, key=lambda value: len(_pairs(row, place, value) & open_pairs))
+    return row  # type: ignore[return-value]
+
+
+def _pairs(row, place=None, value=None) -> set[tuple[int, int, int, int]]:
+    """The pairs in a row, or those that ``value`` at ``place`` would add."""
+    if place is None:
+        return {(a, row[a], b, row[b]) for a, b in itertools.combinations(range(len(row)), 2)}
+    given = [(other, chosen) for other, chosen in enumerate(row) if chosen is not None]
+    return {tuple(itertools.chain(*sorted([(place, value), pair]))) for pair in given}  # type: ignore[misc]
+
+
+def skin_for(choice: dict[str, Any]) -> Skin:
+    """The Skin for an assignment of :data:`CHOICES`."""
+    rows, columns = choice["sheet"]
+    megahertz, baud = choice["link"]
+    values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "report", "send")}
+    values |= {"rows": rows, "columns": columns, "clock_hz": megahertz * 1_000_000, "baud": baud}
+    if choice["surface"] == "cylinder":
+        values |= {"surface": "cylinder", "radius_mm": 75.5, "pitch_y_mm": 7.25}
+    if rows * columns > 1 and choice["mask"] == "cells":
+        values["mask"] = ((rows - 1, 0), (0, columns - 1)) if rows * columns > 2 else ((0, 0),)
+    elif columns > 1 and choice["mask"] == "column":
+        values["mask"] = tuple((row, columns // 2) for row in range(rows))
+    most = Skin(rows=rows, columns=columns, connectivity=choice["connectivity"], settle_us=1000.0).max_zones()
+    if choice["capacity"] != "default":
+        values["zone_capacity"] = 1 if choice["capacity"] == "one" else -(-most // 2)
+    settle, release = _row_time(values, choice["row_time"], megahertz)
+    values |= {"settle_us": settle, "release_us": release}
+    scan_us = facts(Skin(**values | {"debounce": "none", "send": "always"})).scan_clocks / megahertz
+    press, back = choice["debounce_scans"]
+    values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
+    values["keep_alive_ms"] = min(100.0, (choice["keep_alive_scans"] + 0.5) * scan_us / 1000)
+    return Skin(**values)
+
+
+def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float, float]:
+    """Settle and release time in us: the shortest that is accepted, one with odd clocks, or a long one."""
+    release = {"tight": 1, "uneven": 3, "long": 2 * megahertz}[kind]
+    for settle in range(1, 10_000):
+        exact = (settle / megahertz, release / megahertz)
+        try:
+            Skin(**values | {"settle_us": exact[0], "release_us": exact[1], "debounce": "none", "send": "always"})
+        except SkinError:
+            continue
+        if kind == "tight":
+            return exact
+        longer = settle + (7 if kind == "uneven" else 40)
+        return (longer - 0.25) / megahertz, release / megahertz
+    raise AssertionError("no row time is accepted")
+
+
+def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
+    """Random cells that come and go at any cycle, stuck columns and requests."""
+    rng = np.random.default_rng([seed, 7])
+    shape = (skin.rows, skin.columns)
+    scan = facts(skin).scan_clocks
+    pieces: list[tuple[int, np.ndarray, np.ndarray | None]] = []
+    start = 0
+    while start < cycles:
+        cells = rng.random(shape) < rng.choice([0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.95, 1.0])
+        if pieces and rng.random() < 0.2:
+            cells = pieces[-1][1]
+        stuck = rng.random(skin.columns) < 0.3 if rng.random() < 0.25 else None
+        pieces.append((start, cells, stuck))
+        start += int(scan * rng.choice([0.3, 1.0, 1.0, 1.7, 3.0])) + 1
+    byte = 10 * facts(skin).bit_clocks
+    gaps = rng.choice([0, 1, 7, scan, 5 * scan], size=6)
+    starts = np.cumsum(gaps + byte) + int(rng.integers(scan))
+    return Timeline(pieces, [int(cycle) for cycle in starts if cycle < cycles])

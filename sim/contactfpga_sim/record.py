@@ -1,0 +1,80 @@
+"""What every co-simulation bench shares: the pins' input cycle by cycle, and the trace of the probes."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.matrix import Matrix
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact")
+"""Ports of the top that are looked at in every cycle."""
+
+PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "byte_data")
+"""Ports of the top that are read when something is transferred."""
+
+_ROW, _RECORD, _BYTE, _TX, _CONTACT = (1 << place for place in range(len(LEVELS)))
+
+
+class OutOfTime(RuntimeError):
+    """A simulation passed its wall-clock limit."""
+
+
+class Stimulus:
+    """Column and receive pin levels, cycle by cycle; cycles must be asked for in order."""
+
+    def __init__(self, skin: Skin, timeline: Timeline):
+        self._matrix = Matrix(skin)
+        self._pieces = list(reversed(timeline.pieces))
+        self._bit_clocks = facts(skin).bit_clocks
+        self._requests = list(reversed(timeline.requests))
+        self._random = random.Random(0)
+        self._start, self._bits = 0, 0
+
+    def pins(self, cycle: int, rows: int) -> tuple[int, int]:
+        """Levels of the columns (bit c is column c) and of the receive pin, given those of the rows."""
+        if self._pieces and self._pieces[-1][0] <= cycle:
+            _, cells, stuck = self._pieces.pop()
+            self._matrix.press(cells, stuck)
+        return self._matrix.levels(rows), self._rx(cycle)
+
+    def _rx(self, cycle: int) -> int:
+        if self._requests and self._requests[-1] == cycle:
+            self._start = self._requests.pop()
+            self._bits = 1 << 9 | self._random.randrange(256) << 1  # stop, data, start; sent lowest first
+        elif not self._bits:
+            return 1
+        place = (cycle - self._start) // self._bit_clocks
+        if place > 9:
+            self._bits = 0
+            return 1
+        return self._bits >> place & 1
+
+
+class Recorder:
+    """Turns the values of the top's probes, cycle by cycle, into a trace."""
+
+    def __init__(self, cycles: int):
+        self.trace = Trace(cycles)
+        self._levels = _TX
+
+    def note(self, cycle: int, levels: int, read: Callable[[str], int]) -> None:
+        """Take the values of :data:`LEVELS` in ``cycle``, the first one lowest; ``read`` gives any other port's."""
+        if levels & _ROW:
+            self.trace.rows.append((cycle, read("row_cells"), bool(read("row_last"))))
+        if levels & _RECORD:
+            self.trace.records.append((cycle, read("record_data"), bool(read("record_end"))))
+        if levels & _BYTE:
+            self.trace.bytes.append((cycle, read("byte_data")))
+        changed = levels ^ self._levels
+        if changed & _TX:
+            self.trace.line.append((cycle, int(bool(levels & _TX))))
+        if changed & _CONTACT:
+            self.trace.contact.append((cycle, int(bool(levels & _CONTACT))))
+        self._levels = levels

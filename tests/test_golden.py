@@ -1,0 +1,270 @@
+"""The golden model of the whole chain: rules of docs/timing.md worked by hand, and packets read back."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from cobs import cobs
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_sim import golden
+from contactfpga_sim.covering import CHOICES, pairwise, skin_for, stimulus
+from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden.debounce import debounced
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.frame import Packet, stuff
+from contactfpga_sim.golden.link import Link
+from contactfpga_sim.golden.serial import line, received
+
+SCAN = 16 * 72  # reference Skin: 60 clocks settle, 12 release
+FRESH = np.zeros((16, 16), bool)
+
+
+def cells_at(*places: tuple[int, int], shape: tuple[int, int] = (16, 16)) -> np.ndarray:
+    cells = np.zeros(shape, bool)
+    for place in places:
+        cells[place] = True
+    return cells
+
+
+def packets(trace: golden.Trace) -> list[tuple[int, bytes]]:
+    """(cycle of the first byte, unsealed packet) of every whole packet in a trace."""
+    found, begun, data = [], None, bytearray()
+    for cycle, value in trace.bytes:
+        begun = cycle if begun is None else begun
+        data.append(value)
+        if value == protocol.DELIMITER:
+            found.append((begun, protocol.unseal(bytes(data[:-1]))))
+            begun, data = None, bytearray()
+    return found
+
+
+def sent_frames(skin: Skin, trace: golden.Trace) -> list[protocol.Frame]:
+    plain = [packet for _, packet in packets(trace) if packet[0] & 7 != protocol.KIND_HELLO]
+    return [protocol.decode_frame(packet, Derived(skin)) for packet in plain]
+
+
+def test_rows_records_and_contact_of_the_reference_skin_by_hand():
+    skin = Skin()
+    frames = [cells_at((0, 0), (15, 3)), FRESH]
+    trace = predict(skin, Timeline.frames(skin, frames), 2 * SCAN)
+    # row slot k: sampled at the pins in 72 k + 59, strobe 72 k + 61, handed over at 72 k + 62
+    assert trace.rows[:2] == [(62, 1, False), (134, 0, False)]
+    assert trace.rows[15] == (62 + 15 * 72, 8, True)
+    # a cell of row 0 is one cluster of row 1's strip: h + 1 + 2; one of the last row goes with it: h + 1 + 2
+    one = 1 | 0 << 9 | 0 << 9 + 11
+    other = 1 | 3 << 9 | 15 << 9 + 11
+    assert trace.records[:3] == [(137, one, False), (1145, other, False), (1146, 0, True)]
+    # no step in an empty frame: end mark at h + 3
+    assert trace.records[3:] == [(SCAN + 1145, 0, True)]
+    assert trace.contact == [(62, 1), (SCAN + 62 + 15 * 72, 0)]
+
+
+def test_bytes_and_line_of_the_reference_skin_by_hand():
+    skin = Skin()
+    trace = predict(skin, Timeline.frames(skin, [FRESH]), 3 * SCAN)
+    hello = protocol.encode_hello(skin)
+    assert trace.bytes[: len(hello)] == [(2 + 40 * place, value) for place, value in enumerate(hello)]
+    assert trace.line[0] == (3, 0)
+    # The empty frame's end mark is put in at 1145 and packed at 1147, so it waits long before the hello ends:
+    # taken one cycle after the delimiter, its first byte goes when the UART is free.
+    delimiter = 2 + 40 * (len(hello) - 1)
+    assert trace.bytes[len(hello)][0] == delimiter + 40
+    (begun, plain), *_ = packets(trace)[1:]
+    frame = protocol.decode_frame(plain, Derived(skin))
+    assert (begun, frame.sequence, frame.time_us, frame.cells, frame.zones) == (delimiter + 40, 0, 61 // 12, 0, 0)
+
+
+def test_last_byte_of_a_one_zone_frame_keeps_the_stated_bound():
+    """A switch that closes right after its row was sampled: two scans, the wire, and 3 us."""
+    skin = Skin()
+    for row in (0, 7, 15):
+        closes = 40 * SCAN + row * 72 + 60
+        trace = predict(skin, Timeline([(closes, cells_at((row, 5)), None)]), 44 * SCAN)
+        ends = [cycle for cycle, value in trace.bytes if value == 0]
+        with_zone = [frame.zones for frame in sent_frames(skin, trace)].index(1)
+        wire = 40 * 18  # 14 bytes a frame, 4 a zone
+        last_byte_out = ends[1 + with_zone] + 40  # the first packet is the hello
+        assert SCAN < last_byte_out - closes <= 2 * SCAN + wire + 3 * 12
+
+
+@pytest.mark.parametrize(
+    ("method", "press", "release", "reads", "counts"),
+    [
+        ("none", 9, 9, "0101", "0101"),
+        ("sym_defer_pk", 0, 0, "0110100", "0110100"),
+        ("sym_defer_pk", 2, 1, "0110111101001", "0000001111100"),
+        ("sym_defer_pk", 1, 2, "1100100011", "0111111001"),
+        ("asym_eager_defer_pk", 0, 0, "0100", "0100"),
+        ("asym_eager_defer_pk", 1, 1, "01001", "01101"),
+        ("asym_eager_defer_pk", 3, 0, "01000", "01110"),
+        ("asym_eager_defer_pk", 3, 1, "010001", "011111"),
+        ("asym_eager_defer_pk", 3, 1, "0100000", "0111100"),
+        ("asym_eager_defer_pk", 1, 2, "1010001", "1111101"),
+    ],
+)
+def test_debounce_by_hand(method, press, release, reads, counts):
+    samples = np.array([read == "1" for read in reads])[:, None, None]
+    assert "".join("01"[int(state)] for state in debounced(samples, method, press, release)[:, 0, 0]) == counts
+
+
+def test_debounced_row_is_late_by_its_columns_and_three():
+    skin = Skin(debounce="asym_eager_defer_pk", debounce_press_us=0.0, debounce_release_us=0.0)
+    trace = predict(skin, Timeline.frames(skin, [cells_at((0, 4))]), SCAN)
+    assert trace.rows[0] == (62 + 16 + 3, 16, False)
+    assert trace.contact == [(62, 1)]
+
+
+@pytest.mark.parametrize(
+    "plain",
+    [b"", b"\0", b"\0\0", b"\1", b"\1\0", b"\0\1", b"\1" * 253, b"\1" * 254, b"\1" * 255, b"\1" * 508, b"\1" * 509]
+    + [b"\1" * 254 + b"\0", b"\1" * 254 + b"\0\1", b"\0" + b"\1" * 254, b"\1" * 253 + b"\0" + b"\2" * 254],
+)
+def test_stuffing_agrees_with_the_cobs_package_and_the_driver(plain):
+    assert stuff(plain) == cobs.encode(plain) == protocol.cobs_encode(plain)
+    assert protocol.cobs_decode(stuff(plain)) == plain
+
+
+def test_stuffing_agrees_on_random_bytes():
+    rng = np.random.default_rng(0)
+    for length in rng.integers(0, 1200, 200):
+        plain = bytes((rng.integers(1, 256, length) * (rng.random(length) > rng.choice([0, 0.002, 0.3]))).tolist())
+        assert stuff(plain) == cobs.encode(plain)
+
+
+def test_a_full_block_costs_a_cycle_with_the_byte_behind_it():
+    packet = Packet(protocol.KIND_ZONES)  # the lead byte opens the block
+    assert packet.push(b"\1" * 253) == 253
+    assert packet.push(b"\1") == 2
+    assert packet.push(b"\1" * 253) == 253
+    assert packet.push(b"\0") == 2
+    assert packet.push(b"\1\0\1") == 3
+
+
+def test_link_sends_a_hello_first_and_answers_several_wishes_once():
+    link = Link(b"h\0", bit_clocks=4)
+    link.want_hello(0)
+    link.offer(0, b"f\0")
+    link.want_hello(1)
+    link.advance(1000)
+    # taken at 0, byte at 2, delimiter at 42, idle from 43; the hello wanted at 1 comes before the frame
+    assert link.bytes == [(2, 104), (42, 0), (82, 104), (122, 0), (162, 102), (202, 0)]
+    assert link.sent == 1
+
+
+def test_serial_line_by_hand():
+    assert line([(10, 0x0F)], 4) == [(11, 0), (15, 1), (31, 0), (47, 1)]
+    assert line([(0, 0xFF), (40, 0xFF)], 4) == [(1, 0), (5, 1), (41, 0), (45, 1)]
+    assert received([100], 4) == [100 + 2 + 2 + 36]
+    with pytest.raises(ValueError, match="apart"):
+        received([100, 139], 4)
+
+
+def test_request_flags_the_next_frame_and_brings_a_hello():
+    skin = Skin()
+    start = 10 * SCAN
+    trace = predict(skin, Timeline([], [start]), 16 * SCAN)
+    flagged = [frame.time_us for frame in sent_frames(skin, trace) if "requested" in frame.flags]
+    came = received([start], 4)[0]
+    strobes = [index * SCAN + 61 for index in range(20)]
+    assert flagged == [min(strobe for strobe in strobes if strobe > came) // 12]
+    hellos = [cycle for cycle, plain in packets(trace) if plain[0] & 7 == protocol.KIND_HELLO]
+    assert len(hellos) == 2
+    assert hellos[1] > came
+
+
+def test_request_of_an_overwritten_frame_moves_to_the_newer_one():
+    skin = Skin(baud=100_000)  # a frame takes 16 scans on the wire
+    start = 50 * SCAN
+    trace = predict(skin, Timeline([], [start]), 120 * SCAN)
+    frames = sent_frames(skin, trace)
+    assert [frame.sequence for frame in frames] == list(range(len(frames)))
+    assert sum("requested" in frame.flags for frame in frames) == 1
+    flagged = next(frame for frame in frames if "requested" in frame.flags)
+    assert flagged.overwritten > frames[0].overwritten
+    assert flagged.time_us > received([start], 120)[0] // 12 + SCAN // 12
+
+
+def test_unchanged_frames_are_kept_back_until_the_keep_alive():
+    skin = Skin(send="on_change", keep_alive_ms=1.0)  # ten scans of 96 us
+    frames = [FRESH] * 15 + [cells_at((3, 3))] * 12
+    trace = predict(skin, Timeline.frames(skin, frames), 27 * SCAN)
+    indices = [frame.time_us // 96 for frame in sent_frames(skin, trace)]
+    assert indices == [0, 10, 15, 25]
+
+
+def test_overflow_carries_what_fits_and_counts_all():
+    skin = Skin(rows=3, columns=5, zone_capacity=2)
+    cells = cells_at((0, 0), (0, 2), (0, 4), (2, 0), shape=(3, 5))
+    trace = predict(skin, Timeline.frames(skin, [cells] * 12), 12 * 3 * 72)
+    frame = sent_frames(skin, trace)[-1]
+    assert (frame.flags, frame.zones, frame.cells) == ({"overflow"}, 4, 4)
+    assert frame.moments.tolist() == [[1, 0, 0], [1, 2, 0]]
+
+
+def test_stuck_columns_read_pressed_and_are_counted_once():
+    skin = Skin(rows=2, columns=4, mask=((0, 1), (0, 3), (1, 3)))
+    stuck = np.array([True, True, False, True])
+    cells = np.zeros((2, 4), bool)
+    trace = predict(skin, Timeline.frames(skin, [cells] * 30, [stuck] * 30), 30 * 2 * 72)
+    assert [event[1:] for event in trace.rows[:2]] == [(0b0001, False), (0b0011, True)]
+    assert {frame.stuck for frame in sent_frames(skin, trace)[1:]} == {2}
+
+
+@pytest.mark.parametrize("choice", pairwise(CHOICES), ids=lambda choice: "x".join(map(str, choice["sheet"])))
+def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
+    skin = skin_for(choice)
+    known = facts(skin)
+    cycles = max(30 * known.scan_clocks, 20_000)
+    timeline = stimulus(skin, cycles, seed=1)
+    trace = predict(skin, timeline, cycles)
+    rows = np.array([[word >> column & 1 for column in range(skin.columns)] for _, word, _ in trace.rows], bool)
+    late = known.settle + 2 + (skin.columns + 3 if known.debounced else 0)
+    seen = 0
+    for begun, plain in packets(trace):
+        if plain[0] & 7 == protocol.KIND_HELLO:
+            assert protocol.decode_hello(plain) == protocol.Hello.of(skin)
+            continue
+        frame = protocol.decode_frame(plain, Derived(skin))
+        scans = [  # a few, where a scan takes less than a microsecond
+            number
+            for number in range(len(rows) // skin.rows)
+            if (number * known.scan_clocks + known.settle + 1) // known.clocks_per_us == frame.time_us
+            and trace.rows[number * skin.rows][0] == number * known.scan_clocks + late < begun
+        ]
+        assert any(holds(skin, frame, rows[scan * skin.rows : (scan + 1) * skin.rows]) for scan in scans)
+        assert "mismatch" not in frame.flags
+        seen += 1
+    assert seen
+
+
+def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
+    """Whether a frame tells of these cells what it should."""
+    if skin.report == "cells":
+        return np.array_equal(frame.bitmap, cells)
+    zones = golden.zones(cells, skin.connectivity)
+    carried = sorted(map(tuple, frame.moments.tolist()))
+    if (frame.cells, frame.zones) != (cells.sum(), len(zones)):
+        return False
+    if "overflow" in frame.flags:
+        return len(zones) > len(carried) == skin.zone_capacity and set(carried) <= set(zones)
+    return carried == zones
+
+
+def test_widths_agree_with_the_gateways_table_for_every_sheet():
+    for rows in range(1, 65):
+        for columns in (1, 2, 3, rows, 31, 64):
+            for connectivity in (4, 8):
+                skin = Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=500.0)
+                mine, theirs = facts(skin), Derived(skin)
+                for name in ("area_bits", "sum_x_bits", "sum_y_bits", "zones_bits", "item_bytes"):
+                    assert getattr(mine, name) == getattr(theirs, name), (rows, columns, connectivity, name)
+
+
+def test_golden_model_runs_without_amaranth():
+    code = "import sys, contactfpga_sim.golden; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not [name for name in loaded if name.split(".")[0] in ("amaranth", "contactfpga_hdl")]
