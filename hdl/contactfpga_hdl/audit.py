@@ -13,8 +13,8 @@ from contactfpga_hdl.tally import Change, Tally
 class Audit(wiring.Component):
     """Counts a frame before and behind the labeller; lets as many zones through as the frame can carry.
 
-    Records pass without delay. ``summary`` is complete one clock after the end mark and holds until the next one;
-    ``tag`` must hold until the end mark.
+    Records pass without delay. ``summary`` is complete one clock after the end mark and holds until the next one.
+    ``tag`` is read with the frame's last row: behind a debounce the next frame may begin before the end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -47,6 +47,7 @@ class Audit(wiring.Component):
             self.items.payload.end.eq(record.end),
             counts.taken.eq(self.taken),
             counts.row.eq(self.row),
+            counts.tag.eq(self.tag),
             counts.clear.eq(ends),
             counts.zone_valid.eq(zone),
             counts.zone.eq(record.zone),
@@ -101,6 +102,7 @@ class Bitmap(wiring.Component):
             self.items.payload.end.eq(ends),
             counts.taken.eq(taken),
             counts.row.eq(self.rows.payload),
+            counts.tag.eq(self.tag),
             counts.clear.eq(ends & self.items.ready),
         ]
         with m.If(ends & self.items.ready):
@@ -110,14 +112,14 @@ class Bitmap(wiring.Component):
 
 def _summarise(m, stage, counts):
     m.d.sync += [
-        stage.summary.tag.eq(stage.tag),
+        stage.summary.tag.eq(counts.last_tag),
         stage.summary.cells.eq(counts.cells),
         stage.summary.changed.eq(counts.changed),
     ]
 
 
 class _Counts(wiring.Component):
-    """Pressed cells of the frame, what the zones leave unexplained, and whether it changed.
+    """Pressed cells of the frame, what the zones leave unexplained, whether it changed, and its tag.
 
     All of a row is counted three clocks after ``taken``. ``clear`` starts the next frame.
     """
@@ -130,12 +132,14 @@ class _Counts(wiring.Component):
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
+                "tag": In(tag_layout()),
                 "clear": In(1),
                 "zone_valid": In(1),
                 "zone": In(moments),
                 "cells": Out(self.derived.area_bits),
                 "mismatch": Out(1),
                 "changed": Out(1),
+                "last_tag": Out(tag_layout()),
             }
         )
 
@@ -143,6 +147,8 @@ class _Counts(wiring.Component):
         m = Module()
         m.submodules.tally = tally = Tally(self.skin)
         m.d.comb += [tally.taken.eq(self.taken), tally.row.eq(self.row)]
+        with m.If(self.taken & self.row.last):
+            m.d.sync += self.last_tag.eq(self.tag)
         with m.If(self.clear):
             m.d.sync += self.cells.eq(0)
         with m.Elif(tally.valid):

@@ -43,6 +43,33 @@ def _step_layout(derived: Derived) -> data.StructLayout:
     )
 
 
+def _join_layout(derived: Derived) -> data.StructLayout:
+    """What a step adds to its zone, and what becomes of it."""
+    return data.StructLayout(
+        {
+            "end": 1,
+            "opens": 1,  # start from nothing
+            "run": moments_layout(derived),  # add the new run, a group from the stack, and a zone of the row before
+            "pop": 1,
+            "load": 1,
+            "push": 1,  # put what there is on the stack, or into the table, or let it out
+            "store": 1,
+            "place": range(derived.open_zones),
+            "leaves": 1,
+        }
+    )
+
+
+def _nesting(derived: Derived) -> int:
+    """The most zones with a run passed and a run to come."""
+    return math.ceil(derived.skin.columns / 2) // 2
+
+
+def _place(derived: Derived, column):
+    """Where a run that starts at ``column`` keeps its zone's moments."""
+    return column >> 1 if derived.skin.connectivity == 8 else column
+
+
 def _lowest(bits):
     """The lowest bit that is set, alone."""
     return (bits & -bits)[: len(bits)]
@@ -65,7 +92,7 @@ class RunLabeller(wiring.Component):
 
     A row with n steps takes ``max(1, n)`` clocks, the last one of a frame one more; a zone leaves two clocks after
     the last step in which it has a cell (docs/timing.md). With C columns a row takes at most ceil(C/2) steps with
-    8-connectivity and C with 4.
+    8-connectivity and C with 4. Each step passes walk, join and sum in three clocks.
     """
 
     def __init__(self, skin: Skin):
@@ -80,23 +107,24 @@ class RunLabeller(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.walk = walk = _Walk(self.derived)
-        m.submodules.merge = merge = _Merge(self.derived)
+        m.submodules.join = join = _Join(self.derived)
+        m.submodules.sum = sums = _Sum(self.derived)
         wiring.connect(m, wiring.flipped(self.rows), walk.rows)
-        wiring.connect(m, merge.records, wiring.flipped(self.records))
+        wiring.connect(m, sums.records, wiring.flipped(self.records))
+        for stage in (walk, join, sums):
+            m.d.comb += stage.enable.eq(~self.records.valid | self.records.ready)
         m.d.comb += [
-            walk.enable.eq(merge.ready),
-            merge.valid.eq(walk.step_valid),
-            merge.step.eq(walk.step),
-            merge.lookup.eq(walk.lookup),
+            join.valid.eq(walk.step_valid),
+            join.step.eq(walk.step),
+            sums.valid.eq(join.join_valid),
+            sums.join.eq(join.join),
+            sums.lookup.eq(walk.step.before),
         ]
         return m
 
 
 class _Walk(wiring.Component):
-    """Cuts two adjacent rows into steps, one a clock while ``enable`` is high.
-
-    ``step`` is registered; ``lookup`` is the start of its run in the row before, one clock earlier.
-    """
+    """Cuts two adjacent rows into steps, one a clock while ``enable`` is high."""
 
     def __init__(self, derived: Derived):
         self.derived = derived
@@ -107,7 +135,6 @@ class _Walk(wiring.Component):
                 "enable": In(1),
                 "step_valid": Out(1),
                 "step": Out(step),
-                "lookup": Out(step["before"].shape),
             }
         )
 
@@ -152,7 +179,6 @@ class _Walk(wiring.Component):
             step.row_done.eq(self._done),
             step.y.eq(self._y),
             step.final.eq(self._last),
-            self.lookup.eq(step.before),
         ]
         with m.If(self.enable):
             m.d.sync += [self.step.eq(step), self.step_valid.eq(work | self._last)]
@@ -191,163 +217,207 @@ class _Walk(wiring.Component):
             ]
 
 
-class _Merge(wiring.Component):
-    """Joins the steps' runs into zones and lets a zone out when it is closed. Takes a step while ``ready``."""
+class _Join(wiring.Component):
+    """Which runs of the new row are of one zone, and what each step adds to which zone."""
 
     def __init__(self, derived: Derived):
         self.derived = derived
         step = _step_layout(derived)
         super().__init__(
             {
+                "enable": In(1),
                 "valid": In(1),
                 "step": In(step),
-                "lookup": In(step["before"].shape),
-                "ready": Out(1),
-                "records": Out(stream.Signature(record_layout(derived))),
+                "join_valid": Out(1),
+                "join": Out(_join_layout(derived)),
             }
         )
-        moments = moments_layout(derived)
-        nesting = math.ceil(derived.skin.columns / 2) // 2  # zones with a run passed and a run to come
-        self._nesting = nesting
+        self._runs = max(1, math.ceil(derived.skin.columns / 2))  # the most a row can hold
         self._group_layout = data.StructLayout(
             {
-                "open": range(nesting + 1),  # zones of the row before with runs to come
-                "has_run": 1,  # in the new row, and then where its first and last one start
-                "first": step["start"].shape,
-                "last": step["start"].shape,
-                "sums": moments,
+                "open": range(_nesting(derived) + 1),  # zones of the row before with runs to come
+                "has_run": 1,  # in the new row, and then the numbers of the first and the last one
+                "first": range(self._runs),
+                "last": range(self._runs),
+                "place": range(derived.open_zones),  # of the last one in the table
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.stack = stack = Stack(self._group_layout, self._nesting)
-        self._brackets(m)
+        m.submodules.stack = stack = Stack(self._group_layout, _nesting(self.derived))
+        self._works = self.enable & self.valid & ~self.step.end
         kept = Signal(self._group_layout)  # the group of the cluster being walked
         current = Signal(self._group_layout)
         with m.If(~self.step.opens):
             m.d.comb += current.eq(kept)
-        joined, pop = self._join_waiting(m, current, stack)
-        group = self._add_runs(m, joined, current, pop, stack)
-        closed = self.step.closes & (group.open == 0)
-        active = self.valid & ~self.step.end
+        earlier, later = self._brackets(m)
+        pop = self.step.has_before & earlier & (current.open == 0)
+        passed = self.step.has_before & ~later  # the last run of its zone
+        joined = self._take_in(m, current, pop, stack.top)
+        group = self._add_run(m, joined)
         m.d.comb += [
-            self.ready.eq(~self.records.valid | self.records.ready),
-            stack.enable.eq(self.ready & active),
+            group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - (passed & earlier)),
+            stack.enable.eq(self._works),
             stack.pop.eq(pop),
             stack.push.eq(self.step.closes & (group.open != 0)),
             stack.entry.eq(group),
-            self._table_write.en.eq(self.ready & active & closed & group.has_run),
-            self._table_write.addr.eq(self._place(group.last)),
-            self._table_write.data.eq(group.sums),
         ]
-        leaves = self.step.end | closed & (self.step.final | ~group.has_run)
-        with m.If(self.ready):
-            m.d.sync += self.records.valid.eq(self.valid & leaves)
-        with m.If(self.ready & self.valid):
-            m.d.sync += [
-                kept.eq(group),
-                self.records.payload.zone.eq(Mux(self.step.end, 0, group.sums)),
-                self.records.payload.end.eq(self.step.end),
-            ]
+        self._mark(m, current, pop, stack.top, joined)
+        with m.If(self._works):
+            m.d.sync += kept.eq(group)
+        with m.If(self.enable):
+            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(self._decide(m, group, pop, passed))]
         return m
 
-    def _place(self, column):
-        """Where a run that starts at ``column`` keeps its zone's moments."""
-        return column >> 1 if self.derived.skin.connectivity == 8 else column
-
     def _brackets(self, m):
-        """For each run of either row: does a run of the same zone come before it, or after it, in its row?"""
-        slots = math.ceil(self.derived.skin.columns / 2)
-        self._after_one = Signal(slots)  # of the new row, as known so far
-        self._before_one = Signal(slots)
-        self._new_after_one = Signal(slots)
-        self._new_before_one = Signal(slots)
-        old_after_one = Signal(slots)
-        old_before_one = Signal(slots)
-        self._earlier = old_after_one.bit_select(self.step.before >> 1, 1)
-        self._later = old_before_one.bit_select(self.step.before >> 1, 1)
-        with m.If(self.ready & self.valid & ~self.step.end):
-            m.d.sync += [self._after_one.eq(self._new_after_one), self._before_one.eq(self._new_before_one)]
+        """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before?
+
+        Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
+        """
+        old_after, old_before = Signal(self._runs), Signal(self._runs)  # runs after one, before one, of the same zone
+        self._after, self._before = Signal(self._runs), Signal(self._runs)  # the same in the new row, as known so far
+        self._new_after, self._new_before = Signal(self._runs), Signal(self._runs)
+        self._number = Signal(range(self._runs))  # of the step's new run
+        with m.If(self._works):
+            m.d.sync += [
+                self._after.eq(self._new_after),
+                self._before.eq(self._new_before),
+                self._number.eq(self._number + self.step.has_run),
+            ]
+            with m.If(self.step.has_before):
+                m.d.sync += [old_after.eq(old_after >> 1), old_before.eq(old_before >> 1)]
             with m.If(self.step.row_done):
                 m.d.sync += [
-                    old_after_one.eq(self._new_after_one),
-                    old_before_one.eq(self._new_before_one),
-                    self._after_one.eq(0),
-                    self._before_one.eq(0),
+                    old_after.eq(self._new_after),
+                    old_before.eq(self._new_before),
+                    self._after.eq(0),
+                    self._before.eq(0),
+                    self._number.eq(0),
                 ]
+        return old_after[0], old_before[0]
 
-    def _join_waiting(self, m, current, stack):
-        """Join the group on top of the stack if the run before continues it."""
-        pop = Signal()
+    def _take_in(self, m, current, pop, waiting):
+        """The current group, with the group that waited on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
-        m.d.comb += [
-            pop.eq(self.step.has_before & self._earlier & (current.open == 0)),
-            joined.eq(current),
-        ]
+        m.d.comb += joined.eq(current)
         with m.If(pop):
             m.d.comb += [
-                joined.open.eq(stack.top.open),
-                joined.has_run.eq(stack.top.has_run | current.has_run),
-                joined.first.eq(Mux(stack.top.has_run, stack.top.first, current.first)),
-                joined.last.eq(Mux(current.has_run, current.last, stack.top.last)),
+                joined.open.eq(waiting.open),
+                joined.has_run.eq(waiting.has_run | current.has_run),
+                joined.first.eq(Mux(waiting.has_run, waiting.first, current.first)),
+                joined.last.eq(Mux(current.has_run, current.last, waiting.last)),
+                joined.place.eq(Mux(current.has_run, current.place, waiting.place)),
             ]
-        return joined, pop
+        return joined
 
-    def _add_runs(self, m, joined, current, pop, stack):
-        """Add the step's runs to the joined group, and note which runs of the new row are now of one zone."""
-        step = self.step
+    def _add_run(self, m, joined):
         group = Signal(self._group_layout)
-        passed = step.has_before & ~self._later  # the zone's last run: its moments come in
-        m.d.comb += [
-            group.eq(joined),
-            group.open.eq(joined.open + (step.has_before & ~self._earlier & self._later) - (passed & self._earlier)),
-        ]
-        with m.If(step.has_run):
+        m.d.comb += group.eq(joined)
+        with m.If(self.step.has_run):
             m.d.comb += [
                 group.has_run.eq(1),
-                group.first.eq(Mux(joined.has_run, joined.first, step.start)),
-                group.last.eq(step.start),
+                group.first.eq(Mux(joined.has_run, joined.first, self._number)),
+                group.last.eq(self._number),
+                group.place.eq(_place(self.derived, self.step.start)),
             ]
-        run = self._run_moments(m)
-        table = self._read_table(m)
-        for name in ("area", "sum_x", "sum_y"):
-            m.d.comb += group.sums[name].eq(
-                current.sums[name]
-                + Mux(pop, stack.top.sums[name], 0)
-                + Mux(passed, table[name], 0)
-                + Mux(step.has_run, run[name], 0)
-            )
-        over = pop & stack.top.has_run & current.has_run  # two groups of runs become one
-        onto = step.has_run & joined.has_run  # the new run follows one of its zone
-
-        def mark(condition, column):
-            return Mux(condition, 1 << (column >> 1), 0)
-
-        m.d.comb += [
-            self._new_before_one.eq(self._before_one | mark(over, stack.top.last) | mark(onto, joined.last)),
-            self._new_after_one.eq(self._after_one | mark(over, current.first) | mark(onto, step.start)),
-        ]
         return group
 
-    def _run_moments(self, m):
-        """Moments of the new run; the columns' sum is a difference of triangular numbers."""
+    def _mark(self, m, current, pop, waiting, joined):
+        """Set the brackets of runs of the new row that are now known to be of one zone."""
+        over = pop & waiting.has_run & current.has_run  # two groups of runs become one
+        onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
+
+        def bit(condition, number):
+            return Mux(condition, 1 << number, 0)
+
+        m.d.comb += [
+            self._new_before.eq(self._before | bit(over, waiting.last) | bit(onto, joined.last)),
+            self._new_after.eq(self._after | bit(over, current.first) | bit(onto, self._number)),
+        ]
+
+    def _decide(self, m, group, pop, passed):
         step = self.step
-        run = Signal(moments_layout(self.derived))
+        closed = step.closes & (group.open == 0)
+        join = Signal(self.join.shape())
+        m.d.comb += [
+            join.end.eq(step.end),
+            join.opens.eq(step.opens),
+            join.pop.eq(pop),
+            join.load.eq(passed),
+            join.push.eq(step.closes & (group.open != 0)),
+            join.store.eq(closed & group.has_run),
+            join.leaves.eq(step.end | closed & (step.final | ~group.has_run)),
+            join.place.eq(group.place),
+        ]
+        with m.If(step.has_run):
+            m.d.comb += self._run_moments(m, join.run)
+        return join
+
+    def _run_moments(self, m, run):
+        """Moments of the new run; the columns' sum is a difference of triangular numbers."""
+        start, stop = self.step.start, self.step.stop
         columns = self.derived.skin.columns
         up_to = Array(math.comb(column + 1, 2) for column in range(columns))
         below = Array(math.comb(column, 2) for column in range(columns))
-        m.d.comb += [
-            run.area.eq(step.stop - step.start + 1),
-            run.sum_x.eq(up_to[step.stop] - below[step.start]),
-            run.sum_y.eq(run.area[: columns.bit_length()] * step.y),
+        length = Signal(range(columns + 1))
+        m.d.comb += length.eq(stop - start + 1)
+        return [
+            run.area.eq(length),
+            run.sum_x.eq(up_to[stop] - below[start]),
+            run.sum_y.eq(length * self.step.y),
         ]
-        return run
 
-    def _read_table(self, m):
-        shape = moments_layout(self.derived)
-        m.submodules.table = table = memory.Memory(shape=shape, depth=self.derived.open_zones, init=[])
-        self._table_write = table.write_port()
-        read = table.read_port(transparent_for=(self._table_write,))
-        m.d.comb += [read.en.eq(self.ready), read.addr.eq(self._place(self.lookup))]
-        return read.data
+
+class _Sum(wiring.Component):
+    """Adds up the moments of each zone. ``lookup`` is the start of the run before, one clock ahead of ``join``."""
+
+    def __init__(self, derived: Derived):
+        self.derived = derived
+        super().__init__(
+            {
+                "enable": In(1),
+                "valid": In(1),
+                "join": In(_join_layout(derived)),
+                "lookup": In(_step_layout(derived)["before"].shape),
+                "records": Out(stream.Signature(record_layout(derived))),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        moments = moments_layout(self.derived)
+        join = self.join
+        works = self.enable & self.valid & ~join.end
+        m.submodules.stack = stack = Stack(moments, _nesting(self.derived))
+        m.submodules.table = table = memory.Memory(shape=moments, depth=self.derived.open_zones, init=[])
+        write = table.write_port()
+        read = table.read_port()
+        kept = Signal(moments)
+        just_stored = Signal()  # what is to be loaded is what the step before put into the table
+        group = Signal(moments)
+        loaded = Mux(just_stored, kept.as_value(), read.data.as_value())
+        loaded = data.View(moments, Mux(join.load, loaded, 0))
+        for name in ("area", "sum_x", "sum_y"):
+            m.d.comb += group[name].eq(
+                (Mux(join.opens, 0, kept[name]) + join.run[name]) + (Mux(join.pop, stack.top[name], 0) + loaded[name])
+            )
+        with m.If(works):
+            m.d.sync += kept.eq(group)
+        with m.If(self.enable):
+            m.d.sync += just_stored.eq(write.en & (write.addr == read.addr))
+        m.d.comb += [
+            stack.enable.eq(works),
+            stack.pop.eq(join.pop),
+            stack.push.eq(join.push),
+            stack.entry.eq(group),
+            read.en.eq(self.enable),
+            read.addr.eq(_place(self.derived, self.lookup)),
+            write.en.eq(works & join.store),
+            write.addr.eq(join.place),
+            write.data.eq(group),
+            self.records.valid.eq(self.valid & join.leaves),
+            self.records.payload.zone.eq(Mux(join.end, 0, group)),
+            self.records.payload.end.eq(join.end),
+        ]
+        return m

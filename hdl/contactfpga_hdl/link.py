@@ -15,10 +15,10 @@ from contactfpga_hdl.payloads import item_layout, summary_layout
 class Link(wiring.Component):
     """Keeps one frame on the wire, the newest complete one waiting, and one being written.
 
-    Three regions of one memory change places between these uses; a fourth holds the hello. Items wait in front of the packer, where one can be
-    packed two clocks after it came. A new frame drops the one
-    that waits, counted, in the clock its end mark is packed, and waits in its place when it is complete. Nothing in
-    here can hold up the stages before.
+    Items wait in front of the packer, where one can be packed two clocks after it came. Three regions of one memory
+    change places between the three frames; a fourth holds the hello. A new frame drops the one that waits, counted, in
+    the clock its end mark is packed, and waits in its place when it is complete. Nothing in here can hold up
+    the stages before.
     """
 
     def __init__(self, skin: Skin):

@@ -1,6 +1,6 @@
 """Items to bytes on the wire: lead, items, trailer and CRC, stuffed with COBS as they are written."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import crc, data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -78,7 +78,6 @@ class Packer(wiring.Component):
         item_bytes = self.derived.item_bytes
         shift = Signal(8 * max(trailer_bytes, item_bytes))
         left = Signal(range(max(trailer_bytes, item_bytes) + 1))
-        trailing = Signal()
         kind = protocol.KIND_ZONES if self.skin.report == "moments" else protocol.KIND_CELLS
         m.d.comb += [
             self._crc.valid.eq(self._byte_valid & self._byte_ready),

@@ -1,6 +1,6 @@
 """A stack whose top is always at hand."""
 
-from amaranth.hdl import Elaboratable, Module, Signal
+from amaranth.hdl import Elaboratable, Module, Mux, Signal
 from amaranth.lib import data, memory
 
 
@@ -24,27 +24,38 @@ class Stack(Elaboratable):
         m = Module()
         if self.depth == 0:
             return m
+        deeper = Signal()
+        shallower = Signal()
+        m.d.comb += [
+            deeper.eq(self.enable & self.push & ~self.pop),
+            shallower.eq(self.enable & self.pop & ~self.push),
+        ]
         with m.If(self.enable & self.push):
             m.d.sync += self.top.eq(self.entry)
-        with m.If(self.enable):
-            m.d.sync += self.level.eq(self.level + self.push - self.pop)
+        with m.If(deeper):
+            m.d.sync += self.level.eq(self.level + 1)
+        with m.If(shallower):
+            m.d.sync += self.level.eq(self.level - 1)
         if self.depth > 1:
-            self._spill(m)
+            self._spill(m, deeper, shallower)
         return m
 
-    def _spill(self, m):
-        """Entries below the top: entry i of the stack lies at address i."""
+    def _spill(self, m, deeper, shallower):
+        """Entries below the top, entry i at address i. The one next to the top is read ahead, or, when it was just
+        written, kept in a register: no address is read and written in the same clock."""
         m.submodules.below = below = memory.Memory(shape=self.entry.shape(), depth=self.depth - 1, init=[])
         write = below.write_port()
-        read = below.read_port(transparent_for=(write,))
-        level = Signal.like(self.level)
+        read = below.read_port()
+        copy = Signal(self.entry.shape())
+        fresh = Signal()
         m.d.comb += [
-            level.eq(self.level + self.push - self.pop),
-            write.en.eq(self.enable & self.push & ~self.pop & (self.level != 0)),
+            write.en.eq(deeper & (self.level != 0)),
             write.addr.eq(self.level - 1),
             write.data.eq(self.top),
-            read.en.eq(self.enable),
-            read.addr.eq(level - 2),
+            read.en.eq(shallower),
+            read.addr.eq(self.level - 3),
         ]
-        with m.If(self.enable & self.pop & ~self.push):
-            m.d.sync += self.top.eq(read.data)
+        with m.If(deeper):
+            m.d.sync += [copy.eq(self.top), fresh.eq(1)]
+        with m.If(shallower):
+            m.d.sync += [self.top.eq(Mux(fresh, copy, read.data)), fresh.eq(0)]

@@ -31,6 +31,7 @@ class Tally(wiring.Component):
         counting = Signal()
         y = Signal(range(max(2, self.skin.rows)))
         y_next = Signal.like(y)
+        y_counted = Signal.like(y)
         with m.If(self.taken):
             m.d.sync += [cells.eq(self.row.cells), y.eq(y_next), y_next.eq(Mux(self.row.last, 0, y_next + 1))]
         area = Signal(range(columns + 1))
@@ -44,8 +45,9 @@ class Tally(wiring.Component):
             self.valid.eq(counting),
             self.moments.area.eq(area),
             self.moments.sum_x.eq(sum(weighted)),
-            self.moments.sum_y.eq(area * y),
+            y_counted.eq(y),
         ]
+        m.d.comb += self.moments.sum_y.eq(self.moments.area[: len(area)] * y_counted)
         return m
 
 
