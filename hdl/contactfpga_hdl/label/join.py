@@ -1,0 +1,163 @@
+"""Steps to zones: which runs belong together, known from brackets and a stack."""
+
+import math
+
+from amaranth.hdl import Array, Module, Mux, Signal
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.derived import Derived
+from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
+from contactfpga_hdl.stack import Stack
+
+
+class Join(wiring.Component):
+    """Which runs of the new row are of one zone, and what each step adds to which zone."""
+
+    def __init__(self, derived: Derived):
+        self.derived = derived
+        step = step_layout(derived)
+        super().__init__(
+            {
+                "enable": In(1),
+                "valid": In(1),
+                "step": In(step),
+                "join_valid": Out(1),
+                "join": Out(join_layout(derived)),
+            }
+        )
+        self._runs = max(1, math.ceil(derived.skin.columns / 2))  # the most a row can hold
+        self._group_layout = data.StructLayout(
+            {
+                "open": range(nesting(derived) + 1),  # zones of the row before with runs to come
+                "has_run": 1,  # in the new row, and then the numbers of the first and the last one
+                "first": range(self._runs),
+                "last": range(self._runs),
+                "place": range(derived.open_zones),  # of the last one in the table
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.stack = stack = Stack(self._group_layout, nesting(self.derived))
+        self._works = self.enable & self.valid & ~self.step.end
+        kept = Signal(self._group_layout)  # the group of the cluster being walked
+        current = Signal(self._group_layout)
+        with m.If(~self.step.opens):
+            m.d.comb += current.eq(kept)
+        earlier, later = self._brackets(m)
+        pop = self.step.has_before & earlier & (current.open == 0)
+        passed = self.step.has_before & ~later  # the last run of its zone
+        joined = self._take_in(m, current, pop, stack.top)
+        group = self._add_run(m, joined)
+        m.d.comb += [
+            group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - (passed & earlier)),
+            stack.enable.eq(self._works),
+            stack.pop.eq(pop),
+            stack.push.eq(self.step.closes & (group.open != 0)),
+            stack.entry.eq(group),
+        ]
+        self._mark(m, current, pop, stack.top, joined)
+        with m.If(self._works):
+            m.d.sync += kept.eq(group)
+        with m.If(self.enable):
+            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(self._decide(m, group, pop, passed))]
+        return m
+
+    def _brackets(self, m):
+        """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before?
+
+        Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
+        """
+        old_after, old_before = Signal(self._runs), Signal(self._runs)  # runs after one, before one, of the same zone
+        self._after, self._before = Signal(self._runs), Signal(self._runs)  # the same in the new row, as known so far
+        self._new_after, self._new_before = Signal(self._runs), Signal(self._runs)
+        self._number = Signal(range(self._runs))  # of the step's new run
+        with m.If(self._works):
+            m.d.sync += [
+                self._after.eq(self._new_after),
+                self._before.eq(self._new_before),
+                self._number.eq(self._number + self.step.has_run),
+            ]
+            with m.If(self.step.has_before):
+                m.d.sync += [old_after.eq(old_after >> 1), old_before.eq(old_before >> 1)]
+            with m.If(self.step.row_done):
+                m.d.sync += [
+                    old_after.eq(self._new_after),
+                    old_before.eq(self._new_before),
+                    self._after.eq(0),
+                    self._before.eq(0),
+                    self._number.eq(0),
+                ]
+        return old_after[0], old_before[0]
+
+    def _take_in(self, m, current, pop, waiting):
+        """The current group, with the group that waited on the stack if the run before continues it."""
+        joined = Signal(self._group_layout)
+        m.d.comb += joined.eq(current)
+        with m.If(pop):
+            m.d.comb += [
+                joined.open.eq(waiting.open),
+                joined.has_run.eq(waiting.has_run | current.has_run),
+                joined.first.eq(Mux(waiting.has_run, waiting.first, current.first)),
+                joined.last.eq(Mux(current.has_run, current.last, waiting.last)),
+                joined.place.eq(Mux(current.has_run, current.place, waiting.place)),
+            ]
+        return joined
+
+    def _add_run(self, m, joined):
+        group = Signal(self._group_layout)
+        m.d.comb += group.eq(joined)
+        with m.If(self.step.has_run):
+            m.d.comb += [
+                group.has_run.eq(1),
+                group.first.eq(Mux(joined.has_run, joined.first, self._number)),
+                group.last.eq(self._number),
+                group.place.eq(place_of(self.derived, self.step.start)),
+            ]
+        return group
+
+    def _mark(self, m, current, pop, waiting, joined):
+        """Set the brackets of runs of the new row that are now known to be of one zone."""
+        over = pop & waiting.has_run & current.has_run  # two groups of runs become one
+        onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
+
+        def bit(condition, number):
+            return Mux(condition, 1 << number, 0)
+
+        m.d.comb += [
+            self._new_before.eq(self._before | bit(over, waiting.last) | bit(onto, joined.last)),
+            self._new_after.eq(self._after | bit(over, current.first) | bit(onto, self._number)),
+        ]
+
+    def _decide(self, m, group, pop, passed):
+        step = self.step
+        closed = step.closes & (group.open == 0)
+        join = Signal(self.join.shape())
+        m.d.comb += [
+            join.end.eq(step.end),
+            join.opens.eq(step.opens),
+            join.pop.eq(pop),
+            join.load.eq(passed),
+            join.push.eq(step.closes & (group.open != 0)),
+            join.store.eq(closed & group.has_run),
+            join.leaves.eq(step.end | closed & (step.final | ~group.has_run)),
+            join.place.eq(group.place),
+        ]
+        with m.If(step.has_run):
+            m.d.comb += self._run_moments(m, join.run)
+        return join
+
+    def _run_moments(self, m, run):
+        """Moments of the new run; the columns' sum is a difference of triangular numbers."""
+        start, stop = self.step.start, self.step.stop
+        columns = self.derived.skin.columns
+        up_to = Array(math.comb(column + 1, 2) for column in range(columns))
+        below = Array(math.comb(column, 2) for column in range(columns))
+        length = Signal(range(columns + 1))
+        m.d.comb += length.eq(stop - start + 1)
+        return [
+            run.area.eq(length),
+            run.sum_x.eq(up_to[stop] - below[start]),
+            run.sum_y.eq(length * self.step.y),
+        ]

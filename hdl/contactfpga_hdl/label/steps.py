@@ -1,0 +1,55 @@
+"""What walk, join and sum hand to each other, and sizes that follow from the columns."""
+
+import math
+
+from amaranth.lib import data
+
+from contactfpga.derived import Derived
+from contactfpga_hdl.payloads import moments_layout
+
+
+def step_layout(derived: Derived) -> data.StructLayout:
+    """One step of the walk: at most one run of the row before and one of the new row, of one cluster."""
+    column = max(1, (derived.skin.columns - 1).bit_length())
+    return data.StructLayout(
+        {
+            "end": 1,  # no step: the mark behind a frame
+            "has_before": 1,
+            "before": column,  # start of the run in the row before
+            "has_run": 1,
+            "start": column,  # first and last column of the new run
+            "stop": column,
+            "opens": 1,  # first and last step of a cluster
+            "closes": 1,
+            "row_done": 1,  # last step of a row
+            "y": max(1, (derived.skin.rows - 1).bit_length()),
+            "final": 1,  # no row follows in this frame
+        }
+    )
+
+
+def join_layout(derived: Derived) -> data.StructLayout:
+    """What a step adds to its zone, and what becomes of it."""
+    return data.StructLayout(
+        {
+            "end": 1,
+            "opens": 1,  # start from nothing
+            "run": moments_layout(derived),  # add the new run, a group from the stack, and a zone of the row before
+            "pop": 1,
+            "load": 1,
+            "push": 1,  # put what there is on the stack, or into the table, or let it out
+            "store": 1,
+            "place": range(derived.open_zones),
+            "leaves": 1,
+        }
+    )
+
+
+def nesting(derived: Derived) -> int:
+    """The most zones with a run passed and a run to come."""
+    return math.ceil(derived.skin.columns / 2) // 2
+
+
+def place_of(derived: Derived, column):
+    """Where a run that starts at ``column`` keeps its zone's moments."""
+    return column >> 1 if derived.skin.connectivity == 8 else column

@@ -1,0 +1,64 @@
+"""The moments of each zone: added up step by step, kept from row to row, let out when the zone is closed."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.derived import Derived
+from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
+from contactfpga_hdl.payloads import moments_layout, record_layout
+from contactfpga_hdl.stack import Stack
+
+
+class Sum(wiring.Component):
+    """Adds up the moments of each zone. ``lookup`` is the start of the run before, one clock ahead of ``join``."""
+
+    def __init__(self, derived: Derived):
+        self.derived = derived
+        super().__init__(
+            {
+                "enable": In(1),
+                "valid": In(1),
+                "join": In(join_layout(derived)),
+                "lookup": In(step_layout(derived)["before"].shape),
+                "records": Out(stream.Signature(record_layout(derived))),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        moments = moments_layout(self.derived)
+        join = self.join
+        works = self.enable & self.valid & ~join.end
+        m.submodules.stack = stack = Stack(moments, nesting(self.derived))
+        m.submodules.table = table = memory.Memory(shape=moments, depth=self.derived.open_zones, init=[])
+        write = table.write_port()
+        read = table.read_port()
+        kept = Signal(moments)
+        just_stored = Signal()  # what is to be loaded is what the step before put into the table
+        group = Signal(moments)
+        loaded = Mux(just_stored, kept.as_value(), read.data.as_value())
+        loaded = data.View(moments, Mux(join.load, loaded, 0))
+        for name in ("area", "sum_x", "sum_y"):
+            m.d.comb += group[name].eq(
+                (Mux(join.opens, 0, kept[name]) + join.run[name]) + (Mux(join.pop, stack.top[name], 0) + loaded[name])
+            )
+        with m.If(works):
+            m.d.sync += kept.eq(group)
+        with m.If(self.enable):
+            m.d.sync += just_stored.eq(write.en & (write.addr == read.addr))
+        m.d.comb += [
+            stack.enable.eq(works),
+            stack.pop.eq(join.pop),
+            stack.push.eq(join.push),
+            stack.entry.eq(group),
+            read.en.eq(self.enable),
+            read.addr.eq(place_of(self.derived, self.lookup)),
+            write.en.eq(works & join.store),
+            write.addr.eq(join.place),
+            write.data.eq(group),
+            self.records.valid.eq(self.valid & join.leaves),
+            self.records.payload.zone.eq(Mux(join.end, 0, group)),
+            self.records.payload.end.eq(join.end),
+        ]
+        return m
