@@ -38,7 +38,7 @@ class Packer(wiring.Component):
 
     ``decide`` is high for the clock in which an end mark is taken; in it ``summary`` describes the frame and
     ``verdict`` says whether it is sent. ``commit`` is high for the clock in which a frame's last byte is written;
-    ``end`` is then the address behind it. ``base`` must be the next region in the clock after.
+    ``end`` is then the address behind it. ``base`` is then already the next region.
 
     COBS writes a block's length in front of it. Every zero byte is the place of the next length, so a byte takes one
     write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero takes
@@ -80,7 +80,7 @@ class Packer(wiring.Component):
         left = Signal(range(max(trailer_bytes, item_bytes) + 1))
         kind = protocol.KIND_ZONES if self.skin.report == "moments" else protocol.KIND_CELLS
         m.d.comb += [
-            self._crc.valid.eq(self._byte_valid & self._byte_ready),
+            self._crc.valid.eq(self._byte_valid & self._byte_ready & ~self._restart),  # a dropped frame's last byte
             self._crc.data.eq(self._byte),
             self._crc.start.eq(self._restart),
         ]
