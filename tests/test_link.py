@@ -1,0 +1,258 @@
+"""The link: which packet goes out when, and what is in it, against a replay of the rules of docs/timing.md."""
+
+import binascii
+import dataclasses
+import struct
+
+import pytest
+
+from contactfpga import Skin
+from contactfpga_hdl.link import Link
+
+SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000}  # a scan takes 20.004 ms
+SKINS = {
+    "always": {},
+    "on change": {"send": "on_change", "keep_alive_ms": 90.0},
+    "every scan": {"send": "on_change", "keep_alive_ms": 21.0},
+    "cells": {"report": "cells"},
+    "cells on change": {"report": "cells", "send": "on_change"},
+}
+KEEP_ALIVE = {"on change": 4, "every scan": 1, "cells on change": 4}  # scans
+HELLO_EVERY = 24
+ITEM_BYTES = {"moments": 2, "cells": 1}  # 5 + 5 + 5 bits, 4 bits
+TRAILER_BYTES = 7  # 47 + 5 + 4 bits
+TAG = {"time": 24, "stuck": 4, "requested": 1}
+SUMMARY = {"cells": 5, "zones": 4, "overflow": 1, "mismatch": 1, "changed": 1}
+
+
+@dataclasses.dataclass
+class Frame:
+    items: list
+    facts: dict
+    not_before: list = dataclasses.field(default_factory=list)  # of the items and the end mark
+
+
+def skin_of(name):
+    return Skin(**SHEET, **SKINS[name])
+
+
+def sealed(plain):
+    """CRC, COBS and delimiter for a packet without long blocks."""
+    data = plain + binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "big")
+    return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0")) + b"\0"
+
+
+def hello_of(skin):
+    options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
+    facts = (skin.rows, skin.columns, options, skin.zone_capacity, skin.pitch_x_mm, skin.pitch_y_mm, 0.0)
+    return sealed(bytes([1 << 3 | 1]) + struct.pack("<BBBHfff", *facts) + skin.fingerprint)
+
+
+def frame_of(skin, frame, sequence, overwritten, requested):
+    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten, "requested": requested}
+    widths = {"time": 24, "sequence": 8, "overwritten": 8, "overflow": 1, "mismatch": 1, "requested": 1, "stuck": 4}
+    word = offset = 0
+    for name, width in (widths | {"cells": 5, "zones": 4}).items():
+        word |= facts[name] % (1 << width) << offset
+        offset += width
+    size = ITEM_BYTES[skin.report]
+    items = b"".join(item.to_bytes(size, "little") for item in frame.items)
+    return sealed(bytes([1 << 3 | (2 if skin.report == "moments" else 3)]) + items + word.to_bytes(7, "little"))
+
+
+def random_frames(rng, skin, count, spacing=1):
+    """Frames at least as far apart as the Skin allows, their items somewhere in that time."""
+    size = ITEM_BYTES[skin.report]
+    most = skin.zone_capacity if skin.report == "moments" else 4
+    frames, start = [], 1
+    for index in range(count):
+        items = [rng.randrange(1 << 8 * size - 1) for _ in range(rng.randrange(most + 1))]
+        widths = TAG | SUMMARY
+        facts = {name: rng.randrange(1 << width) for name, width in widths.items()} | {"time": index}
+        facts["requested"] = int(rng.random() < 0.15)
+        length = rng.choice((1, 1, spacing, 3 * spacing)) * (most * size + 32)
+        end = start + length - 1
+        times = sorted(rng.sample(range(start, end), len(items)))
+        frames.append(Frame(items, facts, [*times, end]))
+        start += length
+    return frames
+
+
+def run(bench_of_skin, skin, frames, ready, received=(), after=400):
+    """Puts the frames through; returns the bytes' sink and the items' source."""
+    dut, sim = bench_of_skin
+    size = ITEM_BYTES[skin.report]
+    words = [word for frame in frames for word in (*frame.items, 1 << 8 * size)]
+    ends = [index for index, word in enumerate(words) if word >> 8 * size]
+    source = sim.source(dut.items, words, not_before=[at for frame in frames for at in frame.not_before])
+
+    def described(name):
+        def value(_cycle):
+            ended = sum(index < len(source.transfers) for index in ends)
+            return frames[max(0, ended - 1)].facts[name]
+
+        return value
+
+    for name in SUMMARY:
+        sim.drive(dut.summary[name], described(name))
+    for name in TAG:
+        sim.drive(dut.summary.tag[name], described(name))
+    sim.drive(dut.received, lambda cycle: int(cycle in received))
+    sink = sim.sink(dut.bytes, ready=ready)
+    sim.run(frames[-1].not_before[-1] + after)
+    assert source.transfers == [at for frame in frames for at in frame.not_before], "the link never stalls"
+    return sink
+
+
+def decisions(skin, frames, keep_alive):
+    """(cycle of the decision, whether sent) for each frame: none of it depends on the wire."""
+    size, free, idle, out = ITEM_BYTES[skin.report], 1, None, []
+    for frame in frames:
+        for put in frame.not_before[:-1]:
+            free = max(put + 2, free) + size
+        taken = max(frame.not_before[-1] + 2, free)
+        idle = None if idle is None else idle + 1
+        facts = frame.facts
+        sent = skin.send == "always" or bool(facts["changed"] or facts["requested"])
+        sent = sent or idle is None or idle == keep_alive
+        idle = 0 if sent else idle
+        free = taken + (TRAILER_BYTES + 5 if sent else 2)
+        out.append((taken, sent))
+    return out
+
+
+def replay(skin, frames, delimiters, cycles, received=(), keep_alive=None):
+    """(cycle in which it is taken, packet) of every packet, given when each one's delimiter was transferred."""
+    decided = dict(zip([at for at, _ in decisions(skin, frames, keep_alive)], frames))
+    assert len(decided) == len(frames)
+    sends = dict(decisions(skin, frames, keep_alive))
+    hello_from, waiting, idle_from = [0], None, 0
+    sent = overwritten = ends = 0
+    packets, delimiters = [], list(delimiters)
+    for cycle in range(cycles):
+        takes_hello = takes_frame = False
+        if idle_from is not None and cycle >= idle_from:
+            takes_hello = any(at <= cycle for at in hello_from)
+            takes_frame = not takes_hello and waiting is not None and waiting[0] <= cycle
+        if takes_hello:
+            hello_from = [at for at in hello_from if at > cycle]
+            packets.append((cycle, hello_of(skin)))
+        elif takes_frame:
+            packets.append((cycle, waiting[1]))
+            waiting, sent = None, sent + 1
+        if takes_hello or takes_frame:
+            idle_from = delimiters.pop(0) + 1 if delimiters else None
+        if cycle in decided:
+            ends += 1
+            if ends % HELLO_EVERY == 0:
+                hello_from.append(cycle + 1)
+            if sends[cycle]:
+                dropped_request = waiting is not None and waiting[2]
+                overwritten += waiting is not None
+                requested = bool(decided[cycle].facts["requested"] or dropped_request)
+                packet = frame_of(skin, decided[cycle], sent, overwritten, requested)
+                waiting = cycle + TRAILER_BYTES + 4, packet, requested
+        if cycle in received:
+            hello_from.append(cycle + 1)
+    return packets, overwritten
+
+
+def packets_of(sink):
+    """(cycle in which the first byte was offered, bytes) of every packet, and when its delimiter was taken."""
+    packets, ends, current, begun, before = [], [], b"", 0, 0
+    for offered, (cycle, byte) in zip(sink.offered, sink.transfers):
+        if not current:
+            begun = offered
+        else:
+            assert offered - before <= 2, "bytes follow without a gap"
+        current, before = current + bytes([byte]), cycle
+        if not byte:
+            packets.append((begun, current))
+            ends.append(cycle)
+            current = b""
+    return packets, ends
+
+
+def varying_stalls(rng, cycles):
+    """Whether the wire is ready in each cycle: now fast, now hardly ever."""
+    levels = []
+    while len(levels) < cycles:
+        rate = rng.choice((1.0, 0.5, 0.15, 0.05, 0.02))
+        levels += [rng.random() < rate for _ in range(rng.choice((100, 400, 1200)))]
+    return levels
+
+
+@pytest.mark.parametrize("name", SKINS)
+def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(bench, rng, name):
+    skin = skin_of(name)
+    frames = random_frames(rng, skin, 130, spacing=2)
+    cycles = frames[-1].not_before[-1] + 400
+    ready = varying_stalls(rng, cycles + 1)
+    received = {cycle for cycle in range(cycles) if rng.random() < 0.002}
+    dut = Link(skin)
+    sink = run((dut, bench(dut)), skin, frames, lambda cycle: ready[cycle], received)
+    packets, ends = packets_of(sink)
+    wanted, overwritten = replay(skin, frames, ends, cycles, received, KEEP_ALIVE.get(name))
+    assert [packet for _, packet in packets] == [packet for _, packet in wanted][: len(packets)]
+    assert [begun - 2 for begun, _ in packets] == [taken for taken, _ in wanted][: len(packets)]
+    assert len(packets) >= len(wanted) - 1
+    assert len(packets) > 40
+    assert overwritten > 5
+
+
+@pytest.fixture(scope="module")
+def link(bench):
+    dut = Link(skin_of("always"))
+    return dut, bench(dut)
+
+
+def test_the_wire_may_take_a_frame_until_the_very_clock_in_which_the_next_is_decided(link):
+    skin = skin_of("always")
+    facts = dict.fromkeys(TAG | SUMMARY, 1)
+    first = Frame([0x1234], facts, [40, 60])
+    second = Frame([0x2345, 0x3456], facts | {"requested": 0, "time": 2}, [100, 110, 120])
+    (_, _), (decided, _) = decisions(skin, [first, second], None)
+    idle_from = set()
+    for release in range(decided - 20, decided + 5):
+        ready = [cycle < 50 or cycle >= release for cycle in range(1000)]
+        sink = run(link, skin, [first, second], ready.__getitem__)
+        packets, ends = packets_of(sink)
+        wanted, _ = replay(skin, [first, second], ends, 10_000)
+        assert [packet for _, packet in packets] == [packet for _, packet in wanted]
+        assert [begun - 2 for begun, _ in packets] == [taken for taken, _ in wanted]
+        idle_from.add(ends[0] + 1)
+        in_time = ends[0] + 1 <= decided
+        sequence = [(1, 0), (2, 0)] if in_time else [(2, 1)]
+        assert [packet for _, packet in packets[1:]] == [
+            frame_of(skin, (first, second)[number - 1], number - 1 - over, over, requested=number == 1 or over)
+            for number, over in sequence
+        ]
+    assert {decided, decided + 1} <= idle_from
+
+
+def test_a_hello_goes_out_at_start_every_half_second_and_after_a_byte(link, rng):
+    skin = skin_of("always")
+    frames = random_frames(rng, skin, 2 * HELLO_EVERY + 2, spacing=3)
+    received = {frames[10].not_before[0], frames[30].not_before[0], frames[30].not_before[0] + 1}
+    packets, _ = packets_of(run(link, skin, frames, lambda cycle: True, received))
+    kinds = [packet[1] & 7 for _, packet in packets]  # behind the first block's length
+    hellos = [begun for begun, packet in packets if packet == hello_of(skin)]
+    assert kinds.count(1) == len(hellos)
+    assert len(hellos) in (5, 6), "two bytes in a row may share one hello"
+    assert hellos[0] == 2
+    assert len(hello_of(skin)) <= 32
+    for period in (1, 2):
+        decided = decisions(skin, frames, None)[HELLO_EVERY * period - 1][0]
+        assert any(0 < begun - decided <= 3 + 2 * 40 for begun in hellos), "behind one frame at most"
+
+
+def test_a_request_survives_the_frame_that_is_dropped(link, rng):
+    skin = skin_of("always")
+    frames = random_frames(rng, skin, 6)
+    for index, frame in enumerate(frames):
+        frame.facts["requested"] = int(index == 1)
+    ends = frames[4].not_before[-1] - 5
+    packets, _ = packets_of(run(link, skin, frames, lambda cycle: cycle > ends))
+    sent = [packet for _, packet in packets[1:]]
+    assert sent[0] in [frame_of(skin, frames[index], 0, index, requested=True) for index in (3, 4)]
+    assert sent[-1] == frame_of(skin, frames[5], len(sent) - 1, 6 - len(sent), requested=False)
