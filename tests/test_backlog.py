@@ -1,0 +1,96 @@
+"""From rows to the packer at the shortest row time: nothing waits so long that it is lost."""
+
+import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga import Skin
+from contactfpga_hdl.audit import Audit
+from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.link import Link
+
+SHEETS = {
+    "1x64": {"rows": 1, "columns": 64, "connectivity": 4},
+    "64x2": {"rows": 64, "columns": 2, "connectivity": 4},
+    "9x9": {"rows": 9, "columns": 9, "connectivity": 8},
+    "16x16, 8": {"rows": 16, "columns": 16, "connectivity": 8},
+    "16x16, 4": {"rows": 16, "columns": 16, "connectivity": 4},
+    "12x30, few zones": {"rows": 12, "columns": 30, "connectivity": 4, "zone_capacity": 20},
+    "24x40": {"rows": 24, "columns": 40, "connectivity": 8, "zone_capacity": 110},
+}
+
+
+class Chain(wiring.Component):
+    """Labeller, audit and link as the top joins them, with a wire that takes everything."""
+
+    def __init__(self, skin):
+        self.label, self.audit, self.link = RunLabeller(skin), Audit(skin), Link(skin)
+        super().__init__({"rows": In(self.label.rows.signature.flip()), "stalled": Out(1), "packed": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules += [self.label, self.audit, self.link]
+        wiring.connect(m, wiring.flipped(self.rows), self.label.rows)
+        wiring.connect(m, self.label.records, self.audit.records)
+        wiring.connect(m, self.audit.items, self.link.items)
+        m.d.comb += [
+            self.audit.taken.eq(self.rows.valid & self.rows.ready),
+            self.audit.row.eq(self.rows.payload),
+            self.link.summary.eq(self.audit.summary),
+            self.link.bytes.ready.eq(1),
+            self.stalled.eq(~self.link.items.ready),
+            self.packed.eq(self.link.packer.decide),
+        ]
+        return m
+
+
+def shortest(fields):
+    """The Skin with the shortest rows it allows, and their clocks: found by trying, not by its own formula."""
+    for clocks in range(10, 400):
+        try:
+            skin = Skin(clock_hz=1_000_000, baud=250_000, settle_us=clocks - 1, release_us=1, **fields)
+        except ValueError:
+            continue
+        return skin, clocks
+    raise AssertionError("no Skin")
+
+
+def patterns(rng, rows, columns):
+    """Frames that close as many zones as they can, as late, as early or as close together as they can."""
+    dots = sum(1 << x for x in range(0, columns, 2))
+    other = ((1 << columns) - 1) ^ dots
+    spread = [dots if y % 2 == 0 else 0 for y in range(rows)]
+    checkers = [dots if y % 2 == 0 else other for y in range(rows)]
+    half = (rows + 1) // 2
+    late = [0] * half + spread[: rows - half]
+    early = late[::-1]
+    late_checkers, early_checkers = [0] * half + checkers[: rows - half], checkers[: rows - half] + [0] * half
+    stripes = [dots] * rows
+    noise = [rng.randrange(1 << columns) for _ in range(rows)]
+    return [spread, checkers, late, early, late_checkers, early_checkers, stripes, noise, checkers, checkers]
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name):
+    skin, clocks = shortest(SHEETS[name])
+    frames = patterns(rng, skin.rows, skin.columns)
+    dut = Chain(skin)
+    sim = bench(dut)
+    words = [word | (y == skin.rows - 1) << skin.columns for frame in frames for y, word in enumerate(frame)]
+    source = sim.source(dut.rows, words, not_before=[clocks * (index + 1) for index in range(len(words))])
+    stalled, packed = sim.watch(dut.stalled), sim.watch(dut.packed)
+    ends = sim.watch(dut.label.records.valid & dut.label.records.payload.end)
+    mismatch = sim.watch(dut.audit.summary.mismatch)
+    overflow, zones = sim.watch(dut.audit.summary.overflow), sim.watch(dut.audit.summary.zones)
+    sim.run(clocks * (len(words) + skin.rows + 4))
+    assert source.transfers == [clocks * (index + 1) for index in range(len(words))], "the labeller is ready in time"
+    assert not any(stalled.values)
+    assert not any(mismatch.values)
+    ended = [cycle for cycle, value in enumerate(ends.values) if value]
+    decided = [cycle for cycle, value in enumerate(packed.values) if value]
+    assert len(ended) == len(decided) == len(frames)
+    for end, decide, following in zip(ended, decided, [*ended[1:], len(ends.values)]):
+        assert end + 2 <= decide <= following, "packed while its summary holds"
+    for end in ended:
+        assert overflow[end + 1] == (zones[end + 1] > skin.zone_capacity)

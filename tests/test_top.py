@@ -1,0 +1,87 @@
+"""The whole chain: it can be built for every kind of Skin, and tells the facts of the right frame."""
+
+import binascii
+import math
+import time
+
+import pytest
+from amaranth.back import rtlil
+
+from contactfpga import Skin
+from contactfpga_hdl.top import Top
+
+SKINS = {
+    "reference": {},
+    "1x1": {"rows": 1, "columns": 1},
+    "1x64": {"rows": 1, "columns": 64},
+    "64x1": {"rows": 64, "columns": 1},
+    "64x64": {"rows": 64, "columns": 64, "settle_us": 20.0},
+    "64x64, 4": {"rows": 64, "columns": 64, "settle_us": 20.0, "connectivity": 4, "debounce": "sym_defer_pk"},
+    "1x1, all else": {"rows": 1, "columns": 1, "diodes": "row2col", "send": "on_change", "debounce": "sym_defer_pk"},
+    "2x1, cells": {"rows": 2, "columns": 1, "report": "cells", "send": "on_change", "keep_alive_ms": 1.0},
+    "13x6": {"rows": 13, "columns": 6, "mask": ((0, 0), (12, 5)), "debounce": "asym_eager_defer_pk"},
+    "64x64, cells": {"rows": 64, "columns": 64, "report": "cells", "debounce": "asym_eager_defer_pk"},
+    "slow": {"rows": 5, "columns": 3, "clock_hz": 1_000_000, "baud": 9600, "settle_us": 10_000.0},
+    "fast": {"clock_hz": 100_000_000, "baud": 10_000_000, "zone_capacity": 1},
+    "cylinder": {"surface": "cylinder", "radius_mm": 40.0},
+}
+
+
+@pytest.mark.parametrize("probes", [False, True])
+@pytest.mark.parametrize("name", SKINS)
+def test_it_builds_quickly(name, probes):
+    options = {"settle_us": 12.0} | SKINS[name]
+    top = Top(Skin(**options), probes=probes)
+    start = time.process_time()
+    text = rtlil.convert(top)
+    assert "module \\top" in text
+    assert time.process_time() - start < 10
+    assert ("row_transfer" in text) == probes
+
+
+def test_the_same_skin_gives_the_same_netlist():
+    skin = Skin(rows=3, columns=5, settle_us=12.0, debounce="sym_defer_pk", send="on_change")
+    assert rtlil.convert(Top(skin)) == rtlil.convert(Top(skin))
+
+
+def plain(packet):
+    """A packet without CRC and stuffing; its blocks are short."""
+    out, position = b"", 0
+    while position < len(packet):
+        out += packet[position + 1 : position + packet[position]] + b"\0"
+        position += packet[position]
+    assert binascii.crc_hqx(out[:-1], 0xFFFF) == 0
+    return out[:-3]
+
+
+@pytest.mark.parametrize("report", ["moments", "cells"])
+@pytest.mark.parametrize("debounce", ["none", "sym_defer_pk", "asym_eager_defer_pk"])
+@pytest.mark.parametrize(("rows", "columns"), [(2, 16), (3, 12)])
+def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, debounce, rows, columns):
+    """Behind a debounce the next frame's first row is sampled before this frame's end mark."""
+    clocks = columns + 6
+    skin = Skin(
+        rows=rows,
+        columns=columns,
+        report=report,
+        debounce=debounce,
+        debounce_press_us=0,
+        debounce_release_us=0,
+        settle_us=(clocks - 1) / 12,
+        release_us=1 / 12,
+        zone_capacity=1,
+    )
+    top = Top(skin, probes=True)
+    sim = bench(top)
+    sim.drive(top.columns, lambda cycle: sum(1 << x for x in range(1, columns, 2)))  # a run in every other column
+    transfer, byte = sim.watch(top.byte_transfer), sim.watch(top.byte_data)
+    sim.run(5000)
+    data = bytes(value for taken, value in zip(transfer.values, byte.values) if taken)
+    packets = [plain(packet) for packet in data.split(b"\0")[:-1]]
+    frames = [packet for packet in packets if packet[0] & 7 != 1]
+    assert len(frames) > 3
+    trailer_bits = 47 + (rows * columns).bit_length() + ((rows + 1) // 2 * ((columns + 1) // 2)).bit_length()
+    for packet in frames:
+        word = int.from_bytes(packet[-math.ceil(trailer_bits / 8) :], "little")
+        number = (word >> 24 & 255) + (word >> 32 & 255)  # frames sent and frames overwritten before it
+        assert word & 0xFFFFFF == (number * clocks * rows + clocks) // 12
