@@ -1,0 +1,163 @@
+"""Measures what the README and the pages state, in clock cycles of the compiled gateware, and writes it there.
+
+`make figures` runs it. Everything here is exact and repeatable; a test compares the tables in the files with a new run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_sim.board import Board
+from contactfpga_sim.label_bench import LabelBench
+from contactfpga_sim.scenes import edge, fingertip, palm, two_fingers
+from contactfpga_sim.shapes import variants
+
+TACTILE = (fingertip, two_fingers, palm, edge)
+
+INSTANTS = 96
+"""Touch instants, spread evenly over a scan."""
+
+SETTINGS = {
+    "reference": Skin(),
+    "reference, 1 Mbaud": Skin(baud=1_000_000),
+    "32x32": Skin(rows=32, columns=32),
+    "64x64": Skin(rows=64, columns=64),
+}
+
+
+class Latency(NamedTuple):
+    """Median and worst time in us from a switch closing to an event, over the touch instants."""
+
+    median: float
+    worst: float
+
+    @classmethod
+    def of(cls, cycles: list[int], skin: Skin) -> Latency:
+        us = np.array(cycles) / (skin.clock_hz / 1e6)
+        return cls(float(np.median(us)), float(us.max()))
+
+    def __str__(self) -> str:
+        return f"{self.median:.1f} / {self.worst:.1f}"
+
+
+def touch_latencies(skin: Skin) -> dict[str, Latency]:
+    """From a single switch in the first row closing to the pin, and to the first and last byte of its frame.
+
+    The first row is the worst place: the rest of the scan follows it.
+    """
+    frame = Derived(skin).frame_clocks
+    untouched = np.zeros((skin.rows, skin.columns), bool)
+    touched = untouched.copy()
+    touched[0, skin.columns // 2] = True
+    found: dict[str, list[int]] = {"contact": [], "first byte": [], "last byte": []}
+    for instant in range(INSTANTS):
+        start = 8 * frame + instant * frame // INSTANTS
+        with Board(skin, capture=("contact",)) as board:
+            board.hold(untouched[None], start)
+            board.hold(touched[None], 4 * frame + 100 * Derived(skin).bit_clocks * 10)
+            found["contact"].append(int(board.take("contact")["cycle"][0]) - start)
+            first, last = _first_frame_with_cells(board, skin)
+        found["first byte"].append(first - start)
+        found["last byte"].append(last - start)
+    return {name: Latency.of(cycles, skin) for name, cycles in found.items()}
+
+
+def _first_frame_with_cells(board: Board, skin: Skin) -> tuple[int, int]:
+    """Cycles in which the start bit of a frame's first byte begins and the stop bit of its last one ends."""
+    received = board.take("received")
+    ends = np.flatnonzero(received["data"] == protocol.DELIMITER)
+    start = 0
+    for end in ends:
+        packet = received[start:end]["data"].astype(np.uint8).tobytes()
+        plain = protocol.unseal(packet)
+        if plain[0] & 7 == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(skin)).cells:
+            return int(received[start]["cycle"]) - 10 * Derived(skin).bit_clocks, int(received[end]["cycle"])
+        start = end + 1
+    raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
+
+
+def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
+    """Frames a second that reach the host with one zone on the sheet, and the bytes of such a frame."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[1:3, 1:3] = True
+    with Board(skin) as board:
+        board.hold(cells[None], scans * Derived(skin).frame_clocks)
+        packets = board.receive().split(b"\0")[:-1]
+        frames = [packet for packet in packets if protocol.unseal(packet)[0] & 7 == protocol.KIND_ZONES]
+        return len(frames) / (board.cycle / skin.clock_hz), len(frames[-1]) + 1
+
+
+def reference_table() -> str:
+    """Latency, rate and size on the wire over some settings."""
+    lines = [
+        "| sheet | scan | touch to `contact` pin | touch to last byte | frames a second | bytes, one zone |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, skin in SETTINGS.items():
+        latency = touch_latencies(skin)
+        rate, size = frame_rate(skin)
+        scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
+        lines.append(
+            f"| {name} | {scan:g} us | {latency['contact']} us | **{latency['last byte']} us** | {rate:,.0f} | {size} |"
+        )
+    return "\n".join(lines)
+
+
+def labeller_table() -> str:
+    """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
+    lines = [
+        "| cells | connectivity | built-in tactile scenes, worst | shapes that break labellers, worst | bound |",
+        "|---|---|---|---|---|",
+    ]
+    for size in (16, 32, 64):
+        for connectivity in (8, 4):
+            skin = Skin(rows=size, columns=size, connectivity=connectivity, settle_us=10.0)
+            touches = np.stack([_cut_at_last_row(make(skin)(0.0)) for make in TACTILE])
+            shapes = np.stack([cells for _, cells in variants(size, size)])
+            with LabelBench(skin) as bench:
+                clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
+            bound = math.ceil(size / 2) + 4 if connectivity == 8 else size + 4
+            lines.append(f"| {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |")
+    return "\n".join(lines)
+
+
+def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
+    """The contact moved down until its densest row is the sheet's last: the case in which records come late."""
+    return np.roll(cells, len(cells) - 1 - int(cells.sum(axis=1).argmax()), axis=0)
+
+
+TABLES: dict[str, Callable[[], str]] = {"reference": reference_table, "labeller": labeller_table}
+
+
+def update(text: str) -> str:
+    """The text of a page with each `<!-- figures: NAME -->` section measured anew."""
+
+    def measured(match: re.Match[str]) -> str:
+        return f"{match[1]}\n{TABLES[match[2]]()}\n{match[3]}"
+
+    return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", measured, text, flags=re.DOTALL)
+
+
+def main() -> int:
+    """Update the files named."""
+    parser = argparse.ArgumentParser(description="Measure the tables in these pages anew.")
+    parser.add_argument("pages", type=Path, nargs="+")
+    for page in parser.parse_args().pages:
+        page.write_text(update(page.read_text()))
+        print(f"measured {page}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
