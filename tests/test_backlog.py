@@ -1,5 +1,7 @@
 """From rows to the packer at the shortest row time: nothing waits so long that it is lost."""
 
+import math
+
 import pytest
 from amaranth.hdl import Module
 from amaranth.lib import wiring
@@ -17,7 +19,8 @@ SHEETS = {
     "16x16, 8": {"rows": 16, "columns": 16, "connectivity": 8},
     "16x16, 4": {"rows": 16, "columns": 16, "connectivity": 4},
     "12x30, few zones": {"rows": 12, "columns": 30, "connectivity": 4, "zone_capacity": 20},
-    "24x40": {"rows": 24, "columns": 40, "connectivity": 8, "zone_capacity": 110},
+    "24x40, 8": {"rows": 24, "columns": 40, "connectivity": 8, "zone_capacity": 110},
+    "24x40, 4": {"rows": 24, "columns": 40, "connectivity": 4, "zone_capacity": 110},
 }
 
 
@@ -56,25 +59,29 @@ def shortest(fields):
     raise AssertionError("no Skin")
 
 
-def patterns(rng, rows, columns):
-    """Frames that close as many zones as they can, as late, as early or as close together as they can."""
+def patterns(rng, rows, columns, capacity):
+    """Frames that close as many zones as they can, as late, as early or as close together as they can.
+
+    Worst is a frame that closes just its capacity at its end, before one that does so at its start.
+    """
     dots = sum(1 << x for x in range(0, columns, 2))
     other = ((1 << columns) - 1) ^ dots
     spread = [dots if y % 2 == 0 else 0 for y in range(rows)]
     checkers = [dots if y % 2 == 0 else other for y in range(rows)]
-    half = (rows + 1) // 2
-    late = [0] * half + spread[: rows - half]
-    early = late[::-1]
-    late_checkers, early_checkers = [0] * half + checkers[: rows - half], checkers[: rows - half] + [0] * half
-    stripes = [dots] * rows
+    frames = [spread, checkers]
+    for pattern, rows_each in ((spread, 2), (checkers, 1)):
+        some = min(rows, rows_each * math.ceil(capacity / math.ceil(columns / 2)))
+        for count in (some, rows // 2):
+            empty = [0] * (rows - count)
+            frames += [empty + pattern[:count], pattern[:count] + empty]
     noise = [rng.randrange(1 << columns) for _ in range(rows)]
-    return [spread, checkers, late, early, late_checkers, early_checkers, stripes, noise, checkers, checkers]
+    return [*frames, [dots] * rows, noise, checkers, checkers]
 
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name):
     skin, clocks = shortest(SHEETS[name])
-    frames = patterns(rng, skin.rows, skin.columns)
+    frames = patterns(rng, skin.rows, skin.columns, skin.zone_capacity)
     dut = Chain(skin)
     sim = bench(dut)
     words = [word | (y == skin.rows - 1) << skin.columns for frame in frames for y, word in enumerate(frame)]

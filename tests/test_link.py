@@ -70,6 +70,8 @@ def random_frames(rng, skin, count, spacing=1):
         widths = TAG | SUMMARY
         facts = {name: rng.randrange(1 << width) for name, width in widths.items()} | {"time": index}
         facts["requested"] = int(rng.random() < 0.15)
+        if index in (0, 1):  # the first one goes out all the same, the second one waits for the keep-alive
+            facts |= {"changed": 0, "requested": 0}
         length = rng.choice((1, 1, spacing, 3 * spacing)) * (most * size + 32)
         end = start + length - 1
         times = sorted(rng.sample(range(start, end), len(items)))
