@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from contactfpga import Skin
 from contactfpga.derived import Derived
-from contactfpga_hdl.label import RunLabeller, _place
+from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label.steps import place_of
 
 SHAPES = {
     "nested U": "#.#.#.# #.#.#.# #.#.#.# #.###.# #.....# #######",
@@ -257,7 +258,7 @@ def test_open_zones_never_share_a_place_in_the_table(connectivity):
     their places are read before its place is written; so what counts are runs of one row, and of two clusters.
     """
     derived = Derived(skin_of(2, 8, connectivity))
-    places = [_place(derived, x) for x in range(8)]
+    places = [place_of(derived, x) for x in range(8)]
     assert max(places) < derived.open_zones
     starts_of = [[x for x in range(8) if (word & ~(word << 1)) >> x & 1] for word in range(256)]
     for upper, lower in itertools.product(range(256), repeat=2):
