@@ -254,7 +254,7 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
     return carried == zones
 
 
-def test_widths_agree_with_the_gateways_table_for_every_sheet():
+def test_widths_agree_with_the_gatewares_table_for_every_sheet():
     for rows in range(1, 65):
         for columns in (1, 2, 3, rows, 31, 64):
             for connectivity in (4, 8):
@@ -262,6 +262,32 @@ def test_widths_agree_with_the_gateways_table_for_every_sheet():
                 mine, theirs = facts(skin), Derived(skin)
                 for name in ("area_bits", "sum_x_bits", "sum_y_bits", "zones_bits", "item_bytes"):
                     assert getattr(mine, name) == getattr(theirs, name), (rows, columns, connectivity, name)
+
+
+@pytest.mark.parametrize("megahertz", [1, 12, 50])
+def test_clocks_agree_with_the_gatewares_table_where_decimals_are_not_exact(megahertz):
+    for rows, row_clocks in ((1, 143), (3, 59), (11, 45), (16, 72)):
+        scan_us = rows * row_clocks / megahertz
+        for scans in range(1, 12):
+            skin = Skin(
+                rows=rows,
+                columns=5,
+                clock_hz=megahertz * 1_000_000,
+                baud=250_000,
+                settle_us=(row_clocks - 4) / megahertz,
+                release_us=4 / megahertz,
+                debounce="sym_defer_pk",
+                debounce_press_us=scans * scan_us,
+                debounce_release_us=(scans + 0.5) * scan_us,
+                send="on_change",
+                keep_alive_ms=scans * scan_us / 1000,
+            )
+            mine, theirs = facts(skin), Derived(skin)
+            assert mine.scan_clocks == theirs.frame_clocks == rows * row_clocks
+            assert (mine.press_scans, mine.release_scans) == (theirs.press_scans, theirs.release_scans)
+            assert (mine.press_scans, mine.release_scans) == (scans, scans + 1)
+            assert mine.keep_alive_scans == theirs.keep_alive_frames == scans, skin.keep_alive_ms
+            assert mine.hello_scans == theirs.hello_frames
 
 
 def test_golden_model_runs_without_amaranth():

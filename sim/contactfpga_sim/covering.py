@@ -69,6 +69,11 @@ def _pairs(row, place=None, value=None) -> set[tuple[int, int, int, int]]:
     return {tuple(itertools.chain(*sorted([(place, value), pair]))) for pair in given}  # type: ignore[misc]
 
 
+def pairs_in(rows: list[list[int]]) -> set[tuple[int, int, int, int]]:
+    """All pairs (choice, value, choice, value), as indices, that occur in the rows of a covering set."""
+    return set().union(*map(_pairs, rows))
+
+
 def skin_for(choice: dict[str, Any]) -> Skin:
     """The Skin for an assignment of :data:`CHOICES`."""
     rows, columns = choice["sheet"]
@@ -76,7 +81,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "report", "send")}
     values |= {"rows": rows, "columns": columns, "clock_hz": megahertz * 1_000_000, "baud": baud}
     if choice["surface"] == "cylinder":
-        values |= {"surface": "cylinder", "radius_mm": 75.5, "pitch_y_mm": 7.25}
+        values |= {"surface": "cylinder", "radius_mm": 2.0 * columns + 5.5, "pitch_y_mm": 7.25}
     if rows * columns > 1 and choice["mask"] == "cells":
         values["mask"] = ((rows - 1, 0), (0, columns - 1)) if rows * columns > 2 else ((0, 0),)
     elif columns > 1 and choice["mask"] == "column":

@@ -29,6 +29,11 @@ def upwards(value: Fraction) -> int:
     return math.ceil(value - Fraction(1, 10**9))
 
 
+def downwards(value: Fraction) -> int:
+    """The next whole number downwards. A billionth below one does not count."""
+    return math.floor(value + Fraction(1, 10**9))
+
+
 @dataclasses.dataclass(frozen=True)
 class Facts:
     """What the rules call R, C, M, S, L, T, D, P and Q, and the widths of the fields on the wire."""
@@ -86,7 +91,7 @@ class Facts:
 
     @functools.cached_property
     def keep_alive_scans(self) -> int:
-        return math.floor(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+        return downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
 
     @functools.cached_property
     def hello_scans(self) -> int:
