@@ -33,6 +33,10 @@ SHAPES = {
     "over and under": "###.### ..###.. ###.###",
     "passed and joined again": "#...# #.#.# ##### #.#.# #...#",
     "closing inside an open one": "#.#.# #.#.# #...# #...# #####",
+    "island joins the right arm": "##### #...# #.#.# ..### ..#.. ..###",
+    "island joins the left arm": "##### #...# #.#.# ###.. ..#.. ..###",
+    "arches joined on the right": "####### #.....# #.###.# #.#.#.# #.#.### #.#.#.# #.#.#.#",
+    "three arches joined": "######### #.......# #.#####.# #.#...#.# #.#.#.#.# #.#.##### #.#.#.#.# ###.#.#.#",
     "column": "# # . #",
     "row": "##.#.###",
     "cell": "#",
@@ -205,11 +209,25 @@ def test_random_frames_come_out_in_their_cycles(bench, rows, columns, connectivi
     check()
 
 
+def maze(rng, rows, columns):
+    """Dots in every other row and column, joined at random: zones nest deeper in it than in noise."""
+    across, down, dots = rng.uniform(0.2, 0.6), rng.uniform(0.5, 0.95), rng.uniform(0.8, 1.0)
+    chance = [[dots, across], [down, 0.0]]
+    return tuple(sum((rng.random() < chance[y % 2][x % 2]) << x for x in range(columns)) for y in range(rows))
+
+
+@pytest.mark.parametrize("connectivity", [8, 4])
+@pytest.mark.parametrize(("rows", "columns", "count"), [(9, 9, 60), (12, 17, 60), (20, 32, 12)])
+def test_mazes_come_out_in_their_cycles(bench, rng, rows, columns, count, connectivity):
+    assert_exact(bench, [maze(rng, rows, columns) for _ in range(count)], columns, connectivity)
+
+
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("rows", "columns"), [(6, 9), (8, 16), (1, 7), (7, 1)])
 @pytest.mark.parametrize(("gap", "stall"), [(0.5, 0.0), (0.0, 0.5), (0.4, 0.8), (0.8, 0.4)])
 def test_stalls_on_either_port_change_no_zone(bench, rng, rows, columns, connectivity, gap, stall):
-    frames = [tuple(rng.randrange(1 << columns) for _ in range(rows)) for _ in range(12)]
+    frames = [tuple(rng.randrange(1 << columns) for _ in range(rows)) for _ in range(6)]
+    frames += [maze(rng, rows, columns) for _ in range(6)]
     _, records = label(bench, frames, columns, connectivity, rng, gap, stall)
     wanted = [sorted(moments(zone) for zone in pieces(frame, connectivity)) for frame in frames]
     assert zones_by_frame(records) == wanted
