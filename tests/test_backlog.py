@@ -8,7 +8,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
-from contactfpga_hdl.audit import Audit
+from contactfpga_hdl.audit import Audit, Bitmap
 from contactfpga_hdl.label import RunLabeller
 from contactfpga_hdl.link import Link
 
@@ -21,27 +21,38 @@ SHEETS = {
     "12x30, few zones": {"rows": 12, "columns": 30, "connectivity": 4, "zone_capacity": 20},
     "24x40, 8": {"rows": 24, "columns": 40, "connectivity": 8, "zone_capacity": 110},
     "24x40, 4": {"rows": 24, "columns": 40, "connectivity": 4, "zone_capacity": 110},
+    "1x1, cells": {"rows": 1, "columns": 1, "report": "cells"},
+    "1x7, cells": {"rows": 1, "columns": 7, "report": "cells"},
+    "1x9, cells": {"rows": 1, "columns": 9, "report": "cells"},
+    "2x3, cells": {"rows": 2, "columns": 3, "report": "cells"},
+    "3x64, cells": {"rows": 3, "columns": 64, "report": "cells"},
 }
 
 
 class Chain(wiring.Component):
-    """Labeller, audit and link as the top joins them, with a wire that takes everything."""
+    """Labeller, audit and link as the top joins them, or bitmap and link, with a wire that takes everything."""
 
     def __init__(self, skin):
-        self.label, self.audit, self.link = RunLabeller(skin), Audit(skin), Link(skin)
-        super().__init__({"rows": In(self.label.rows.signature.flip()), "stalled": Out(1), "packed": Out(1)})
+        self.link = Link(skin)
+        self.audit = Audit(skin) if skin.report == "moments" else Bitmap(skin)
+        self.front = RunLabeller(skin) if skin.report == "moments" else self.audit
+        super().__init__(
+            {"rows": In(self.front.rows.signature.flip()), "ends": Out(1), "stalled": Out(1), "packed": Out(1)}
+        )
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules += [self.label, self.audit, self.link]
-        wiring.connect(m, wiring.flipped(self.rows), self.label.rows)
-        wiring.connect(m, self.label.records, self.audit.records)
+        m.submodules += [self.audit, self.link]
+        wiring.connect(m, wiring.flipped(self.rows), self.front.rows)
+        if self.front is not self.audit:
+            m.submodules += self.front
+            wiring.connect(m, self.front.records, self.audit.records)
+            m.d.comb += [self.audit.taken.eq(self.rows.valid & self.rows.ready), self.audit.row.eq(self.rows.payload)]
         wiring.connect(m, self.audit.items, self.link.items)
         m.d.comb += [
-            self.audit.taken.eq(self.rows.valid & self.rows.ready),
-            self.audit.row.eq(self.rows.payload),
             self.link.summary.eq(self.audit.summary),
             self.link.bytes.ready.eq(1),
+            self.ends.eq(self.audit.items.valid & self.audit.items.ready & self.audit.items.payload.end),
             self.stalled.eq(~self.link.items.ready),
             self.packed.eq(self.link.packer.decide),
         ]
@@ -82,12 +93,13 @@ def patterns(rng, rows, columns, capacity):
 def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name):
     skin, clocks = shortest(SHEETS[name])
     frames = patterns(rng, skin.rows, skin.columns, skin.zone_capacity)
+    frames *= 1 + 100 // (skin.rows * skin.columns)  # time for what is late to add up
     dut = Chain(skin)
     sim = bench(dut)
     words = [word | (y == skin.rows - 1) << skin.columns for frame in frames for y, word in enumerate(frame)]
     source = sim.source(dut.rows, words, not_before=[clocks * (index + 1) for index in range(len(words))])
     stalled, packed = sim.watch(dut.stalled), sim.watch(dut.packed)
-    ends = sim.watch(dut.label.records.valid & dut.label.records.payload.end)
+    ends = sim.watch(dut.ends)
     mismatch = sim.watch(dut.audit.summary.mismatch)
     overflow, zones = sim.watch(dut.audit.summary.overflow), sim.watch(dut.audit.summary.zones)
     sim.run(clocks * (len(words) + skin.rows + 4))

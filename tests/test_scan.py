@@ -8,8 +8,8 @@ from contactfpga import Skin
 from contactfpga_hdl.scan import Scanner
 
 SKINS = {
-    "1x1": {"rows": 1, "columns": 1, "settle_us": 9, "release_us": 1},
-    "1x7": {"rows": 1, "columns": 7, "settle_us": 10, "release_us": 3},
+    "1x1": {"rows": 1, "columns": 1, "settle_us": 15, "release_us": 1},
+    "1x7": {"rows": 1, "columns": 7, "settle_us": 13, "release_us": 3},
     "7x1": {"rows": 7, "columns": 1, "settle_us": 6, "release_us": 4},
     "3x5": {"rows": 3, "columns": 5, "settle_us": 8, "release_us": 3, "mask": ((0, 1), (2, 1), (2, 4), (1, 1))},
     "2x20": {"rows": 2, "columns": 20, "settle_us": 1, "release_us": 25, "mask": ((0, 0), (1, 0), (1, 19))},

@@ -51,8 +51,9 @@ class Derived:
     @property
     def min_row_clocks(self) -> int:
         """A row must last until debounce and labeller are done with the one before it, and a frame until
-        its records are packed."""
-        packing = self.zone_capacity * self.record_bytes + 32 if self.skin.report == "moments" else 0
+        its items are packed."""
+        closing = 32 if self.skin.report == "moments" else self.trailer_bytes + 8
+        packing = self.max_items * self.item_bytes + closing
         return max(self.skin.columns + 6, 10, math.ceil(packing / self.skin.rows))
 
     @property
