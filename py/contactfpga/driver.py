@@ -23,6 +23,7 @@ from contactfpga.errors import (
     ReplayEnded,
     SkinMismatch,
 )
+from contactfpga.protocol import Hello
 from contactfpga.receiver import Item, Receiver, Stats
 from contactfpga.skin import Skin
 from contactfpga.transport import Recorder, Transport, connect
@@ -52,7 +53,7 @@ class Board:
     def __init__(self, transport: Transport, skin: Skin | None = None):
         self._transport = transport
         self._receiver = Receiver(transport.name, skin, transport.live)
-        self._queue: collections.deque[Item] = collections.deque()
+        self._queue: collections.deque[Zones | ContactFPGAError] = collections.deque()
         self._last_read = transport.clock()
         self._asked = False  # an answer may still come that nobody waits for
 
@@ -99,7 +100,8 @@ class Board:
         deadline = self._transport.clock() + _checked(timeout)
         start = self.stats.bytes
         while not self._queue:
-            if not self._pump(deadline) and self._transport.clock() >= deadline:
+            self._pump(deadline)
+            if not self._queue and self._transport.clock() >= deadline:
                 raise self._timed_out(timeout, start)
         return _zones(self._queue.popleft())
 
@@ -156,14 +158,18 @@ class Board:
             raise self._queue[0]
 
     def _pump(self, deadline: float) -> int:
-        """Read once, until the deadline at most; returns the number of bytes."""
+        """Read once, until the deadline at most, into the queue; returns the number of bytes."""
+        before = self.stats.bytes
+        self._queue += (item for item in self._receive(deadline) if not isinstance(item, Hello))
+        return self.stats.bytes - before
+
+    def _receive(self, deadline: float) -> list[Item]:
         now = self._transport.clock()
         if now - self._last_read > STALE_S:
             self._drop_waiting()
         data = self._transport.read(max(0.0, deadline - now))
         self._last_read = self._transport.clock()
-        self._queue += self._receiver.feed(data, self._last_read)
-        return len(data)
+        return self._receiver.feed(data, self._last_read)
 
     def _drop_waiting(self) -> None:
         deadline = self._transport.clock() + 1.0  # a wire is always slower than this loop; a pty need not be
@@ -174,20 +180,22 @@ class Board:
     def _request(self, deadline: float, timeout: float) -> Zones:
         self._queue.clear()
         self._drop_waiting()
-        start, hellos = self.stats.bytes, self.stats.hellos
+        start = self.stats.bytes
         self._transport.write(ASK)
         self._asked = True
+        greeted = False
         while True:
-            count = self._pump(deadline)
-            while self._queue:
-                item = self._queue.popleft()
-                if isinstance(item, SkinMismatch) and self._receiver.skin is not None:
-                    continue  # a board that was given another Skin between two calls is no trouble for this one
-                zones = _zones(item)
-                if "requested" in zones.flags and self.stats.hellos > hellos:
+            items = self._receive(deadline)
+            for index, item in enumerate(items):
+                if isinstance(item, Hello):
+                    greeted = True
+                elif isinstance(item, SkinMismatch) and self._receiver.skin is not None:
+                    greeted = True  # a board that was given another Skin between two calls is no trouble for this one
+                elif greeted and "requested" in _zones(item).flags:
                     self._asked = False
-                    return zones
-            if not count and self._transport.clock() >= deadline:
+                    self._queue += (later for later in items[index + 1 :] if not isinstance(later, Hello))
+                    return _zones(item)
+            if self._transport.clock() >= deadline:
                 raise self._timed_out(timeout, start)
 
     def _timed_out(self, timeout: float, start: int) -> ReadTimeout:
@@ -306,8 +314,8 @@ def _find(baud: int) -> str:
     raise PortNotFound(f"{many}. Candidates: " + "; ".join(report))
 
 
-def _zones(item: Item) -> Zones:
-    if isinstance(item, Exception):
+def _zones(item: Zones | ContactFPGAError) -> Zones:
+    if isinstance(item, ContactFPGAError):
         raise item
     return item
 

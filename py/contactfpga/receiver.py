@@ -14,7 +14,7 @@ from contactfpga.zone import Zones
 
 WRAP_US = 1 << protocol.TIME_BITS
 _COUNTER = 1 << protocol.COUNTER_BITS
-Item = Zones | SkinMismatch | VersionMismatch
+Item = Zones | Hello | SkinMismatch | VersionMismatch
 _RESTART_US = 1_000_000
 """A board whose first frame this is started less than this long ago."""
 
@@ -77,7 +77,7 @@ class Receiver:
         self._counting = False
 
     def feed(self, data: bytes, now: float) -> list[Item]:
-        """What ``data`` completes, in order: zones, or the error that a hello gives cause for.
+        """What ``data`` completes, in order: zones, hellos, and the errors that hellos give cause for.
 
         ``now`` is the time of its arrival in seconds.
         """
@@ -105,6 +105,7 @@ class Receiver:
         item: Item | None = None
         if packet == self._hello_packet:
             self.stats.hellos += 1
+            item = self.hello
         else:
             try:
                 item = self._decode(packet, now)
@@ -150,7 +151,7 @@ class Receiver:
             "load a bitstream and install a contactfpga of the same release"
         )
 
-    def _take_hello(self, hello: Hello, packet: bytes) -> SkinMismatch | None:
+    def _take_hello(self, hello: Hello, packet: bytes) -> Hello | SkinMismatch:
         try:
             told = hello.skin()
         except SkinError as error:
@@ -170,8 +171,8 @@ class Receiver:
             )
         self.skin = expected or told
         self._derived = Derived(self.skin)
-        if before is None or not changed:
-            return None
+        if not changed or before is None:
+            return hello
         return SkinMismatch(
             f"{self.port} now has {_describe(hello)}, before it was {_describe(before)}: another bitstream was "
             "loaded; frames from here on are of the new Skin"
