@@ -1,6 +1,5 @@
 """The link: which packet goes out when, and what is in it, against a replay of the rules of docs/timing.md."""
 
-import binascii
 import dataclasses
 import struct
 
@@ -20,8 +19,8 @@ SKINS = {
 KEEP_ALIVE = {"on change": 4, "every scan": 1, "cells on change": 4}  # scans
 HELLO_EVERY = 24
 ITEM_BYTES = {"moments": 2, "cells": 1}  # 5 + 5 + 5 bits, 4 bits
-TRAILER_BYTES = 7  # 47 + 5 + 4 bits
-TAG = {"time": 24, "stuck": 4, "requested": 1}
+TRAILER_BYTES = 7  # 24 + 8 + 3 + 5 + 4 + 4 bits and the last byte
+TAG = {"time": 24, "stuck": 3, "requested": 1}
 SUMMARY = {"cells": 5, "zones": 4, "overflow": 1, "mismatch": 1, "changed": 1}
 
 
@@ -37,27 +36,39 @@ def skin_of(name):
 
 
 def sealed(plain):
-    """CRC, COBS and delimiter for a packet without long blocks."""
-    data = plain + binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "big")
-    return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0")) + b"\0"
+    """COBS, check bytes and delimiter for a packet without long blocks."""
+    stuffed = b"".join(bytes([len(block) + 1]) + block for block in plain.split(b"\0"))
+    crc = crc16(stuffed)
+    return stuffed + bytes([128 + crc % 128, 128 + crc // 128 % 128, 128 + crc // 128**2]) + b"\0"
+
+
+def crc16(data):
+    """CRC-16/MCRF4XX, bit by bit in the order of the line."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
+    return crc
 
 
 def hello_of(skin):
     options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
     facts = (skin.rows, skin.columns, options, skin.zone_capacity, skin.pitch_x_mm, skin.pitch_y_mm, 0.0)
-    return sealed(bytes([1 << 3 | 1]) + struct.pack("<BBBHfff", *facts) + skin.fingerprint)
+    return sealed(struct.pack("<BBBHfff", *facts) + skin.fingerprint + bytes([1 << 5]))
 
 
 def frame_of(skin, frame, sequence, overwritten, requested):
     facts = frame.facts | {"sequence": sequence, "overwritten": overwritten, "requested": requested}
-    widths = {"time": 24, "sequence": 8, "overwritten": 8, "overflow": 1, "mismatch": 1, "requested": 1, "stuck": 4}
+    widths = {"time": 24, "sequence": 8, "stuck": 3, "cells": 5, "zones": 4, "overwritten": 4}
     word = offset = 0
-    for name, width in (widths | {"cells": 5, "zones": 4}).items():
+    for name, width in (widths | {"overflow": 1, "mismatch": 1, "requested": 1}).items():
         word |= facts[name] % (1 << width) << offset
         offset += width
     size = ITEM_BYTES[skin.report]
     items = b"".join(item.to_bytes(size, "little") for item in frame.items)
-    return sealed(bytes([1 << 3 | (2 if skin.report == "moments" else 3)]) + items + word.to_bytes(7, "little"))
+    word |= (1 if skin.report == "moments" else 2) << offset | 1 << offset + 2
+    return sealed(items + word.to_bytes(7, "little"))
 
 
 def random_frames(rng, skin, count, spacing=1):
@@ -108,7 +119,7 @@ def run(bench_of_skin, skin, frames, ready, received=(), after=400):
 
 def decisions(skin, frames, keep_alive):
     """(cycle of the decision, whether sent) for each frame: none of it depends on the wire."""
-    size, free, idle, out = ITEM_BYTES[skin.report], 1, None, []
+    size, free, idle, out = ITEM_BYTES[skin.report], 0, None, []
     for frame in frames:
         for put in frame.not_before[:-1]:
             free = max(put + 2, free) + size
@@ -118,7 +129,7 @@ def decisions(skin, frames, keep_alive):
         sent = skin.send == "always" or bool(facts["changed"] or facts["requested"])
         sent = sent or idle is None or idle == keep_alive
         idle = 0 if sent else idle
-        free = taken + (TRAILER_BYTES + 5 if sent else 2)
+        free = taken + (TRAILER_BYTES + 2 if sent else 1)
         out.append((taken, sent))
     return out
 
@@ -153,7 +164,7 @@ def replay(skin, frames, delimiters, cycles, received=(), keep_alive=None):
                 overwritten += waiting is not None
                 requested = bool(decided[cycle].facts["requested"] or dropped_request)
                 packet = frame_of(skin, decided[cycle], sent, overwritten, requested)
-                waiting = cycle + TRAILER_BYTES + 4, packet, requested
+                waiting = cycle + TRAILER_BYTES + 2, packet, requested
         if cycle in received:
             hello_from.append(cycle + 1)
     return packets, overwritten
@@ -237,9 +248,9 @@ def test_a_hello_goes_out_at_start_every_half_second_and_after_a_byte(link, rng)
     frames = random_frames(rng, skin, 2 * HELLO_EVERY + 2, spacing=3)
     received = {frames[10].not_before[0], frames[30].not_before[0], frames[30].not_before[0] + 1}
     packets, _ = packets_of(run(link, skin, frames, lambda cycle: True, received))
-    kinds = [packet[1] & 7 for _, packet in packets]  # behind the first block's length
+    kinds = [packet[-5] >> 3 & 3 for _, packet in packets]  # in front of check bytes and delimiter
     hellos = [begun for begun, packet in packets if packet == hello_of(skin)]
-    assert kinds.count(1) == len(hellos)
+    assert kinds.count(0) == len(hellos)
     assert len(hellos) in (5, 6), "two bytes in a row may share one hello"
     assert hellos[0] == 2
     assert len(hello_of(skin)) <= 32

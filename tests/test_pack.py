@@ -1,6 +1,5 @@
 """The packer byte for byte against an encoder of its own, and clock by clock against docs/timing.md."""
 
-import binascii
 import dataclasses
 
 import pytest
@@ -42,20 +41,27 @@ class Frame:
     def plain(self, skin, verdict):
         _, area, zones = sizes(skin)
         fields = self.trailer | verdict
-        widths = {"time": 24, "sequence": 8, "overwritten": 8, "overflow": 1, "mismatch": 1, "requested": 1, "stuck": 4}
+        widths = {"time": 24, "sequence": 8, "stuck": 3, "cells": area, "zones": zones}
+        widths["overwritten"] = overwritten_width(area, zones)
+        widths |= {"overflow": 1, "mismatch": 1, "requested": 1}
         word = offset = 0
-        for name, width in (widths | {"cells": area, "zones": zones}).items():
+        for name, width in widths.items():
             word |= fields[name] << offset
             offset += width
-        lead = 1 << 3 | (2 if skin.report == "moments" else 3)
-        return bytes([lead]) + b"".join(self.items) + word.to_bytes(-(-offset // 8), "little")
+        word |= (1 if skin.report == "moments" else 2) << offset | 1 << offset + 2
+        return b"".join(self.items) + word.to_bytes((offset + 5) // 8, "little")
+
+
+def overwritten_width(area, zones):
+    """What is left up to whole bytes, four bits at least."""
+    counted = 24 + 8 + 3 + area + zones
+    return next(width for width in range(4, 12) if (counted + width) % 8 == 0)
 
 
 def stuffed(plain):
-    """CRC and COBS, a byte at a time; also after which bytes of the frame an extra clock goes by."""
-    data = plain + binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "big")
+    """COBS, a byte at a time; also after which bytes of the frame an extra clock goes by."""
     out, block, extra = bytearray(), bytearray(), []
-    for index, byte in enumerate(data):
+    for index, byte in enumerate(plain):
         if len(block) == 254:
             out += b"\xff" + block
             block.clear()
@@ -70,7 +76,7 @@ def stuffed(plain):
 
 def random_trailer(rng, skin):
     _, area, zones = sizes(skin)
-    widths = {"time": 24, "overflow": 1, "mismatch": 1, "stuck": 4, "cells": area, "zones": zones}
+    widths = {"time": 24, "overflow": 1, "mismatch": 1, "stuck": 3, "cells": area, "zones": zones}
     return {name: rng.randrange(1 << width) for name, width in widths.items()}
 
 
@@ -87,7 +93,8 @@ def run(bench, skin, frames, rng, gap=0.0):
     words = [word for f in frames for word in [*(int.from_bytes(item, "little") for item in f.items), end]]
     source = sim.source(dut.items, words, rng, gap=gap)
     owner = [index for index, frame in enumerate(frames) for _ in range(len(frame.items) + 1)]
-    verdicts = [{name: rng.randrange(1 << width) for name, width in VERDICT.items()} for _ in frames]
+    widths = {"sequence": 8, "overwritten": overwritten_width(*sizes(skin)[1:]), "requested": 1}
+    verdicts = [{name: rng.randrange(1 << width) for name, width in widths.items()} for _ in frames]
 
     def packing(fields):
         frame = owner[min(len(source.transfers), len(owner) - 1)]
@@ -97,7 +104,7 @@ def run(bench, skin, frames, rng, gap=0.0):
         sim.drive(dut.summary[name], lambda cycle, name=name: packing(lambda frame, _: frame.trailer[name]))
     for name in ("time", "stuck"):
         sim.drive(dut.summary.tag[name], lambda cycle, name=name: packing(lambda frame, _: frame.trailer[name]))
-    for name in VERDICT:
+    for name in widths:
         sim.drive(dut.verdict[name], lambda cycle, name=name: packing(lambda _, verdict: verdict[name]))
     sim.drive(dut.verdict.send, lambda cycle: packing(lambda frame, _: int(frame.send)))
     memory = Memory(sim, dut)
@@ -105,9 +112,6 @@ def run(bench, skin, frames, rng, gap=0.0):
     sim.run(60 * len(words) * (size + 20), until=lambda: len(memory.follow().frames) == sent and source.done)
     assert memory.decided == [cycle for cycle, word in zip(source.transfers, words) if word == end]
     return memory.frames, source, verdicts
-
-
-VERDICT = {"sequence": 8, "overwritten": 8, "requested": 1}
 
 
 class Memory:
@@ -159,15 +163,14 @@ def test_frames_are_byte_exact_also_between_frames_that_are_not_sent(bench, rng,
     assert [written for _, written in got] == wanted(skin, frames, verdicts)
 
 
-def test_crc_and_stuffing_of_the_oracle_are_the_published_ones():
-    assert binascii.crc_hqx(b"123456789", 0xFFFF) == 0x29B1
-    assert stuffed(b"\x11\x22\x00\x33")[0][:5] == b"\x03\x11\x22\x04\x33"
+def test_stuffing_of_the_oracle_is_the_published_one():
+    assert stuffed(b"\x11\x22\x00\x33")[0] == b"\x03\x11\x22\x02\x33"
 
 
 def until_first_zero(rng, size, length, count):
-    """Items whose frame begins with ``length`` bytes that are not zero, the lead included, and then a zero."""
+    """Items whose frame begins with ``length`` bytes that are not zero, and then a zero."""
     data = bytearray(rng.randrange(1, 256) for _ in range(size * count))
-    data[length - 1] = 0
+    data[length] = 0
     return [bytes(data[start : start + size]) for start in range(0, len(data), size)]
 
 
@@ -182,9 +185,9 @@ def test_blocks_around_254_bytes_and_their_clocks(bench, rng, length):
 
 def test_a_frame_that_ends_with_a_full_block_has_no_empty_one_behind_it(bench, rng):
     skin = skin_of("zones of 3 bytes")
-    # 1 + 3 * 81 + 8 + 2 bytes. The counters and the CRC differ from frame to frame; in most of them they hold no zero.
-    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "stuck": 15, "cells": 127, "zones": 31}
-    frames = [Frame(random_items(rng, 3, 81, 0.0), largest) for _ in range(8)]
+    # 3 * 82 + 8 bytes. The counters differ from frame to frame; in most of them they hold no zero.
+    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "stuck": 7, "cells": 127, "zones": 31}
+    frames = [Frame(random_items(rng, 3, 82, 0.0), largest) for _ in range(8)]
     got, source, verdicts = run(bench, skin, frames, rng)
     assert [written for _, written in got] == wanted(skin, frames, verdicts)
     full = [written for _, written in got if written[0] == 255]
@@ -196,21 +199,21 @@ def test_a_frame_that_ends_with_a_full_block_has_no_empty_one_behind_it(bench, r
 def assert_clocks(skin, frames, verdicts, got, source):
     """The packer's cycles by docs/timing.md, where each item waits already when it can be taken."""
     size = sizes(skin)[0]
-    taken, waits, ready = [], [], 1
+    taken, waits, ready = [], [], 0
     for frame, verdict in zip(frames, verdicts):
         plain = frame.plain(skin, verdict)
         extra = stuffed(plain)[1]
         for index in range(len(frame.items)):
             taken.append(ready)
-            ready += size + sum(1 + index * size <= at < 1 + (index + 1) * size for at in extra)
+            ready += size + sum(index * size <= at < (index + 1) * size for at in extra)
         taken.append(ready)
         if not frame.send:
-            ready += 2
+            ready += 1
             continue
-        trailer = len(plain) - 1 - size * len(frame.items)
+        trailer = len(plain) - size * len(frame.items)
         late = sum(at >= len(plain) - trailer for at in extra)
-        waits.append(ready + trailer + 4 + late)
-        ready += trailer + 5 + late
+        ready += trailer + 2 + late
+        waits.append(ready)
     assert source.transfers == taken
     assert [cycle + 1 for cycle, _ in got] == waits
 

@@ -1,12 +1,12 @@
 """Whole frames from the packer to the wire, newest first, and hellos between them."""
 
-from amaranth.hdl import Array, Module, Mux, Signal
-from amaranth.lib import memory, stream, wiring
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
+from amaranth.lib import crc, memory, stream, wiring
 from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import protocol
-from contactfpga.derived import Derived
+from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.pack import Packer
 from contactfpga_hdl.payloads import item_layout, summary_layout
@@ -24,8 +24,8 @@ class Link(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._region = self.derived.max_frame_bytes - 1  # the delimiter is not stored
-        self._hello = protocol.encode_hello(skin)[:-1]
+        self._region = self.derived.max_stored_bytes
+        self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
         self._depth = 3 * self._region + len(self._hello)
         self.packer = Packer(skin, address_bits=(self._depth - 1).bit_length())
         super().__init__(
@@ -83,8 +83,8 @@ class Link(wiring.Component):
         """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known."""
         verdict = self.packer.verdict
         tag = self.summary.tag
-        sent = Signal(protocol.COUNTER_BITS)
-        overwritten = Signal(protocol.COUNTER_BITS)
+        sent = Signal(SEQUENCE_BITS)
+        overwritten = Signal(self.derived.overwritten_bits)
         waiting_requested = Signal()
         drops = self._waits & ~self._take_frame
         m.d.comb += [
@@ -130,6 +130,9 @@ class Link(wiring.Component):
         address = Signal.like(read.addr)
         end = Signal.like(self.packer.end)
         m.d.comb += read.addr.eq(address)
+        m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
+        tail = Signal(range(CHECK_BYTES + 1))
+        m.d.comb += [check.data.eq(read.data), check.start.eq(self._take_hello | self._take_frame)]
         with m.FSM(name="wire"):
             with m.State("IDLE"):
                 m.d.comb += [self._take_hello.eq(self._hello_due), self._take_frame.eq(self._waits & ~self._hello_due)]
@@ -142,13 +145,22 @@ class Link(wiring.Component):
             with m.State("FETCH"):
                 m.next = "BYTE"
             with m.State("BYTE"):
-                m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(read.data)]
+                m.d.comb += [
+                    self.bytes.valid.eq(1),
+                    self.bytes.payload.eq(read.data),
+                    check.valid.eq(self.bytes.ready),
+                ]
                 with m.If(self.bytes.ready):
-                    m.d.sync += address.eq(address + 1)
+                    m.d.sync += [address.eq(address + 1), tail.eq(0)]
                     m.next = "FETCH"
                     with m.If(address == end):
-                        m.next = "DELIMITER"
-            with m.State("DELIMITER"):
-                m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(protocol.DELIMITER)]
+                        m.next = "TAIL"
+            with m.State("TAIL"):
+                # The CRC in pieces of seven bits, so that none of its bytes is zero.
+                closing = [Cat(check.crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)]
+                closing += [Cat(check.crc[14:], Const(0x20, 6)), Const(protocol.DELIMITER, 8)]
+                m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(Array(closing)[tail])]
                 with m.If(self.bytes.ready):
-                    m.next = "IDLE"
+                    m.d.sync += tail.eq(tail + 1)
+                    with m.If(tail == CHECK_BYTES):
+                        m.next = "IDLE"

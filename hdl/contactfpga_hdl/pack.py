@@ -1,34 +1,36 @@
-"""Items to bytes on the wire: lead, items, trailer and CRC, stuffed with COBS as they are written."""
+"""Items to the bytes of a frame: items and trailer, stuffed with COBS as they are written."""
 
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import crc, data, stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import protocol
-from contactfpga.derived import Derived
+from contactfpga.derived import SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import item_layout, summary_layout
 
 
-def verdict_layout() -> data.StructLayout:
+def verdict_layout(derived: Derived) -> data.StructLayout:
     """What the link decides about a frame whose end mark is packed."""
     return data.StructLayout(
-        {"send": 1, "sequence": protocol.COUNTER_BITS, "overwritten": protocol.COUNTER_BITS, "requested": 1}
+        {"send": 1, "sequence": SEQUENCE_BITS, "overwritten": derived.overwritten_bits, "requested": 1}
     )
 
 
 def _trailer_layout(derived: Derived) -> data.StructLayout:
     return data.StructLayout(
         {
-            "time": protocol.TIME_BITS,
-            "sequence": protocol.COUNTER_BITS,
-            "overwritten": protocol.COUNTER_BITS,
+            "time": TIME_BITS,
+            "sequence": SEQUENCE_BITS,
+            "stuck": STUCK_BITS,
+            "cells": derived.area_bits,
+            "zones": derived.zones_bits,
+            "overwritten": derived.overwritten_bits,
             "overflow": 1,
             "mismatch": 1,
             "requested": 1,
-            "stuck": protocol.STUCK_BITS,
-            "cells": derived.area_bits,
-            "zones": derived.zones_bits,
+            "kind": protocol.KIND_BITS,
+            "version": 8 - protocol.FLAG_BITS - protocol.KIND_BITS,
         }
     )
 
@@ -53,7 +55,7 @@ class Packer(wiring.Component):
                 "items": In(stream.Signature(item_layout(self.derived))),
                 "summary": In(summary_layout(self.derived)),
                 "decide": Out(1),
-                "verdict": In(verdict_layout()),
+                "verdict": In(verdict_layout(self.derived)),
                 "base": In(address_bits),
                 "commit": Out(1),
                 "end": Out(address_bits),
@@ -67,64 +69,38 @@ class Packer(wiring.Component):
         self._byte_valid = Signal()
         self._byte_ready = Signal()
         self._restart = Signal()
-        m.submodules.crc = self._crc = crc.catalog.CRC16_IBM_3740(data_width=8).create()
         self._stuff(m)
         self._sequence_bytes(m)
         return m
 
     def _sequence_bytes(self, m):
-        """Lead, then items as they come, then trailer and CRC."""
+        """Items as they come, then the trailer."""
         trailer_bytes = self.derived.trailer_bytes
         item_bytes = self.derived.item_bytes
         shift = Signal(8 * max(trailer_bytes, item_bytes))
         left = Signal(range(max(trailer_bytes, item_bytes) + 1))
-        kind = protocol.KIND_ZONES if self.skin.report == "moments" else protocol.KIND_CELLS
-        m.d.comb += [
-            self._crc.valid.eq(self._byte_valid & self._byte_ready & ~self._restart),  # a dropped frame's last byte
-            self._crc.data.eq(self._byte),
-            self._crc.start.eq(self._restart),
-        ]
+        m.d.comb += [self._byte_valid.eq(left != 0), self._byte.eq(shift[:8])]
+        with m.If(self._byte_valid & self._byte_ready):
+            m.d.sync += [shift.eq(shift >> 8), left.eq(left - 1)]
         with m.FSM(name="part"):
-            with m.State("LEAD"):
-                m.d.comb += [self._byte_valid.eq(1), self._byte.eq(protocol.lead_byte(kind))]
-                m.next = "ITEMS"
             with m.State("ITEMS"):
-                m.d.comb += [
-                    self._byte_valid.eq(left != 0),
-                    self._byte.eq(shift[:8]),
-                    self.items.ready.eq((left == 0) | (left == 1) & self._byte_ready),
-                ]
-                with m.If(self._byte_valid & self._byte_ready):
-                    m.d.sync += [shift.eq(shift >> 8), left.eq(left - 1)]
+                m.d.comb += self.items.ready.eq((left == 0) | (left == 1) & self._byte_ready)
                 with m.If(self.items.valid & self.items.ready):
                     m.d.sync += [shift.eq(self.items.payload.data), left.eq(item_bytes)]
                     with m.If(self.items.payload.end):
                         m.d.comb += self.decide.eq(1)
-                        m.d.sync += [shift.eq(self._trailer(m)), left.eq(trailer_bytes)]
                         with m.If(self.verdict.send):
+                            m.d.sync += [shift.eq(self._trailer(m)), left.eq(trailer_bytes)]
                             m.next = "TRAILER"
                         with m.Else():
                             m.d.comb += self._restart.eq(1)
                             m.d.sync += left.eq(0)
-                            m.next = "LEAD"
             with m.State("TRAILER"):
-                m.d.comb += [self._byte_valid.eq(1), self._byte.eq(shift[:8])]
-                with m.If(self._byte_ready):
-                    m.d.sync += [shift.eq(shift >> 8), left.eq(left - 1)]
-                    with m.If(left == 1):
-                        m.next = "CRC"
-            with m.State("CRC"):
-                m.d.comb += [self._byte_valid.eq(1), self._byte.eq(self._crc.crc[8:])]
-                with m.If(self._byte_ready):
-                    m.d.sync += shift.eq(self._crc.crc[:8])
-                    m.next = "CRC_LOW"
-            with m.State("CRC_LOW"):
-                m.d.comb += [self._byte_valid.eq(1), self._byte.eq(shift[:8])]
-                with m.If(self._byte_ready):
+                with m.If((left == 1) & self._byte_ready):
                     m.next = "CLOSE"
             with m.State("CLOSE"):
                 m.d.comb += [self.commit.eq(1), self._restart.eq(1)]
-                m.next = "LEAD"
+                m.next = "ITEMS"
 
     def _trailer(self, m):
         trailer = Signal(_trailer_layout(self.derived))
@@ -138,6 +114,8 @@ class Packer(wiring.Component):
             trailer.stuck.eq(self.summary.tag.stuck),
             trailer.cells.eq(self.summary.cells),
             trailer.zones.eq(self.summary.zones),
+            trailer.kind.eq(protocol.KIND_ZONES if self.skin.report == "moments" else protocol.KIND_CELLS),
+            trailer.version.eq(protocol.VERSION),
         ]
         return trailer.as_value()
 

@@ -2,8 +2,7 @@
 
 from amaranth.lib import data
 
-from contactfpga import protocol
-from contactfpga.derived import Derived
+from contactfpga.derived import STUCK_BITS, TIME_BITS, Derived
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
@@ -28,7 +27,7 @@ def item_layout(derived: Derived) -> data.StructLayout:
 
 def tag_layout() -> data.StructLayout:
     """What the scanner knows of a frame besides its cells."""
-    return data.StructLayout({"time": protocol.TIME_BITS, "stuck": protocol.STUCK_BITS, "requested": 1})
+    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "requested": 1})
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:

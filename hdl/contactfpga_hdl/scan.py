@@ -5,8 +5,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
-from contactfpga import protocol
-from contactfpga.derived import STUCK_MAX, Derived
+from contactfpga.derived import STUCK_MAX, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
 
@@ -128,7 +127,7 @@ class Scanner(wiring.Component):
     def _tag_frame(self, m):
         per_us = self.derived.clocks_per_us
         prescaler = Signal(range(max(2, per_us)))
-        time = Signal(protocol.TIME_BITS)
+        time = Signal(TIME_BITS)
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
         with m.Else():

@@ -12,8 +12,14 @@ if TYPE_CHECKING:
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can be late behind a frame and still come every second."""
 
-STUCK_MAX = 15
+STUCK_MAX = 7
 """The stuck-line counter stops here."""
+
+TIME_BITS = 24
+SEQUENCE_BITS = 8
+STUCK_BITS = 3
+MIN_OVERWRITTEN_BITS = 4
+CHECK_BYTES = 3
 
 
 class Derived:
@@ -52,19 +58,18 @@ class Derived:
     def min_row_clocks(self) -> int:
         """A row must last until debounce and labeller are done with the one before it, and a frame until
         its items are packed."""
-        closing = 32 if self.skin.report == "moments" else self.trailer_bytes + 8
-        packing = self.max_items * self.item_bytes + closing
+        packing = self.max_stored_bytes + 4
         return max(self.skin.columns + 6, 10, math.ceil(packing / self.skin.rows))
 
     @property
     def keep_alive_frames(self) -> int:
         """A frame is sent at the latest after this many scans."""
-        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / self.frame_clocks)
+        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / self.frame_clocks + 1e-9)
 
     @property
     def hello_frames(self) -> int:
         """A hello is due after this many scans."""
-        return max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks))
+        return max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
 
     @property
     def press_scans(self) -> int:
@@ -115,8 +120,17 @@ class Derived:
 
     @functools.cached_property
     def trailer_bytes(self) -> int:
-        """Bytes that close a frame, before its CRC."""
-        return math.ceil((24 + 8 + 8 + 3 + 4 + self.area_bits + self.zones_bits) / 8)
+        """Bytes that close a frame, its kind byte among them."""
+        return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
+
+    @functools.cached_property
+    def overwritten_bits(self) -> int:
+        """What the other fields leave of the trailer: four bits or more."""
+        return 8 * (self.trailer_bytes - 1) - self._counted_bits
+
+    @property
+    def _counted_bits(self) -> int:
+        return TIME_BITS + SEQUENCE_BITS + STUCK_BITS + self.area_bits + self.zones_bits
 
     @functools.cached_property
     def item_bytes(self) -> int:
@@ -128,10 +142,15 @@ class Derived:
         return self.zone_capacity if self.skin.report == "moments" else self.skin.rows
 
     @functools.cached_property
+    def max_stored_bytes(self) -> int:
+        """The longest frame as the board keeps it: items and trailer, stuffed."""
+        plain = self.max_items * self.item_bytes + self.trailer_bytes
+        return plain + math.ceil(plain / 254)
+
+    @functools.cached_property
     def max_frame_bytes(self) -> int:
-        """The longest frame on the wire: kind, items, trailer, CRC, stuffed, with its delimiter."""
-        plain = 1 + self.max_items * self.item_bytes + self.trailer_bytes + 2
-        return plain + math.ceil(plain / 254) + 1
+        """The longest frame on the wire: with its check bytes and its delimiter."""
+        return self.max_stored_bytes + CHECK_BYTES + 1
 
     # ---- sizes of tables
 

@@ -9,23 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.derived import Derived
+from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 
 VERSION = 1
 DELIMITER = 0
 
-KIND_HELLO = 1
-KIND_ZONES = 2
-KIND_CELLS = 3
+KIND_HELLO = 0
+KIND_ZONES = 1
+KIND_CELLS = 2
 
 FLAGS = ("overflow", "mismatch", "requested")
 """Names of a frame's flags, lowest bit first."""
 
-TIME_BITS = 24
-COUNTER_BITS = 8
 FLAG_BITS = len(FLAGS)
-STUCK_BITS = 4
+KIND_BITS = 2
 
 _HELLO = struct.Struct("<BBBHfff8s")
 _OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
@@ -34,18 +32,24 @@ _OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("al
 class PacketError(ValueError):
     """Bytes that are not a whole, valid packet.
 
-    ``reason`` is a key of the driver's counters; ``lead`` the first byte of a packet of another version.
+    ``reason`` is a key of the driver's counters; ``kind`` and ``version`` are those of a packet of another version.
     """
 
-    def __init__(self, reason: str, message: str, lead: int = 0):
+    def __init__(self, reason: str, message: str, kind: int = 0, version: int = VERSION):
         super().__init__(message)
         self.reason = reason
-        self.lead = lead
+        self.kind = kind
+        self.version = version
 
 
-def lead_byte(kind: int) -> int:
-    """First byte of every packet: version in the upper five bits, kind in the lower three. Never zero."""
-    return VERSION << 3 | kind
+def kind_byte(kind: int, flags: int = 0) -> int:
+    """Last plain byte of every packet: flags in the lower three bits, kind in two, version in the upper three."""
+    return VERSION << FLAG_BITS + KIND_BITS | kind << FLAG_BITS | flags
+
+
+def kind_of(plain: bytes) -> int:
+    """Kind of an unsealed packet."""
+    return plain[-1] >> FLAG_BITS & (1 << KIND_BITS) - 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,9 +102,9 @@ class Frame:
     """Device time of the first row's sample, modulo 2^24 us."""
     flags: frozenset[str]
     overwritten: int
-    """Complete frames that a newer one replaced before they were sent, modulo 256."""
+    """Complete frames that a newer one replaced before they were sent, modulo 2^``Derived.overwritten_bits``."""
     stuck: int
-    """Columns that read pressed while no row was driven; 15 stands for 15 or more."""
+    """Columns that read pressed while no row was driven; 7 stands for 7 or more."""
     zones: int
     """Zones on the sheet, also those beyond the capacity; 0 with ``report = "cells"``."""
     cells: int
@@ -130,9 +134,7 @@ def cobs_decode(data: bytes) -> bytes:
         code = data[position]
         end = position + code
         if code == 0 or end > len(data):
-            raise PacketError(
-                "framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes"
-            )
+            raise PacketError("framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes")
         out += data[position + 1 : end]
         position = end
         if code < 255 and position < len(data):
@@ -140,32 +142,45 @@ def cobs_decode(data: bytes) -> bytes:
     return bytes(out)
 
 
+_MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+
+
+def check_bytes(stuffed: bytes) -> bytes:
+    """CRC-16/MCRF4XX of the stuffed bytes, lowest bits first, in three bytes that are never zero.
+
+    That CRC takes bits in the order of the line; the standard library has its mirror image.
+    """
+    mirrored = binascii.crc_hqx(stuffed.translate(_MIRRORED), 0xFFFF)
+    crc = _MIRRORED[mirrored >> 8] | _MIRRORED[mirrored & 0xFF] << 8
+    return bytes([0x80 | crc & 0x7F, 0x80 | crc >> 7 & 0x7F, 0x80 | crc >> 14])
+
+
 def seal(plain: bytes) -> bytes:
-    """A packet's bytes on the wire: CRC-16/IBM-3740 appended, stuffed, delimiter last."""
-    crc = binascii.crc_hqx(plain, 0xFFFF).to_bytes(2, "big")
-    return cobs_encode(plain + crc) + bytes([DELIMITER])
+    """A packet's bytes on the wire: stuffed, check bytes, delimiter."""
+    stuffed = cobs_encode(plain)
+    return stuffed + check_bytes(stuffed) + bytes([DELIMITER])
 
 
 def unseal(packet: bytes) -> bytes:
     """Undo :func:`seal` for a packet without its delimiter; raises :class:`PacketError`."""
-    plain = cobs_decode(packet)
-    if len(plain) < 3:
-        raise PacketError("framing", f"packet of {len(plain)} bytes; the shortest has 3")
-    if binascii.crc_hqx(plain, 0xFFFF) != 0:
-        raise PacketError("crc", f"CRC of a packet of {len(plain)} bytes does not match")
-    if plain[0] >> 3 != VERSION:
-        message = f"packet of protocol version {plain[0] >> 3}; this host speaks {VERSION}"
-        raise PacketError("version", message, plain[0])
-    return plain[:-2]
+    stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
+    if len(stuffed) < 2:
+        raise PacketError("framing", f"packet of {len(packet)} bytes; the shortest has {CHECK_BYTES + 2}")
+    if check != check_bytes(stuffed):
+        raise PacketError("crc", f"CRC of a packet of {len(packet)} bytes does not match")
+    plain = cobs_decode(stuffed)
+    version = plain[-1] >> FLAG_BITS + KIND_BITS if plain else 0
+    if version != VERSION:
+        message = f"packet of protocol version {version}; this host speaks {VERSION}"
+        raise PacketError("version", message, kind_of(plain) if plain else 0, version)
+    return plain
 
 
 def encode_hello(skin: Skin) -> bytes:
     """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
     facts = Hello.of(skin)
-    options = sum(
-        choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items())
-    )
-    plain = struct.pack("B", lead_byte(KIND_HELLO)) + _HELLO.pack(
+    options = sum(choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
+    plain = _HELLO.pack(
         facts.rows,
         facts.columns,
         options,
@@ -175,21 +190,17 @@ def encode_hello(skin: Skin) -> bytes:
         facts.radius_mm or 0.0,
         facts.fingerprint,
     )
-    return seal(plain)
+    return seal(plain + bytes([kind_byte(KIND_HELLO)]))
 
 
 def decode_hello(plain: bytes) -> Hello:
     """Read an unsealed hello."""
-    if plain[0] & 7 != KIND_HELLO or len(plain) != 1 + _HELLO.size:
+    if kind_of(plain) != KIND_HELLO or len(plain) != _HELLO.size + 1:
         raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
-    rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[1:])
+    rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[:-1])
     if options >> len(_OPTIONS):
-        raise PacketError(
-            "content", f"hello with options {options:#x}; this version knows {len(_OPTIONS)} of them"
-        )
-    chosen: dict[str, Any] = {
-        name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())
-    }
+        raise PacketError("content", f"hello with options {options:#x}; this version knows {len(_OPTIONS)} of them")
+    chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
     return Hello(
         rows=rows,
         columns=columns,
@@ -210,36 +221,23 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
     """
     skin = derived.skin
     kind = KIND_ZONES if skin.report == "moments" else KIND_CELLS
-    if plain[0] & 7 != kind:
-        raise PacketError(
-            "kind", f"packet of kind {plain[0] & 7}; report = {skin.report!r} sends kind {kind}"
-        )
-    body = len(plain) - 1 - derived.trailer_bytes
+    if kind_of(plain) != kind:
+        raise PacketError("kind", f"packet of kind {kind_of(plain)}; report = {skin.report!r} sends kind {kind}")
+    body = len(plain) - derived.trailer_bytes
     items, rest = divmod(body, derived.item_bytes)
     if body < 0 or rest:
         raise PacketError("length", f"frame of {len(plain)} bytes holds no whole number of items")
-    trailer = int.from_bytes(plain[1 + body :], "little")
-    time_us, sequence, overwritten, flag_bits, stuck, cells, zones, beyond = _split(
-        trailer,
-        *(
-            TIME_BITS,
-            COUNTER_BITS,
-            COUNTER_BITS,
-            FLAG_BITS,
-            STUCK_BITS,
-            derived.area_bits,
-            derived.zones_bits,
-        ),
+    time_us, sequence, stuck, cells, zones, overwritten = _split(
+        int.from_bytes(plain[body:-1], "little"),
+        *(TIME_BITS, SEQUENCE_BITS, STUCK_BITS, derived.area_bits, derived.zones_bits),
     )
-    flags = _FLAG_SETS[flag_bits]
+    flags = _FLAG_SETS[plain[-1] & (1 << FLAG_BITS) - 1]
     expected = skin.rows if skin.report == "cells" else zones
     carried = min(expected, derived.max_items)
     if items != carried or ("overflow" in flags) != (carried < expected):
-        raise PacketError(
-            "length", f"frame carries {items} items, states {expected} and the flags {sorted(flags)}"
-        )
-    if beyond or zones > (skin.max_zones() if skin.report == "moments" else 0):
-        raise PacketError("content", f"frame states {zones} zones and fills its trailer up with {beyond}")
+        raise PacketError("length", f"frame carries {items} items, states {expected} and the flags {sorted(flags)}")
+    if zones > (skin.max_zones() if skin.report == "moments" else 0):
+        raise PacketError("content", f"frame states {zones} zones; the sheet holds at most {skin.max_zones()}")
     frame = Frame(
         sequence=sequence,
         time_us=time_us,
@@ -248,8 +246,8 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
         stuck=stuck,
         zones=zones,
         cells=cells,
-        moments=_moments(plain[1 : 1 + body], items, derived) if skin.report == "moments" else _NO_MOMENTS,
-        bitmap=_bitmap(plain[1 : 1 + body], derived) if skin.report == "cells" else None,
+        moments=_moments(plain[:body], items, derived) if skin.report == "moments" else _NO_MOMENTS,
+        bitmap=_bitmap(plain[:body], derived) if skin.report == "cells" else None,
     )
     if "mismatch" not in flags:
         _check_sums(frame, derived)
@@ -258,9 +256,7 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
 
 _NO_MOMENTS = np.zeros((0, 3), np.int64)
 _NO_MOMENTS.flags.writeable = False
-_FLAG_SETS = [
-    frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << FLAG_BITS)
-]
+_FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << FLAG_BITS)]
 
 
 def _check_sums(frame: Frame, derived: Derived) -> None:
@@ -274,16 +270,11 @@ def _check_sums(frame: Frame, derived: Derived) -> None:
         carried = sum(area)
         possible = (
             all(area)
-            and all(
-                x <= a * (skin.columns - 1) and y <= a * (skin.rows - 1)
-                for a, x, y in zip(area, sum_x, sum_y)
-            )
+            and all(x <= a * (skin.columns - 1) and y <= a * (skin.rows - 1) for a, x, y in zip(area, sum_x, sum_y))
             and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
         )
     if not possible or frame.cells > derived.cells:
-        raise PacketError(
-            "content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be"
-        )
+        raise PacketError("content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be")
 
 
 def _moments(data: bytes, zones: int, derived: Derived) -> np.ndarray:

@@ -6,14 +6,14 @@ import dataclasses
 from collections import Counter
 
 from contactfpga import protocol
-from contactfpga.derived import Derived
+from contactfpga.derived import SEQUENCE_BITS, TIME_BITS, Derived
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.protocol import Frame, Hello, PacketError
 from contactfpga.skin import MAX_LINES, Skin, SkinError
 from contactfpga.zone import Zones
 
-WRAP_US = 1 << protocol.TIME_BITS
-_COUNTER = 1 << protocol.COUNTER_BITS
+WRAP_US = 1 << TIME_BITS
+_SEQUENCES = 1 << SEQUENCE_BITS
 Item = Zones | Hello | SkinMismatch | VersionMismatch
 _RESTART_US = 1_000_000
 """A board whose first frame this is started less than this long ago."""
@@ -111,7 +111,7 @@ class Receiver:
                 item = self._decode(packet, now)
             except PacketError as error:
                 if error.reason == "version":
-                    return self._foreign(error.lead)
+                    return self._foreign(error)
                 self._refuse(error.reason)
                 return None
         self._begun = True
@@ -128,7 +128,7 @@ class Receiver:
 
     def _decode(self, packet: bytes, now: float) -> Item | None:
         plain = protocol.unseal(packet)
-        if plain[0] & 7 == protocol.KIND_HELLO:
+        if protocol.kind_of(plain) == protocol.KIND_HELLO:
             return self._take_hello(protocol.decode_hello(plain), packet)
         if self._derived is None or self.skin is None:
             if self.hello is None:
@@ -142,12 +142,12 @@ class Receiver:
         self._last, self._now, self._counting = frame, now, True
         return Zones(frame, self.skin, self._time_us)
 
-    def _foreign(self, lead: int) -> VersionMismatch | None:
+    def _foreign(self, error: PacketError) -> VersionMismatch | None:
         self.stats.foreign_version += 1
-        if lead & 7 != protocol.KIND_HELLO:
+        if error.kind != protocol.KIND_HELLO:
             return None
         return VersionMismatch(
-            f"{self.port} speaks protocol version {lead >> 3}, this host version {protocol.VERSION}; "
+            f"{self.port} speaks protocol version {error.version}, this host version {protocol.VERSION}; "
             "load a bitstream and install a contactfpga of the same release"
         )
 
@@ -183,12 +183,12 @@ class Receiver:
         last = self._last
         if last is None or not self._counting:
             return
-        if frame.sequence == 0 and last.sequence != _COUNTER - 1 and frame.time_us < _RESTART_US:
+        if frame.sequence == 0 and last.sequence != _SEQUENCES - 1 and frame.time_us < _RESTART_US:
             self.stats.restarts += 1
             self._last = None
             return
-        self.stats.lost += (frame.sequence - last.sequence - 1) % _COUNTER
-        self.stats.overwritten += (frame.overwritten - last.overwritten) % _COUNTER
+        self.stats.lost += (frame.sequence - last.sequence - 1) % _SEQUENCES
+        self.stats.overwritten += (frame.overwritten - last.overwritten) % (1 << self._derived.overwritten_bits)
 
     def _unwrap(self, raw: int, now: float) -> int:
         if self._last is None:

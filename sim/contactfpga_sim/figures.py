@@ -81,7 +81,7 @@ def _first_frame_with_cells(board: Board, skin: Skin) -> tuple[int, int]:
     for end in ends:
         packet = received[start:end]["data"].astype(np.uint8).tobytes()
         plain = protocol.unseal(packet)
-        if plain[0] & 7 == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(skin)).cells:
+        if protocol.kind_of(plain) == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(skin)).cells:
             return int(received[start]["cycle"]) - 10 * Derived(skin).bit_clocks, int(received[end]["cycle"])
         start = end + 1
     raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
@@ -94,7 +94,7 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
     with Board(skin) as board:
         board.hold(cells[None], scans * Derived(skin).frame_clocks)
         packets = board.receive().split(b"\0")[:-1]
-        frames = [packet for packet in packets if protocol.unseal(packet)[0] & 7 == protocol.KIND_ZONES]
+        frames = [packet for packet in packets if protocol.kind_of(protocol.unseal(packet)) == protocol.KIND_ZONES]
         return len(frames) / (board.cycle / skin.clock_hz), len(frames[-1]) + 1
 
 

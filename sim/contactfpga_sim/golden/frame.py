@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import dataclasses
 import struct
 
@@ -12,22 +11,17 @@ from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.scan import Scan
 
-HELLO, ZONES, CELLS = 1, 2, 3
+HELLO, ZONES, CELLS = 0, 1, 2
 OVERFLOW, REQUESTED = 1, 4
-
-
-def lead(kind: int) -> int:
-    """First byte of a packet of protocol version 1."""
-    return 1 << 3 | kind
+VERSION = 1
 
 
 class Packet:
-    """A packet while it is packed: the CRC runs along, and COBS blocks fill up."""
+    """A packet while it is packed: COBS blocks fill up."""
 
-    def __init__(self, kind: int):
+    def __init__(self) -> None:
         self._plain = bytearray()
         self._block = 0
-        self.push(bytes([lead(kind)]))
 
     def push(self, plain: bytes) -> int:
         """Pack bytes; returns the cycles that takes."""
@@ -41,13 +35,21 @@ class Packet:
             self._plain.append(byte)
         return cycles
 
-    def push_crc(self) -> int:
-        """Pack the CRC of all bytes so far; returns the cycles that takes."""
-        return self.push(binascii.crc_hqx(bytes(self._plain), 0xFFFF).to_bytes(2, "big"))
-
     def wire(self) -> bytes:
-        """The packet as it goes over the wire, delimiter included."""
-        return stuff(bytes(self._plain)) + b"\0"
+        """The packet as it goes over the wire: stuffed, check bytes, delimiter."""
+        stuffed = stuff(bytes(self._plain))
+        crc = crc16(stuffed)
+        return stuffed + bytes(128 + piece for piece in (crc % 128, crc // 128 % 128, crc // 128**2)) + b"\0"
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/MCRF4XX: x^16 + x^12 + x^5 + 1, register full of ones, lowest bit of each byte first."""
+    crc = 0xFFFF
+    for byte in data:
+        for bit in range(8):
+            feedback = (crc ^ byte >> bit) & 1
+            crc = crc >> 1 ^ feedback * 0x8408
+    return crc
 
 
 def stuff(plain: bytes) -> bytes:
@@ -74,9 +76,8 @@ def hello(facts: Facts) -> bytes:
     options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
     sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
     lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0.0)
-    packet = Packet(HELLO)
-    packet.push(sizes + lengths + facts.fingerprint)
-    packet.push_crc()
+    packet = Packet()
+    packet.push(sizes + lengths + facts.fingerprint + bytes([VERSION << 5 | HELLO << 3]))
     return packet.wire()
 
 
@@ -99,7 +100,7 @@ class Packer:
     def __init__(self, facts: Facts, link: Link):
         self._facts = facts
         self._link = link
-        self._free = 1
+        self._free = 0
         self._index = 0
         self._last_sent = 0
         self._before: np.ndarray | None = None
@@ -108,7 +109,7 @@ class Packer:
 
     def take(self, items: Items) -> None:
         """Pack one frame."""
-        packet = Packet(ZONES if self._facts.moments else CELLS)
+        packet = Packet()
         for put, data in items.records[: self._facts.capacity]:
             taken = max(self._free, put + 2)
             self._free = taken + packet.push(data.to_bytes(self._facts.item_bytes, "little"))
@@ -117,7 +118,7 @@ class Packer:
         if self._is_sent(items):
             self._send(packet, items, taken)
         else:
-            self._free = taken + 2
+            self._free = taken + 1
         self._before = items.cells
         self._index += 1
         if self._index % self._facts.hello_scans == 0:
@@ -135,25 +136,32 @@ class Packer:
             self._overwritten += 1
             requested |= self._carried_request
         self._carried_request = requested
-        closing = packet.push(self._trailer(items, requested)) + packet.push_crc()
+        closing = packet.push(self._trailer(items, requested))
         self._link.offer(taken + closing + 2, packet.wire())
-        self._free = taken + closing + 3
+        self._free = taken + closing + 2
         self._last_sent = self._index
 
     def _trailer(self, items: Items, requested: bool) -> bytes:
         facts = self._facts
         overflow = len(items.records) > facts.capacity
-        fields = (
-            (items.scan.time_us % 2**24, 24),
-            (self._link.sent % 256, 8),
-            (self._overwritten % 256, 8),
-            (overflow * OVERFLOW | requested * REQUESTED, 3),
-            (min(items.scan.stuck, 15), 4),
-            (int(items.cells.sum()), facts.area_bits),
-            (len(items.records) if facts.moments else 0, facts.zones_bits),
+        cells = int(items.cells.sum())
+        zones = len(items.records) if facts.moments else 0
+        counted = 24 + 8 + 3 + facts.area_bits + facts.zones_bits
+        room = -(-(counted + 4) // 8) * 8 - counted
+        word, width = join(
+            (
+                (items.scan.time_us % 2**24, 24),
+                (self._link.sent % 256, 8),
+                (min(items.scan.stuck, 7), 3),
+                (cells, facts.area_bits),
+                (zones, facts.zones_bits),
+                (self._overwritten % 2**room, room),
+                (overflow * OVERFLOW | requested * REQUESTED, 3),
+                (ZONES if facts.moments else CELLS, 2),
+                (VERSION, 3),
+            )
         )
-        word, width = join(fields)
-        return word.to_bytes(-(-width // 8), "little")
+        return word.to_bytes(width // 8, "little")
 
 
 def join(fields: tuple[tuple[int, int], ...]) -> tuple[int, int]:
