@@ -1,8 +1,8 @@
 """Writes docs/verification.md from the results of `make test`, or checks that it still holds.
 
-tests/claims.toml lists what is claimed and the tests that show it. A claim whose tests are missing, skipped or failed is
-an error; only those marked `recordings` may be skipped, where the recordings are absent. A test says how many cases it
-ran with `record_property("cases", n)`; one that says nothing counts as one.
+tests/claims.toml lists what is claimed and the tests that show it. A claim whose tests are missing, skipped or failed
+is an error; only those marked `recordings` may be skipped, where the recordings are absent. A test says how many cases
+it ran with `record_property("cases", n)`; one that says nothing counts as one.
 """
 
 import argparse
@@ -17,8 +17,9 @@ PAGE = ROOT / "docs" / "verification.md"
 
 HEAD = """# Verification
 
-Written by `make verification` from the results of `make test`; CI fails when a line's tests are missing or skipped, or when this page is
-out of date. Only the recordings may be absent. *Cases* counts frames, patterns or inputs where a test runs many of them.
+Written by `make verification` from the results of `make test`; CI fails when a line's tests are missing or skipped, or
+when this page is out of date. Only the recordings may be absent. *Cases* counts frames, patterns or inputs where a test
+runs many of them.
 
 """
 

@@ -34,15 +34,17 @@ class Audit(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         record = self.records.payload
-        ends = self.records.valid & self.records.ready & record.end
-        zone = self.records.valid & ~record.end
+        taken = self.records.valid & self.records.ready
+        ends = taken & record.end
+        zone = taken & ~record.end
         zones = Signal(self.derived.zones_bits)
         overflow = Signal()
-        fits = (zones < self.derived.zone_capacity) & self.items.ready
+        fits = zones < self.derived.zone_capacity
+        passes = record.end | fits
         m.submodules.counts = counts = _Counts(self.skin)
         m.d.comb += [
-            self.records.ready.eq(~record.end | self.items.ready),  # a zone that finds no place is counted, not kept
-            self.items.valid.eq(self.records.valid & (record.end | fits)),
+            self.records.ready.eq(self.items.ready | ~passes),
+            self.items.valid.eq(self.records.valid & passes),
             self.items.payload.data.eq(record.zone.as_value()),
             self.items.payload.end.eq(record.end),
             counts.taken.eq(self.taken),

@@ -78,7 +78,7 @@ def _first_frame_with_cells(board: Board, skin: Skin) -> tuple[int, int]:
     received = board.take("received")
     ends = np.flatnonzero(received["data"] == protocol.DELIMITER)
     start = 0
-    for end in ends:
+    for end in map(int, ends):
         packet = received[start:end]["data"].astype(np.uint8).tobytes()
         plain = protocol.unseal(packet)
         if protocol.kind_of(plain) == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(skin)).cells:
