@@ -137,7 +137,7 @@ class Receiver:
                 self.stats.foreign_skin += 1
             return None
         frame = protocol.decode_frame(plain, self._derived)
-        self._count(frame)
+        self._count(frame, self._derived)
         self._time_us = self._unwrap(frame.time_us, now)
         self._last, self._now, self._counting = frame, now, True
         return Zones(frame, self.skin, self._time_us)
@@ -178,7 +178,7 @@ class Receiver:
             "loaded; frames from here on are of the new Skin"
         )
 
-    def _count(self, frame: Frame) -> None:
+    def _count(self, frame: Frame, derived: Derived) -> None:
         self.stats.frames += 1
         last = self._last
         if last is None or not self._counting:
@@ -188,7 +188,7 @@ class Receiver:
             self._last = None
             return
         self.stats.lost += (frame.sequence - last.sequence - 1) % _SEQUENCES
-        self.stats.overwritten += (frame.overwritten - last.overwritten) % (1 << self._derived.overwritten_bits)
+        self.stats.overwritten += (frame.overwritten - last.overwritten) % (1 << derived.overwritten_bits)
 
     def _unwrap(self, raw: int, now: float) -> int:
         if self._last is None:
