@@ -57,7 +57,7 @@ def flags_in(skin: Skin, trace: Trace) -> set[str]:
     seen = set()
     for packet in data[: data.rindex(0)].split(b"\0"):
         plain = protocol.unseal(packet)
-        if plain[0] & 7 == protocol.KIND_HELLO:
+        if protocol.kind_of(plain) == protocol.KIND_HELLO:
             seen.add("hello")
             continue
         frame = protocol.decode_frame(plain, Derived(skin))
