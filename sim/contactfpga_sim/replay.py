@@ -1,0 +1,269 @@
+"""Recorded frames through the compiled gateware: ``contactfpga replay``."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+from contactfpga.protocol import Frame
+from contactfpga.skin import MAX_LINES, Skin
+from contactfpga_sim.board import Board
+
+if TYPE_CHECKING:
+    import argparse
+
+CHUNK = 256
+"""Frames that are simulated while those before are decoded."""
+
+BIT_CLOCKS = 2
+"""The fastest UART a Skin admits."""
+
+
+class ReplayError(RuntimeError):
+    """A frame of the input did not come out exactly once."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replayed:
+    """What the gateware made of one input frame."""
+
+    frame: Frame
+    first_record: int | None
+    """Clocks from the transfer of the frame's last row to its first record, negative if that came before; None
+    without a zone."""
+    last_record: int | None
+    """The same to its last record."""
+    duration: int
+    """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
+
+
+def read_frames(path: str | Path, threshold: float | None) -> np.ndarray:
+    """(frames, rows, columns) bool from a .npy file of bools, or of numbers that count as pressed above ``threshold``.
+
+    Raises ValueError that names what is wrong.
+    """
+    try:
+        frames = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise ValueError(f"{path} is no .npy file: {error}") from None
+    if not isinstance(frames, np.ndarray) or frames.ndim != 3:
+        shape = getattr(frames, "shape", "none")
+        raise ValueError(f"{path} has shape {shape}; replay takes an array (frames, rows, columns)")
+    if not all(1 <= lines <= MAX_LINES for lines in frames.shape[1:]):
+        raise ValueError(
+            f"{path} has frames of {frames.shape[1]}x{frames.shape[2]}; a sheet has 1 to {MAX_LINES} lines"
+        )
+    if frames.dtype == bool:
+        return frames
+    if frames.dtype.kind not in "iuf":
+        raise ValueError(f"{path} holds {frames.dtype}; replay takes bools or numbers")
+    if threshold is None:
+        raise ValueError(f"{path} holds {frames.dtype}; say with --threshold above which value a cell is pressed")
+    if frames.dtype.kind == "f" and np.isnan(frames).any():
+        raise ValueError(f"{path} holds {int(np.isnan(frames).sum())} NaN; a cell is pressed or it is not")
+    return frames > threshold
+
+
+def zones_bound(frames: np.ndarray, connectivity: int) -> int:
+    """At least as many as the zones of any frame: runs that touch nothing in the row above."""
+    above = np.pad(frames, ((0, 0), (1, 0), (1, 1)))[:, :-1]
+    touched = above[:, :, 1:-1]
+    if connectivity == 8:
+        touched = touched | above[:, :, :-2] | above[:, :, 2:]
+    starts = frames & ~np.pad(frames, ((0, 0), (0, 0), (1, 0)))[:, :, :-1]
+    run = starts.ravel().cumsum() - 1  # number of the run that a pressed cell is in
+    joined = np.zeros(int(starts.sum()), bool)
+    joined[run[(frames & touched).ravel()]] = True
+    frame_of_run = np.nonzero(starts)[0]
+    return int(np.bincount(frame_of_run[~joined]).max(initial=0))
+
+
+def skin_for(rows: int, columns: int, connectivity: int, zones: int, pitch_mm: float = 10.0) -> Skin:
+    """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
+
+    Steps of the capacity are a third at most, so that recordings of one sheet share few builds.
+    """
+    shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
+    most = Skin(**shape, zone_capacity=1).max_zones()
+    steps = (step << shift for shift in range(12) for step in (4, 5, 6, 7))
+    capacity = min(most, next(step for step in (1, 2, 3, *steps) if step >= zones))
+    slow = Skin(**shape, zone_capacity=capacity, baud=6_000_000)
+    derived = Derived(slow)
+    wire = derived.max_frame_bytes * 10 * BIT_CLOCKS + 8
+    row_clocks = max(derived.min_row_clocks, math.ceil(wire / rows))
+    return slow.replace(
+        zone_capacity=capacity,
+        settle_us=(row_clocks - 1) / derived.clocks_per_us,
+        release_us=1 / derived.clocks_per_us,
+        pitch_x_mm=pitch_mm,
+        pitch_y_mm=pitch_mm,
+    )
+
+
+def replay(frames: np.ndarray, skin: Skin) -> Iterator[Replayed]:
+    """Hold each (rows, columns) bool frame for exactly one scan of a board built from ``skin``; results in order.
+
+    Scans in which the board says hello, and some at the start, are left to an untouched sheet. Raises
+    :class:`ReplayError` if a frame does not come out exactly once.
+    """
+    plan = _Plan(skin, len(frames))
+    with Board(skin, capture=("rows", "records")) as board, ThreadPoolExecutor(1) as pool:
+        collector = _Collector(board, plan)
+        parts = [range(start, min(start + CHUNK, plan.scans)) for start in range(0, plan.scans, CHUNK)]
+        running = pool.submit(collector.simulate, frames, parts[0])
+        for following in [*parts[1:], None]:
+            events = running.result()
+            if following is not None:
+                running = pool.submit(collector.simulate, frames, following)
+            yield from collector.collect(events)
+    collector.finish()
+
+
+class _Plan:
+    """Which scan holds which input frame."""
+
+    def __init__(self, skin: Skin, count: int):
+        derived = Derived(skin)
+        hello = 32 * 10 * derived.bit_clocks
+        quiet = math.ceil(hello / derived.frame_clocks) + 2
+        period = derived.hello_frames
+        self.frame_of: list[int | None] = [None] * quiet
+        frame = 0
+        while frame < count:
+            if period > 2 * quiet and (len(self.frame_of) + 1) % period < quiet:
+                self.frame_of.append(None)
+                continue
+            self.frame_of.append(frame)
+            frame += 1
+        self.frame_of += [None] * (quiet + 1)
+        self.scans = len(self.frame_of)
+
+
+@dataclasses.dataclass
+class _Events:
+    rows: np.ndarray
+    records: np.ndarray
+    received: np.ndarray
+
+
+class _Collector:
+    def __init__(self, board: Board, plan: _Plan):
+        self._board = board
+        self._plan = plan
+        self._derived = Derived(board.skin)
+        self._times: dict[int, list[int]] = {}  # scan: first row, last row, records
+        self._scan = 0
+        self._row_scan = 0
+        self._pending: list[int] = []
+        self._packet = bytearray()
+        self._next = 0
+
+    def simulate(self, frames: np.ndarray, scans: range) -> _Events:
+        skin = self._board.skin
+        cells = np.zeros((len(scans), skin.rows, skin.columns), bool)
+        for index, scan in enumerate(scans):
+            frame = self._plan.frame_of[scan]
+            if frame is not None:
+                cells[index] = frames[frame]
+        self._board.hold(cells)
+        return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
+
+    def collect(self, events: _Events) -> Iterator[Replayed]:
+        """The input frames whose last byte is among the events."""
+        self._note_times(events)
+        for cycle, value in zip(events.received["cycle"].tolist(), events.received["data"].tolist()):
+            if value != protocol.DELIMITER:
+                self._packet.append(value)
+                continue
+            plain = protocol.unseal(bytes(self._packet))
+            self._packet.clear()
+            if protocol.kind_of(plain) == protocol.KIND_ZONES:
+                yield from self._place(protocol.decode_frame(plain, self._derived), cycle)
+
+    def _note_times(self, events: _Events) -> None:
+        rows = self._board.skin.rows
+        for cycle, mark in zip(events.rows["cycle"].tolist(), events.rows["mark"].tolist()):
+            times = self._times.setdefault(self._row_scan // rows, [cycle, cycle])
+            times[1] = cycle
+            self._row_scan += 1
+            assert bool(mark) == (self._row_scan % rows == 0)
+        for cycle, end in zip(events.records["cycle"].tolist(), events.records["mark"].tolist()):
+            if end:
+                self._times[self._scan] += self._pending[:1] + self._pending[-1:]
+                self._pending.clear()
+                self._scan += 1
+            else:
+                self._pending.append(cycle)
+
+    def _place(self, frame: Frame, end: int) -> Iterator[Replayed]:
+        """Find the scan by its time; an untouched sheet's frames may be overwritten by each other."""
+        scan = self._next
+        while self._time(scan) != frame.time_us:
+            if scan >= self._plan.scans or self._plan.frame_of[scan] is not None:
+                raise ReplayError(f"scan {scan} did not reach the host; the next frame is of {frame.time_us} us")
+            scan += 1
+        self._next = scan + 1
+        first_row, last_row, *records = self._times.pop(scan)
+        if self._plan.frame_of[scan] is not None:
+            clocks = [cycle - last_row for cycle in records] or [None, None]
+            yield Replayed(frame, clocks[0], clocks[1], end - first_row)
+
+    def _time(self, scan: int) -> int:
+        derived = self._derived
+        strobe = scan * derived.frame_clocks + derived.settle_clocks + 1
+        return strobe // derived.clocks_per_us % (1 << 24)
+
+    def finish(self) -> None:
+        left = sum(frame is not None for frame in self._plan.frame_of[self._next :])
+        if left:
+            raise ReplayError(f"{left} frames of the input did not reach the host")
+
+
+def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
+    """One input frame as ``contactfpga replay --json`` prints it."""
+    zones = []
+    for area, sum_x, sum_y in result.frame.moments.tolist():
+        x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
+        zones.append({"area": area, "sum_x": sum_x, "sum_y": sum_y, "x_mm": x_mm, "y_mm": y_mm})
+    zones.sort(key=lambda zone: (zone["y_mm"], zone["x_mm"], zone["area"]))
+    cycles = {
+        "last_row_to_first_record": result.first_record,
+        "last_row_to_last_record": result.last_record,
+        "frame": result.duration,
+    }
+    return {"frame": index, "zones": zones, "flags": sorted(result.frame.flags), "cycles": cycles}
+
+
+def main(args: argparse.Namespace) -> int:
+    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.json."""
+    frames = read_frames(args.frames, args.threshold)
+    _, rows, columns = frames.shape
+    bound = zones_bound(frames, args.connectivity)
+    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm)
+    started = time.monotonic()
+    counts, late = [0], [0]
+    for index, result in enumerate(replay(frames, skin)):
+        if args.json:
+            sys.stdout.write(json.dumps(to_json(index, result, skin)) + "\n")
+        else:
+            counts.append(result.frame.zones)
+            late.append(result.last_record or 0)
+    if not args.json:
+        seconds = time.monotonic() - started
+        print(f"frames              {len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity")
+        print(f"zones               {sum(counts)}, at most {max(counts)} in a frame")
+        print(f"last record         at most {max(late)} clocks after a frame's last row")
+        print(f"speed               {len(frames) / seconds:,.0f} frames a second")
+        print("Every frame came back exactly once. One JSON object a frame: --json")
+    return 0
