@@ -216,8 +216,8 @@ class _Collector:
         self._next = scan + 1
         first_row, last_row, *records = self._times.pop(scan)
         if self._plan.frame_of[scan] is not None:
-            clocks = [cycle - last_row for cycle in records] or [None, None]
-            yield Replayed(frame, clocks[0], clocks[1], end - first_row)
+            first, last = (cycle - last_row for cycle in records) if records else (None, None)
+            yield Replayed(frame, first, last, end - first_row)
 
     def _time(self, scan: int) -> int:
         derived = self._derived

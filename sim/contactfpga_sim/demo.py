@@ -1,0 +1,182 @@
+"""What ``make sim`` runs: scenes through the gateware, each compared clock by clock with the golden model."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+from contactfpga.protocol import Frame
+from contactfpga.skin import Skin
+from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native, draw, scenes
+from contactfpga_sim.compare import Mismatch, compare
+from contactfpga_sim.golden import Timeline, Trace, predict
+
+SCANS = 4
+"""An untouched scan, then the scene; the first touched frame is complete after the second."""
+
+TOUCH_SCAN = 1
+
+ENGINES: dict[str, Callable[[Skin, Timeline, int], Trace]] = {
+    "compiled": bench_native.run,
+    "Amaranth": bench_amaranth.run,
+    "cocotb, Verilator": bench_cocotb.run,
+}
+
+RUNS = {
+    "fingertip": ("compiled", "Amaranth", "cocotb, Verilator"),
+    **{name: ("compiled",) for name in (*scenes.NAMES,) if name not in ("fingertip", "nothing")},
+}
+"""Which engines a scene goes through."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """One scene through one engine."""
+
+    scene: str
+    engine: str
+    cells: np.ndarray
+    frame: Frame | None
+    """The first touched frame as it came over the wire."""
+    last_record: int | None
+    """Clocks from the frame's last row to its last record."""
+    first_byte_us: float
+    last_byte_us: float
+    size: int
+    events: int
+    """Events at the stage boundaries that agree with the golden model."""
+    difference: str
+
+
+def run(name: str, engine: str, skin: Skin) -> Outcome:
+    """The scene from the second scan on; compared over all cycles."""
+    scan = Derived(skin).frame_clocks
+    scene = scenes.scene(skin, name)
+    untouched = np.zeros((skin.rows, skin.columns), bool)
+    frames = [untouched, *(scene(index * scan / skin.clock_hz) for index in range(SCANS - 1))]
+    timeline = Timeline.frames(skin, frames)
+    cycles = SCANS * scan + Derived(skin).max_frame_bytes * 10 * Derived(skin).bit_clocks
+    trace = ENGINES[engine](skin, timeline, cycles)
+    try:
+        events, difference = compare(predict(skin, timeline, cycles), trace), ""
+    except Mismatch as mismatch:
+        events, difference = 0, str(mismatch)
+    first, last, size, frame = _first_touched(trace, skin)
+    us = skin.clock_hz / 1e6
+    touch = TOUCH_SCAN * scan
+    return Outcome(
+        scene=name,
+        engine=engine,
+        cells=frames[TOUCH_SCAN],
+        frame=frame,
+        last_record=_last_record(trace, skin),
+        first_byte_us=(first - touch) / us,
+        last_byte_us=(last - touch) / us,
+        size=size,
+        events=events,
+        difference=difference,
+    )
+
+
+def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
+    """Cycle of the start bit of its first byte, end of its last one, its bytes on the wire, the frame."""
+    packet: list[tuple[int, int]] = []
+    for cycle, value in trace.bytes:
+        packet.append((cycle, value))
+        if value != protocol.DELIMITER:
+            continue
+        plain = protocol.unseal(bytes(value for _, value in packet[:-1]))
+        if protocol.kind_of(plain) == protocol.KIND_ZONES:
+            frame = protocol.decode_frame(plain, Derived(skin))
+            if frame.cells:
+                return packet[0][0] + 1, cycle + 1 + 10 * Derived(skin).bit_clocks, len(packet), frame
+        packet = []
+    return 0, 0, 0, None
+
+
+def _last_record(trace: Trace, skin: Skin) -> int | None:
+    last_rows = [cycle for cycle, _, last in trace.rows if last]
+    begin, end = last_rows[TOUCH_SCAN - 1], last_rows[TOUCH_SCAN]
+    window = [cycle for cycle, _, mark in trace.records if not mark and begin < cycle <= end + 4 * skin.columns]
+    return window[-1] - end if window else None
+
+
+def table_of(outcomes: list[Outcome]) -> Table:
+    """One line a scene and engine."""
+    table = Table(title="Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud", title_justify="left")
+    for heading in ("scene", "engine"):
+        table.add_column(heading, no_wrap=True)
+    headings = (
+        "zones",
+        "last record\nafter last row",
+        "touch to\nfirst byte",
+        "touch to\nlast byte",
+        "bytes",
+        "events\ncompared",
+    )
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    table.add_column("verdict")
+    for out in outcomes:
+        zones = "-" if out.frame is None else str(out.frame.zones)
+        late = "-" if out.last_record is None else f"{out.last_record} clocks"
+        verdict = "[red]differs" if out.difference else "[green]the same"
+        table.add_row(
+            *(out.scene, out.engine, zones, late, f"{out.first_byte_us:.1f} us", f"{out.last_byte_us:.1f} us"),
+            *(str(out.size), str(out.events), verdict),
+        )
+    return table
+
+
+def main() -> int:
+    """Run every scene; 1 if gateware and golden model differ anywhere."""
+    parser = argparse.ArgumentParser(prog="make sim", description=__doc__)
+    parser.add_argument("--picture", type=Path, default=Path("build/scenes.png"), help="where the scenes are drawn")
+    picture = parser.parse_args().picture
+    skin = Skin()
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=120)
+    runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine, console)]
+    outcomes = []
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("scenes", total=len(runs))
+        for name, engine in runs:
+            progress.update(task, description=f"{name} ({engine})")
+            outcomes.append(run(name, engine, skin))
+            progress.advance(task)
+    scenes_run = [out for out in outcomes if out.engine == "compiled"]
+    console.print(draw.in_terminal(scenes_run))
+    console.print(table_of(outcomes))
+    draw.to_file(scenes_run, skin, picture)
+    wrong = [out for out in outcomes if out.difference or out.frame is None]
+    console.print(f"Scenes and their zones: {picture}")
+    if wrong:
+        for out in wrong:
+            console.print(f"[red]{out.scene}, {out.engine}: {out.difference or 'no touched frame came'}")
+        console.print(f"[red]{len(wrong)} of {len(outcomes)} runs differ from the golden model")
+        return 1
+    console.print(f"All {len(outcomes)} runs agree with the golden model in every clock.")
+    console.print("Next: .venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")
+    return 0
+
+
+def _available(engine: str, console: Console) -> bool:
+    if engine.startswith("cocotb") and not bench_cocotb.available("verilator"):
+        console.print(f"[yellow]{engine}: not available on this machine, left out")
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    sys.exit(main())
