@@ -104,14 +104,15 @@ def reference_table() -> str:
         "| sheet | scan | touch to `contact` pin | touch to last byte | frames a second | bytes, one zone |",
         "|---|---|---|---|---|---|",
     ]
-    for name, skin in SETTINGS.items():
-        latency = touch_latencies(skin)
-        rate, size = frame_rate(skin)
-        scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
-        lines.append(
-            f"| {name} | {scan:g} us | {latency['contact']} us | **{latency['last byte']} us** | {rate:,.0f} | {size} |"
-        )
-    return "\n".join(lines)
+    return "\n".join(lines + [reference_row(name, skin) for name, skin in SETTINGS.items()])
+
+
+def reference_row(name: str, skin: Skin) -> str:
+    """One setting's row of :func:`reference_table`."""
+    latency = touch_latencies(skin)
+    rate, size = frame_rate(skin)
+    scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
+    return f"| {name} | {scan:g} us | {latency['contact']} us | **{latency['last byte']} us** | {rate:,.0f} | {size} |"
 
 
 def labeller_table() -> str:
