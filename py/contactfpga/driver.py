@@ -187,11 +187,10 @@ class Board:
         while True:
             items = self._receive(deadline)
             for index, item in enumerate(items):
-                if isinstance(item, Hello):
+                changed = isinstance(item, SkinMismatch) and self._receiver.skin is not None
+                if isinstance(item, Hello) or changed:  # another Skin since the last call is no trouble for this one
                     greeted = True
-                elif isinstance(item, SkinMismatch) and self._receiver.skin is not None:
-                    greeted = True  # a board that was given another Skin between two calls is no trouble for this one
-                elif greeted and "requested" in _zones(item).flags:
+                elif "requested" in _zones(item).flags and greeted:
                     self._asked = False
                     self._queue += (later for later in items[index + 1 :] if not isinstance(later, Hello))
                     return _zones(item)

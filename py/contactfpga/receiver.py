@@ -28,7 +28,7 @@ class Stats:
     lost: int = 0
     """Frames the board sent that did not arrive whole, from the gaps in their sequence numbers, a gap modulo 256."""
     overwritten: int = 0
-    """Frames the board replaced by newer ones before it sent them, a gap modulo 256."""
+    """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Derived.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
     """Packets refused, by reason: framing, crc, length, kind, content, noise."""
     resynchronised: int = 0

@@ -72,12 +72,12 @@ class Zones(Sequence[Zone]):
 
     @property
     def overwritten(self) -> int:
-        """Frames that the board replaced by newer ones before they were sent, modulo 256."""
+        """Frames that the board replaced by newer ones before they were sent, modulo what the trailer has room for."""
         return self.frame.overwritten
 
     @property
     def stuck(self) -> int:
-        """Columns that read pressed while no row was driven; 15 stands for 15 or more."""
+        """Columns that read pressed while no row was driven; 7 stands for 7 or more."""
         return self.frame.stuck
 
     @property
@@ -134,7 +134,8 @@ class Zones(Sequence[Zone]):
         return iter(self._zones)
 
     def __repr__(self) -> str:
-        what = f"{len(self)} zones" if self.cells is None else "bitmap"
+        count = f"{len(self)} zone" + ("" if len(self) == 1 else "s")
+        what = count if self.cells is None else "bitmap"
         flags = "".join(f", {flag}" for flag in sorted(self.flags))
         when = f"frame {self.sequence} at {self.time_us / 1e6:.6f} s"
         head = f"<Zones: {what}, {self.pressed} cells pressed, {when}{flags}"

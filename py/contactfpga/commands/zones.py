@@ -36,7 +36,8 @@ def render(board: driver.Board, zones: Zones):  # type: ignore[no-untyped-def]
 
     from contactfpga.commands.sheet import draw
 
-    table = Table("cells", "mm²", "x mm", "y mm", title=f"{zones.total_zones} zones")
+    title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
+    table = Table("cells", "mm²", "x mm", "y mm", title=title)
     for zone in zones:
         table.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", f"{zone.x_mm:.2f}", f"{zone.y_mm:.2f}")
     beside = Table.grid(padding=(0, 3))

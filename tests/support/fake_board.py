@@ -1,0 +1,133 @@
+"""A board in Python behind a pseudo-terminal, which misbehaves where a test wants it to."""
+
+import contextlib
+import fcntl
+import os
+import pty
+import select
+import struct
+import termios
+import threading
+import time
+import tty
+
+from wire import Wire
+
+ZONE = (4, 10, 6)
+"""The zone it reports unless told otherwise: area, sum x, sum y."""
+
+
+def wait_until(condition, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not come about"
+        time.sleep(0.002)
+
+
+@contextlib.contextmanager
+def background(function):
+    """Runs a function beside the block; what it raises is raised at the block's end."""
+    failures = []
+
+    def guarded():
+        try:
+            function()
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=guarded)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+    if failures:
+        raise failures[0]
+
+
+class FakeBoard:
+    """Answers each byte with a hello and a frame flagged `requested`; ``path`` is its port."""
+
+    def __init__(self, skin, link=None):
+        self.wire = Wire(skin)
+        self.moments = [ZONE]
+        self.answers = True
+        self.greets = True
+        self.stream = b""  # sent over and over, as fast as the port takes it
+        self.version = 1
+        self.slice = 1 << 16  # bytes written at once
+        self.sequence = 0
+        self.time_us = 0
+        self.asked = 0
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        if link is not None:
+            link.unlink(missing_ok=True)
+            link.symlink_to(self.path)
+            self.path = str(link)
+        self._stop = threading.Event()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def frame(self, flags=(), **options) -> bytes:
+        """The next frame; every one counts."""
+        options = {"sequence": self.sequence, "time": self.time_us} | options
+        self.sequence += 1
+        self.time_us += 96
+        if self.wire.skin.report == "cells":
+            row = [column % 2 for column in range(self.wire.skin.columns)]
+            return self.wire.cells([row] * self.wire.skin.rows, flags=flags, **options)
+        return self.wire.zones(self.moments, flags=flags, version=self.version, **options)
+
+    def hello(self) -> bytes:
+        return self.wire.hello(version=self.version)
+
+    def send(self, data: bytes):
+        with self._lock:
+            for start in range(0, len(data), self.slice):
+                if start:
+                    time.sleep(0.001)
+                self._write(data[start : start + self.slice])
+
+    def waiting(self) -> int:
+        """Bytes in the port that its client has not read."""
+        return struct.unpack("i", fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4)))[0]
+
+    def unplug(self):
+        self._stop.set()
+        self._thread.join()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def close(self):
+        if not self._stop.is_set():
+            self.unplug()
+
+    def _write(self, data: bytes):
+        while data and not self._stop.is_set():
+            _, ready, _ = select.select([], [self._master], [], 0.05)
+            if ready:
+                data = data[os.write(self._master, data) :]
+
+    def _serve(self):
+        while not self._stop.is_set():
+            ready, _, _ = select.select([self._master], [], [], 0 if self.stream else 0.005)
+            if ready:
+                self.asked += len(os.read(self._master, 100))
+                if self.answers:
+                    answer = self.hello() if self.greets else b""
+                    self.send(answer + self.frame(flags=["requested"]))
+            elif self.stream:
+                _, writable, _ = select.select([], [self._master], [], 0.005)
+                if writable:
+                    with self._lock:
+                        self._write(self.stream)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()

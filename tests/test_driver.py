@@ -1,0 +1,191 @@
+"""The driver on pseudo-terminals: what it reads, and every way a port can go wrong."""
+
+import random
+import subprocess
+import sys
+import time
+
+import pytest
+from fake_board import ZONE, FakeBoard, background, wait_until
+
+import contactfpga
+from contactfpga import driver
+
+SKIN = contactfpga.Skin()
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
+
+
+@pytest.fixture
+def board():
+    with FakeBoard(SKIN) as board:
+        yield board
+
+
+@pytest.fixture(autouse=True)
+def _closed_ports():
+    yield
+    for port in list(driver._boards):
+        driver._forget(port)
+
+
+# ---- read_zones
+
+
+def test_read_zones_gives_the_zone_in_cells_and_mm(board):
+    zones = contactfpga.read_zones(board.path, timeout=LONG)
+    assert [(z.area_cells, z.sum_x, z.sum_y) for z in zones] == [ZONE]
+    assert (zones[0].area_mm2, zones[0].x_mm, zones[0].y_mm) == (400.0, 25.0, 15.0)
+    assert zones.flags == {"requested"}
+    assert zones.pressed == 4
+    assert zones.total_zones == 1
+
+
+def test_port_stays_open_between_reads(board):
+    first = contactfpga.read_zones(board.path, timeout=LONG)
+    kept = driver._boards[board.path]
+    second = contactfpga.read_zones(board.path, timeout=LONG)
+    assert driver._boards[board.path] is kept
+    assert second.sequence == first.sequence + 1
+    assert board.asked == 2
+
+
+def test_frames_older_than_the_call_are_discarded(board):
+    contactfpga.read_zones(board.path, timeout=LONG)
+    board.moments = [(1, 0, 0)]
+    old = board.frame() * 3 + board.frame(flags=["requested"])
+    board.send(old)
+    wait_until(lambda: board.waiting() == len(old))
+    board.moments = [(2, 1, 0)]
+    zones = contactfpga.read_zones(board.path, timeout=LONG)
+    assert zones[0].area_cells == 2
+    assert driver._boards[board.path].stats.discarded_bytes == len(old)
+
+
+def test_flagged_frame_before_the_hello_is_an_older_request(board):
+    contactfpga.read_zones(board.path, timeout=LONG)
+    board.answers = False
+    old, hello, new = board.frame(["requested"]), board.hello(), board.frame(["requested"])
+    opened = driver._boards[board.path]
+    asked = board.asked
+
+    def answer():
+        wait_until(lambda: board.asked > asked)
+        board.send(old + board.frame() + hello + board.frame() + new)
+
+    with background(answer):
+        assert opened.read(LONG).sequence == 2
+
+
+def test_answer_to_a_question_that_timed_out_is_not_taken_for_the_next(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        board.answers = False
+        with pytest.raises(contactfpga.ReadTimeout):
+            opened.read(0.1)
+        asked = 2
+        wait_until(lambda: board.asked == asked)
+        board.answers = True
+        opened.read(LONG)
+        assert board.asked == asked + 2
+
+
+@pytest.mark.parametrize("timeout", [0, -1, float("nan"), float("inf"), "1", None])
+def test_timeout_must_be_positive_and_finite(timeout):
+    with pytest.raises(ValueError, match="must be a positive number of seconds"):
+        contactfpga.read_zones("/dev/null", timeout=timeout)
+
+
+# ---- what can go wrong with the port
+
+
+def test_silence(board):
+    board.answers = False
+    start = time.monotonic()
+    with pytest.raises(contactfpga.BoardSilent, match="not one byte came") as caught:
+        contactfpga.read_zones(board.path, timeout=0.3)
+    assert 0.3 <= time.monotonic() - start < LONG
+    assert isinstance(caught.value, TimeoutError)
+    assert board.path in str(caught.value)
+    assert "within 0.3 s" in str(caught.value)
+    assert "doctor" in str(caught.value)
+
+
+def test_noise(board):
+    board.answers = False
+    board.stream = bytes(random.Random(1).randbytes(997))
+    with pytest.raises(contactfpga.OnlyNoise, match=r"bytes came, but no valid packet .*baud rate"):
+        contactfpga.read_zones(board.path, timeout=1.0)
+
+
+def test_hello_without_frames(board):
+    board.answers = False
+    board.stream = board.hello()
+    with pytest.raises(contactfpga.ReadTimeout, match="hellos and 0 frames") as caught:
+        contactfpga.read_zones(board.path, timeout=1.0)
+    assert not isinstance(caught.value, contactfpga.BoardSilent | contactfpga.OnlyNoise)
+
+
+def test_frames_without_a_hello_are_not_read(board):
+    board.greets = False
+    with pytest.raises(contactfpga.ReadTimeout):
+        contactfpga.read_zones(board.path, timeout=1.0)
+
+
+def test_unplugged_while_waiting(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        board.answers = False
+        with background(lambda: (time.sleep(0.2), board.unplug())), pytest.raises(contactfpga.PortLost) as caught:
+            opened.read(LONG)
+    assert board.path in str(caught.value)
+    assert "plug the board in" in str(caught.value)
+
+
+def test_unplugged_while_iterating(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        frames = iter(opened)
+        next(frames)
+        board.unplug()
+        with pytest.raises(contactfpga.PortLost):
+            next(frames)
+
+
+def test_port_that_came_back_is_opened_again(tmp_path):
+    link = tmp_path / "port"
+    with FakeBoard(SKIN, link):
+        contactfpga.read_zones(str(link), timeout=LONG)
+    with FakeBoard(SKIN, link) as second:
+        second.moments = [(9, 0, 0)]
+        assert contactfpga.read_zones(str(link), timeout=LONG)[0].area_cells == 9
+
+
+def test_port_that_stays_away(tmp_path):
+    link = tmp_path / "port"
+    with FakeBoard(SKIN, link):
+        contactfpga.read_zones(str(link), timeout=LONG)
+    link.unlink()
+    for _ in range(2):
+        with pytest.raises(contactfpga.PortNotFound, match="is the board plugged in"):
+            contactfpga.read_zones(str(link), timeout=0.3)
+
+
+def test_missing_port_names_the_next_step():
+    with pytest.raises(contactfpga.PortNotFound, match=r"/dev/no_such_port .*is the board plugged in\?"):
+        contactfpga.open("/dev/no_such_port")
+
+
+def test_second_client_is_refused_and_the_first_goes_on(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+            contactfpga.open(board.path)
+        code = f"import contactfpga; contactfpga.read_zones({board.path!r})"
+        other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+        assert "another program reads this port" in other.stderr
+        assert opened.read(LONG)[0].area_cells == 4
+    with contactfpga.open(board.path, timeout=LONG) as again:
+        assert again.read(LONG)[0].area_cells == 4
+
+
+def test_bytes_that_come_one_by_one(board):
+    board.slice = 1
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        assert opened.next(LONG)[0].area_cells == 4
+        assert not opened.stats.damaged

@@ -1,0 +1,126 @@
+"""The driver and the gateware itself: simulated behind sim://, and in real time behind a pseudo-terminal."""
+
+import collections
+import itertools
+
+import pytest
+from fake_board import background, wait_until
+
+import contactfpga
+from contactfpga import driver
+
+SKIN = contactfpga.Skin()
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
+
+
+@pytest.fixture(autouse=True)
+def _closed_ports():
+    yield
+    for port in list(driver._boards):
+        driver._forget(port)
+
+
+@pytest.fixture
+def pty_board():
+    from contactfpga_sim.pty_board import PtyBoard
+
+    with PtyBoard(SKIN, "palm") as board:
+        yield board
+    assert board.failure is None
+
+
+# ---- sim://
+
+
+def test_simulated_board_answers_read_zones():
+    zones = contactfpga.read_zones("sim://?scene=palm")
+    assert zones.flags == {"requested"}
+    assert len(zones) == 2
+    assert sum(zone.area_cells for zone in zones) == zones.pressed
+
+
+def test_a_second_read_is_of_a_later_frame():
+    first, second = (contactfpga.read_zones("sim://?scene=palm") for _ in range(2))
+    assert second.time_us > first.time_us
+    assert second.flags == {"requested"}
+
+
+def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
+    file = tmp_path / "skin.toml"
+    file.write_text(SKIN.replace(send="on_change").to_toml())
+    with contactfpga.open(f"sim://?skin={file}") as opened:
+        opened.next()
+        before = opened._transport.clock()
+        with pytest.raises(contactfpga.BoardSilent, match=r"within 0\.01 s"):
+            opened.next(0.01)
+        assert opened._transport.clock() - before == pytest.approx(0.01)
+        assert opened.next(0.1).time_us == pytest.approx(100_000, abs=2 * 96)  # the keep-alive
+
+
+def test_simulated_board_loses_nothing():
+    with contactfpga.open("sim://?scene=moving") as opened:
+        frames = list(itertools.islice(opened, 12_000))
+        stats = opened.stats
+    steps = {after.time_us - before.time_us for before, after in itertools.pairwise(frames)}
+    assert stats.lost == 0
+    assert not stats.damaged
+    assert stats.hellos >= 3  # the one asked for and two of their own in over a second
+    assert steps == {96, 192}  # a hello takes the place of a frame now and then
+    assert len({zones[0].x_mm for zones in frames}) > 20
+
+
+def test_simulated_board_of_a_file(tmp_path):
+    skin = contactfpga.Skin(rows=5, columns=7, pitch_x_mm=3.0, report="cells", settle_us=20.0)
+    file = tmp_path / "skin.toml"
+    file.write_text(skin.to_toml())
+    with contactfpga.open(f"sim://?skin={file}&scene=full", skin=skin) as opened:
+        zones = opened.read()
+    assert zones.cells.shape == (5, 7)
+    assert zones.cells.all()
+
+
+def test_simulated_board_with_an_unknown_option():
+    with pytest.raises(contactfpga.PortNotFound, match=r"scene=NAME"):
+        contactfpga.open("sim://?colour=red")
+    with pytest.raises(contactfpga.PortNotFound, match="scene 'elbow' is not known"):
+        contactfpga.open("sim://?scene=elbow")
+
+
+# ---- a pseudo-terminal
+
+
+def test_the_board_on_a_pseudo_terminal_answers_read_zones(pty_board):
+    for _ in range(3):
+        zones = contactfpga.read_zones(pty_board.port, timeout=LONG)
+        assert len(zones) == 2
+        assert zones.flags == {"requested"}
+
+
+def test_a_second_client_of_the_pseudo_terminal_is_refused_and_the_first_goes_on(pty_board):
+    with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+            contactfpga.open(pty_board.port, timeout=LONG)
+        assert len(opened.read(LONG)) == 2
+    with contactfpga.open(pty_board.port, timeout=LONG) as again:
+        assert len(again.read(LONG)) == 2
+
+
+def test_a_board_that_is_stopped_while_it_is_read_is_lost(pty_board):
+    with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+        frames = opened.stats.frames
+
+        def stop():
+            wait_until(lambda: opened.stats.frames > frames + 20)
+            pty_board.stop()
+
+        with background(stop), pytest.raises(contactfpga.PortLost) as caught:
+            collections.deque(opened, maxlen=0)
+    assert pty_board.port in str(caught.value)
+    with pytest.raises(contactfpga.PortNotFound):
+        contactfpga.read_zones(pty_board.port, timeout=LONG)
+
+
+def test_a_client_that_left_does_not_end_the_board(pty_board):
+    for _ in range(3):
+        with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+            assert opened.next(LONG).pressed == opened.next(LONG).pressed

@@ -1,0 +1,82 @@
+"""Bytes in, zones out: chunks, counters and the device time."""
+
+import random
+
+import pytest
+from wire import Wire, last_byte, seal
+
+import contactfpga
+from contactfpga.receiver import Receiver
+
+SKIN = contactfpga.Skin()
+
+
+def test_chunks_do_not_matter():
+    wire, rng = Wire(SKIN), random.Random(3)
+    stream = wire.hello() + b"".join(
+        wire.zones([(5, 5 * (i % 16), i % 76)], sequence=i, time=i * 96) for i in range(300)
+    )
+    for _ in range(20):
+        receiver, items, rest = Receiver("x"), [], stream
+        while rest:
+            cut = rng.randrange(1, 60)
+            items += receiver.feed(rest[:cut], 0.0)
+            rest = rest[cut:]
+        assert [zones.sequence for zones in items[1:]] == [i % 256 for i in range(300)]
+        assert receiver.stats.lost == 0
+        assert not receiver.stats.damaged
+
+
+def test_noise_without_a_single_zero_keeps_no_more_than_a_packet():
+    receiver = Receiver("x")
+    for _ in range(100):
+        receiver.feed(b"\xaa" * 4096, 0.0)
+        assert len(receiver._rest) < 20_000
+    assert receiver.stats.damaged["noise"] > 10
+
+
+def test_overflow_carries_what_fits_and_says_so():
+    skin = SKIN.replace(zone_capacity=2)
+    receiver, wire = Receiver("x"), Wire(skin)
+    receiver.feed(wire.hello(), 0.0)
+    (zones,) = receiver.feed(wire.zones([(2, 1, 0), (3, 3, 3)], cells=40, zones=17, flags=["overflow"]), 0.0)
+    assert len(zones) == 2
+    assert (zones.total_zones, zones.pressed, zones.flags) == (17, 40, {"overflow"})
+
+
+def test_packets_without_a_meaning_are_counted():
+    receiver, wire = Receiver("x", SKIN), Wire(SKIN)
+    receiver.feed(wire.zones([]) + wire.hello(), 0.0)
+    receiver.feed(seal(bytes(8) + last_byte(3)) + wire.cells([[0] * 16] * 16), 0.0)
+    receiver.feed(wire.zones([], version=3), 0.0)
+    assert receiver.stats.before_hello == 1
+    assert receiver.stats.damaged == {"kind": 2}
+    assert receiver.stats.foreign_version == 1
+
+
+def frames_at(times_us, clock_s=None, live=True):
+    """Unwrapped times of frames sampled at ``times_us`` of device time and read at ``clock_s``."""
+    receiver, wire = Receiver("x", live=live), Wire(SKIN)
+    receiver.feed(wire.hello(), 0.0)
+    clock_s = clock_s or [time_us / 1e6 for time_us in times_us]
+    return [
+        receiver.feed(wire.zones([], time=time_us, sequence=index), now)[0].time_us
+        for index, (time_us, now) in enumerate(zip(times_us, clock_s))
+    ]
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_time_goes_on_past_its_24_bits(live):
+    times = [round(i * 1.1e6) for i in range(60)]
+    assert frames_at(times, live=live) == times
+
+
+def test_gap_longer_than_the_wrap_is_bridged_by_the_clock():
+    times = [5_000_000, 5_000_096, 905_000_000, 905_000_096, 4_000_000_000]
+    assert frames_at(times) == times
+
+
+def test_time_stands_frames_that_waited_some_seconds():
+    times = [round(i * 0.5e6) for i in range(200)]
+    late = [(i // 7 * 7 + 7) * 0.5 for i in range(200)]
+    assert frames_at(times, late) == times
