@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test campaign lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification figures campaign lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -38,8 +38,16 @@ sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model 
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
 test: $(VENV)/.stamp-test | compiler ## run the tests
-	$(PY) -m pytest -n $(JOBS) --dist loadfile $(ARGS)
-# The check of the verification page goes here, after the tests whose results it reads.
+	$(PY) -m pytest -n $(JOBS) --dist loadfile --junitxml build/tests.xml $(ARGS)
+ifeq ($(strip $(ARGS)),)
+	$(PY) scripts/verification.py --check
+endif
+
+verification: $(VENV)/.stamp-test ## write docs/verification.md from the results of the last make test
+	$(PY) scripts/verification.py
+
+figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
+	$(PY) -m contactfpga_sim.figures README.md docs/use.md
 
 campaign: $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)

@@ -43,6 +43,8 @@ def read_results(path: Path) -> dict[str, Outcome]:
     """Outcome of every test function, by `file::name`, all its parameters together."""
     results: dict[str, Outcome] = {}
     for case in ElementTree.parse(path).iter("testcase"):
+        if "icarus" in case.get("name", ""):
+            continue  # a second simulator where it is installed; the page must not depend on that
         file = case.get("classname", "").split(".")[1]
         outcome = results.setdefault(f"{file}::{case.get('name', '').split('[')[0]}", Outcome())
         kinds = {child.tag for child in case}
@@ -57,13 +59,21 @@ def read_results(path: Path) -> dict[str, Outcome]:
     return results
 
 
+def matching(test: str, results: dict[str, Outcome]) -> list[Outcome]:
+    """Outcomes of a test, or with ``file::*`` of all tests in a file."""
+    if test.endswith("::*"):
+        found = [outcome for name, outcome in results.items() if name.startswith(test[:-1])]
+        return found or [Outcome()]
+    return [results.get(test, Outcome())]
+
+
 def judge(claims: dict, results: dict[str, Outcome]) -> tuple[str, list[str], set[str]]:
     """The page, what is wrong, and the lines that may differ because the recordings are absent."""
     page, wrong, loose = HEAD, [], set()
     for section in claims["section"]:
         page += f"## {section['title']}\n\n| claim | tests | cases | result |\n|---|---|---|---|\n"
         for claim in section["claim"]:
-            outcomes = [results.get(test, Outcome()) for test in claim["tests"]]
+            outcomes = [outcome for test in claim["tests"] for outcome in matching(test, results)]
             words = sorted({outcome.word() for outcome in outcomes})
             cases = sum(outcome.cases for outcome in outcomes)
             tests = "<br>".join(f"`{test}`" for test in claim["tests"])
