@@ -79,6 +79,7 @@ class Packer(wiring.Component):
         item_bytes = self.derived.item_bytes
         shift = Signal(8 * max(trailer_bytes, item_bytes))
         left = Signal(range(max(trailer_bytes, item_bytes) + 1))
+        trailer = self._trailer(m)
         m.d.comb += [self._byte_valid.eq(left != 0), self._byte.eq(shift[:8])]
         with m.If(self._byte_valid & self._byte_ready):
             m.d.sync += [shift.eq(shift >> 8), left.eq(left - 1)]
@@ -90,7 +91,7 @@ class Packer(wiring.Component):
                     with m.If(self.items.payload.end):
                         m.d.comb += self.decide.eq(1)
                         with m.If(self.verdict.send):
-                            m.d.sync += [shift.eq(self._trailer(m)), left.eq(trailer_bytes)]
+                            m.d.sync += [shift.eq(trailer), left.eq(trailer_bytes)]
                             m.next = "TRAILER"
                         with m.Else():
                             m.d.comb += self._restart.eq(1)

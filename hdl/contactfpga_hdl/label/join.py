@@ -58,10 +58,11 @@ class Join(wiring.Component):
             stack.entry.eq(group),
         ]
         self._mark(m, current, pop, stack.top, joined)
+        join = self._decide(m, group, pop, passed)
         with m.If(self._works):
             m.d.sync += kept.eq(group)
         with m.If(self.enable):
-            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(self._decide(m, group, pop, passed))]
+            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(join)]
         return m
 
     def _brackets(self, m):
