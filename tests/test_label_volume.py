@@ -34,9 +34,7 @@ def benches() -> Iterator[dict]:
     def bench(rows: int, columns: int, connectivity: int) -> LabelBench:
         size = (rows, columns, connectivity)
         if size not in built:
-            built[size] = LabelBench(
-                Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=20.0)
-            )
+            built[size] = LabelBench(Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=20.0))
         return built[size]
 
     yield bench

