@@ -1,0 +1,314 @@
+"""The Skin: what it refuses and with which words, its file, its fingerprint, and what it fills in."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contactfpga import ContactFPGAError, Skin, SkinError
+from contactfpga.derived import Derived
+
+LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
+
+REFUSED = [
+    # the sheet
+    ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
+    ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
+    ({"columns": 0}, "columns is 0; it must lie between 1 and 64"),
+    ({"columns": 65}, "columns is 65; it must lie between 1 and 64"),
+    ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
+    ({"rows": True}, "rows is True; it must be a whole number"),
+    ({"rows": "16"}, "rows is '16'; it must be a whole number"),
+    ({"pitch_x_mm": 0}, "pitch_x_mm is 0.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_y_mm": -1}, "pitch_y_mm is -1.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_y_mm": 1001}, "pitch_y_mm is 1001.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_x_mm": float("nan")}, "pitch_x_mm is nan; it must be a finite number"),
+    ({"pitch_x_mm": float("inf")}, "pitch_x_mm is inf; it must be a finite number"),
+    ({"pitch_x_mm": None}, "pitch_x_mm is None; it must be a finite number"),
+    ({"pitch_x_mm": "10"}, "pitch_x_mm is '10'; it must be a finite number"),
+    ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
+    ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
+    # its surface
+    ({"surface": "sphere"}, "surface is 'sphere'; it must be one of 'plane', 'cylinder'"),
+    ({"radius_mm": 50}, "radius_mm is 50.0; a plane has none, leave it out"),
+    ({"surface": "cylinder"}, "radius_mm is missing; surface = 'cylinder' needs it"),
+    ({"surface": "cylinder", "radius_mm": 0.05}, "radius_mm is 0.05; it must lie between 0.1 and 100000.0 mm"),
+    ({"surface": "cylinder", "radius_mm": -50}, "radius_mm is -50.0; it must lie between 0.1 and 100000.0 mm"),
+    (
+        {"surface": "cylinder", "radius_mm": 25},
+        "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet, which is not "
+        "supported; use at most 15 columns",
+    ),
+    # its mask
+    ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
+    ({"mask": "ab"}, "mask is 'ab'; it must be a list of [row, column]"),
+    ({"mask": [3]}, "mask holds 3; it must hold [row, column] pairs"),
+    ({"mask": [(1, 2, 3)]}, "mask holds (1, 2, 3); it must hold [row, column] pairs"),
+    ({"mask": [(1.0, 2)]}, "mask holds (1.0, 2); it must hold [row, column] pairs"),
+    ({"mask": [(True, 2)]}, "mask holds (True, 2); it must hold [row, column] pairs"),
+    ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
+    ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
+    ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
+    # scan and debounce
+    ({"diodes": "none"}, "diodes is 'none'; it must be one of 'col2row', 'row2col'"),
+    ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster'"),
+    ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
+    ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
+    ({"settle_us": -5}, "settle_us is -5.0; it must lie between 0.0 and 10000.0 us"),
+    ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
+    (
+        {"settle_us": 0.5},
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us)",
+    ),
+    (
+        {"debounce": "fast"},
+        "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk'",
+    ),
+    (
+        {"debounce": "sym_defer_pk", "debounce_press_us": -1},
+        "debounce_press_us is -1.0; it must lie between 0.0 and 393120.0 us",
+    ),
+    (
+        {"debounce": "asym_eager_defer_pk", "debounce_release_us": 393_121},
+        "debounce_release_us is 393121.0; it must lie between 0.0 and 393120.0 us",
+    ),
+    # report and link
+    ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'cells'"),
+    ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),
+    ({"send": "on_change", "keep_alive_ms": 101}, "keep_alive_ms is 101.0; it must lie between 0.0 and 100.0 ms"),
+    ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes 0.096 ms"),
+    ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
+    ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
+    ({"zone_capacity": 1.5}, "zone_capacity is 1.5; it must be a whole number"),
+    ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 401_000_000}, "clock_hz is 401000000; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"baud": 7_000_000}, "baud is 7000000; it must lie between 1200 and 6000000 for this clock"),
+    ({"baud": 300}, "baud is 300; it must lie between 1200 and 6000000 for this clock"),
+    (
+        {"baud": 5_000_000},
+        "baud is 5000000: a clock of 12000000 Hz misses it by +20.00 %, the limit is 1.5 %; nearest good rates: "
+        "4000000, 6000000",
+    ),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED, ids=[str(changes) for changes, _ in REFUSED])
+def test_refused_with_value_and_limit(changes, message):
+    with pytest.raises(SkinError) as caught:
+        Skin(**changes)
+    assert str(caught.value) == message
+    assert isinstance(caught.value, ValueError)
+    assert isinstance(caught.value, ContactFPGAError)
+
+
+def test_a_small_baud_error_is_accepted():
+    assert Derived(Skin(baud=921_600)).bit_clocks == 13
+
+
+@pytest.mark.parametrize(("baud", "good"), [(2_960_000, True), (2_950_000, False)])
+def test_the_limit_of_the_baud_error(baud, good):
+    """12 MHz / 4 is 3 Mbaud: 1.35 % above the one, 1.69 % above the other."""
+    if good:
+        Skin(baud=baud)
+    else:
+        with pytest.raises(SkinError, match=r"\+1.69 %.*nearest good rates: 2400000, 3000000, 4000000"):
+            Skin(baud=baud)
+
+
+@given(st.integers(1, 200), st.integers(1200, 3_000_000))
+@settings(max_examples=300, deadline=None)
+def test_named_rates_are_good_ones(megahertz, baud):
+    clock_hz = megahertz * 1_000_000
+    if baud > clock_hz // 2:
+        return
+    refused = ""
+    try:
+        Skin(clock_hz=clock_hz, baud=baud, **LONG)
+    except SkinError as error:
+        refused = str(error)
+    if refused:
+        rates = refused.partition("nearest good rates: ")[2].split(", ")
+        assert [Skin(clock_hz=clock_hz, baud=int(rate), **LONG) for rate in rates]
+
+
+def test_every_field_has_a_default_and_a_refusal():
+    """A field that nothing can be wrong with would be one that nobody checks."""
+    touched = {name for changes, _ in REFUSED for name in changes}
+    assert touched == {field.name for field in dataclasses.fields(Skin)}
+    Skin()
+
+
+def test_the_reference_skin():
+    skin = Skin()
+    assert (skin.rows, skin.columns, skin.connectivity, skin.report) == (16, 16, 8, "moments")
+    assert (skin.clock_hz, skin.baud, skin.settle_us, skin.release_us) == (12_000_000, 3_000_000, 5.0, 1.0)
+    assert (skin.debounce, skin.send, skin.scan) == ("none", "always", "raster")
+    assert Derived(skin).frame_clocks == 16 * 72
+
+
+def test_a_skin_does_not_change():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Skin().rows = 8
+
+
+# ---- capacity
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "connectivity", "capacity"),
+    [
+        (1, 1, 8, 1),
+        (16, 16, 8, 64),
+        (16, 16, 4, 128),
+        (32, 32, 8, 256),
+        (32, 32, 4, 512),
+        (33, 32, 8, 256),
+        (33, 32, 4, 256),
+        (64, 64, 8, 256),
+        (64, 1, 8, 32),
+        (5, 7, 8, 12),
+        (5, 7, 4, 18),
+    ],
+)
+def test_default_capacity(rows, columns, connectivity, capacity):
+    skin = Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG)
+    assert skin.zone_capacity == capacity
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_max_zones_is_what_the_worst_frame_of_a_small_sheet_holds(connectivity):
+    """Every frame of every sheet up to 3x4, labelled by scipy."""
+    ndimage = pytest.importorskip("scipy.ndimage")
+    structure = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    import numpy as np
+
+    for rows in range(1, 4):
+        for columns in range(1, 5):
+            words = np.arange(1 << rows * columns)[:, None] >> np.arange(rows * columns) & 1
+            most = max(ndimage.label(word.reshape(rows, columns), structure)[1] for word in words)
+            assert Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG).max_zones() == most
+
+
+def test_replace_gives_a_changed_sheet_its_own_capacity():
+    assert Skin(zone_capacity=7).replace(settle_us=6.0).zone_capacity == 7
+    assert Skin(zone_capacity=7).replace(rows=8).zone_capacity == 32
+    assert Skin().replace(rows=8, zone_capacity=3).zone_capacity == 3
+    with pytest.raises(SkinError, match="rows is 65"):
+        Skin().replace(rows=65)
+
+
+# ---- file and fingerprint
+
+
+@st.composite
+def skins(draw):
+    rows, columns = draw(st.integers(1, 64)), draw(st.integers(1, 64))
+    radius_mm = draw(st.none() | st.floats(200.0, 90_000.0))
+    cell = st.tuples(st.integers(0, rows - 1), st.integers(0, columns - 1))
+    mask = draw(st.lists(cell, max_size=min(5, rows * columns - 1)))
+    return Skin(
+        rows=rows,
+        columns=columns,
+        pitch_x_mm=draw(st.floats(0.01, 15.0)),
+        pitch_y_mm=draw(st.floats(0.01, 1000.0)),
+        surface="plane" if radius_mm is None else "cylinder",
+        radius_mm=radius_mm,
+        mask=tuple(mask),
+        connectivity=draw(st.sampled_from([4, 8])),
+        diodes=draw(st.sampled_from(["col2row", "row2col"])),
+        settle_us=draw(st.floats(600.0, 10_000.0)),
+        release_us=draw(st.floats(1.0, 10_000.0)),
+        debounce=draw(st.sampled_from(["none", "sym_defer_pk", "asym_eager_defer_pk"])),
+        debounce_press_us=draw(st.floats(0.0, 5000.0)),
+        report=draw(st.sampled_from(["moments", "cells"])),
+        zone_capacity=draw(st.none() | st.just(1)),
+    )
+
+
+@given(skin=skins())
+@settings(max_examples=200, deadline=None)
+def test_a_file_gives_the_same_skin_back(tmp_path_factory, skin):
+    path = tmp_path_factory.mktemp("skin") / "skin.toml"
+    path.write_text(skin.to_toml())
+    loaded = Skin.load(path)
+    assert loaded == skin
+    assert loaded.fingerprint == skin.fingerprint
+
+
+@given(first=skins(), second=skins())
+@settings(max_examples=100, deadline=None)
+def test_fingerprints_tell_skins_apart(first, second):
+    assert (first == second) == (first.fingerprint == second.fingerprint)
+    assert len(first.fingerprint) == 8
+
+
+OTHER = {
+    "rows": 15,
+    "columns": 15,
+    "pitch_x_mm": 9.0,
+    "pitch_y_mm": 9.0,
+    "mask": ((1, 1),),
+    "connectivity": 4,
+    "diodes": "row2col",
+    "settle_us": 6.0,
+    "release_us": 2.0,
+    "debounce": "sym_defer_pk",
+    "debounce_press_us": 4000.0,
+    "debounce_release_us": 4000.0,
+    "report": "cells",
+    "send": "on_change",
+    "keep_alive_ms": 50.0,
+    "zone_capacity": 63,
+    "clock_hz": 24_000_000,
+    "baud": 1_000_000,
+}
+
+
+def test_every_field_is_in_the_fingerprint():
+    others = [Skin(**{name: value}) for name, value in OTHER.items()]
+    others += [Skin(surface="cylinder", radius_mm=radius_mm) for radius_mm in (100.0, 101.0)]
+    assert set(OTHER) | {"surface", "radius_mm", "scan"} == {field.name for field in dataclasses.fields(Skin)}
+    assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
+
+
+def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written():
+    code = "from contactfpga import Skin; print(Skin(pitch_x_mm=10, mask=[[2, 1], [0, 3], [2, 1]]).fingerprint.hex())"
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert other.stdout.strip() == Skin(pitch_x_mm=10.0, mask=((0, 3), (2, 1))).fingerprint.hex()
+
+
+def test_file_with_an_unknown_key(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 8\ncolumn = 8\n")
+    with pytest.raises(SkinError, match=r"skin.toml: unknown key 'column'; known are rows, columns, pitch_x_mm"):
+        Skin.load(path)
+
+
+def test_file_that_is_no_toml(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows: 8\n")
+    with pytest.raises(SkinError, match=r"skin\.toml: not a TOML file"):
+        Skin.load(path)
+
+
+def test_file_with_a_value_that_cannot_work(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 99\n")
+    with pytest.raises(SkinError, match="rows is 99"):
+        Skin.load(path)
+
+
+def test_empty_file_is_the_reference_skin(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("")
+    assert Skin.load(path) == Skin()
+
+
+def test_fields_are_plain_values():
+    """Whatever reads a Skin's fields, as the golden model does, needs no code of the host."""
+    json.dumps(dataclasses.asdict(Skin(mask=[[1, 2]])))
