@@ -1,11 +1,10 @@
-"""The driver on pseudo-terminals: every frame in order, versions and Skins."""
+"""The driver on pseudo-terminals: every frame in order, the newest one, restarts."""
 
 import threading
 import time
 
 import pytest
 from fake_board import FakeBoard, background, wait_until
-from wire import Wire
 
 import contactfpga
 from contactfpga import driver
@@ -25,51 +24,6 @@ def _closed_ports():
     yield
     for port in list(driver._boards):
         driver._forget(port)
-
-
-# ---- versions and Skins
-
-
-def test_another_protocol_version(board):
-    board.version = 2
-    with pytest.raises(contactfpga.VersionMismatch, match="speaks protocol version 2, this host version 1"):
-        contactfpga.read_zones(board.path, timeout=LONG)
-
-
-def test_the_expected_skin_is_taken_whole(board):
-    with contactfpga.open(board.path, skin=SKIN, timeout=LONG) as opened:
-        assert opened.skin is SKIN
-        assert opened.fingerprint == SKIN.fingerprint
-
-
-def test_another_skin_than_the_one_asked_for(board):
-    other = SKIN.replace(settle_us=6.0)
-    with pytest.raises(contactfpga.SkinMismatch) as caught:
-        contactfpga.open(board.path, skin=other, timeout=LONG)
-    assert SKIN.fingerprint.hex() in str(caught.value)
-    assert other.fingerprint.hex() in str(caught.value)
-
-
-def test_skin_that_changes_mid_stream_is_noticed_after_the_frames_before_it(board):
-    with contactfpga.open(board.path, timeout=LONG) as opened:
-        opened.next(LONG)
-        last = board.frame()
-        board.wire = Wire(SKIN.replace(rows=8, columns=40, settle_us=10.0))
-        board.moments = [(1, 39, 7)]
-        board.send(last + board.hello() + board.frame())
-        assert opened.next(LONG)[0].area_cells == 4
-        with pytest.raises(contactfpga.SkinMismatch, match=r"now has a 8x40 Skin.*before it was a 16x16"):
-            opened.next(LONG)
-        assert opened.next(LONG)[0].x_mm == 390.0
-        assert opened.skin.columns == 40
-        assert opened.stats.skin_changes == 1
-        assert opened.stats.lost == 0
-
-
-def test_read_takes_a_board_with_a_new_skin_as_it_is(board):
-    contactfpga.read_zones(board.path, timeout=LONG)
-    board.wire = Wire(SKIN.replace(pitch_x_mm=20.0))
-    assert contactfpga.read_zones(board.path, timeout=LONG)[0].x_mm == 50.0
 
 
 # ---- every frame

@@ -1,0 +1,43 @@
+"""Random frames as a board would send them, and whether the product takes a packet for one."""
+
+from wire import Wire
+
+from contactfpga import protocol
+from contactfpga.derived import Derived
+
+
+def moments(rng, skin, zones):
+    """(area, sum x, sum y) of zones that could be on the sheet, of few cells each."""
+    rows = []
+    for _ in range(zones):
+        area = rng.randrange(1, 10)
+        rows.append((area, rng.randrange(area * (skin.columns - 1) + 1), rng.randrange(area * (skin.rows - 1) + 1)))
+    return rows
+
+
+def frame(rng, skin, zones=None):
+    """A frame as sent, with its delimiter; ``zones``: how many, where the Skin reports zones."""
+    options = {name: rng.randrange(1 << bits) for name, bits in (("time", 24), ("sequence", 8), ("overwritten", 4))}
+    options["flags"] = ["requested"] if rng.random() < 0.2 else []
+    if skin.report == "cells":
+        bitmap = [[rng.random() < 0.3 for _ in range(skin.columns)] for _ in range(skin.rows)]
+        return Wire(skin).cells(bitmap, **options)
+    return Wire(skin).zones(moments(rng, skin, zones), **options)
+
+
+def receiver(skin):
+    """The product's verdict on a packet without its delimiter, as a function."""
+    derived = Derived(skin)
+
+    def accepts(packet):
+        try:
+            plain = protocol.unseal(packet)
+            if protocol.kind_of(plain) == protocol.KIND_HELLO:
+                protocol.decode_hello(plain)
+            else:
+                protocol.decode_frame(plain, derived)
+        except protocol.PacketError:
+            return False
+        return True
+
+    return accepts
