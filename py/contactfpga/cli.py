@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import importlib
 import importlib.metadata
+import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 
@@ -27,23 +27,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors print one line that names the next step."""
     args = _parser().parse_args(arguments)
     try:
-        return _load(args.command).main(args) or 0
+        return importlib.import_module(_COMMANDS[args.command]).main(args) or 0
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nor is what is left to flush at exit
         return 0
-    except (ContactFPGAError, ValueError, OSError) as error:
-        print(f"contactfpga: {error}", file=sys.stderr)
-        return 1
-
-
-def _load(command: str) -> ModuleType:
-    try:
-        return importlib.import_module(_COMMANDS[command])
     except ModuleNotFoundError as error:
-        extra = "cli" if (error.name or "").split(".")[0] == "rich" else "sim"
-        raise MissingExtra(f"`contactfpga {command}` ({error})", extra) from None
+        return _failed(_missing(args.command, error))
+    except (ContactFPGAError, ValueError, OSError) as error:
+        return _failed(error)
+
+
+def _failed(error: Exception) -> int:
+    print(f"contactfpga: {error}", file=sys.stderr)
+    return 1
+
+
+def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
+    extra = "cli" if (error.name or "").split(".")[0] == "rich" else "sim"
+    return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
 def _parser() -> argparse.ArgumentParser:
