@@ -106,6 +106,45 @@ def test_refused_with_value_and_limit(changes, message):
     assert isinstance(caught.value, ContactFPGAError)
 
 
+JUST_WITHIN = [
+    {"rows": 1, "columns": 1},
+    {"rows": 64, "columns": 64, "settle_us": 100},
+    {"pitch_x_mm": 0.01, "pitch_y_mm": 1000},
+    {"rows": 1, "columns": 2, "mask": [[0, 0]]},
+    {"mask": [[15, 15], (0, 0)]},
+    {"surface": "cylinder", "radius_mm": 25, "columns": 15},
+    {"clock_hz": 1_000_000, "baud": 500_000, "settle_us": 100},
+    {"clock_hz": 400_000_000},
+    {"baud": 1200},
+    {"send": "on_change", "keep_alive_ms": 0.096},
+    {"send": "on_change", "keep_alive_ms": 100},
+    {"send": "always", "keep_alive_ms": 500},
+    {"zone_capacity": 1},
+    {"zone_capacity": 64},
+    {"settle_us": 10_000, "release_us": 10_000},
+    {"settle_us": 0.8},
+    {"debounce": "sym_defer_pk", "debounce_press_us": 393_120, "debounce_release_us": 0},
+    {"debounce": "none", "debounce_press_us": -1},
+]
+
+
+@pytest.mark.parametrize("changes", JUST_WITHIN, ids=str)
+def test_what_just_keeps_the_limits_is_taken(changes):
+    skin = Skin(**changes)
+    assert all(getattr(skin, name) == value for name, value in changes.items() if name != "mask")
+
+
+@pytest.mark.parametrize("radius_mm", [3.3, 10.0, 12.5, 25.4, 100.0])
+def test_a_cylinder_takes_as_many_columns_as_the_message_says(radius_mm):
+    fields = {"surface": "cylinder", "radius_mm": radius_mm, **LONG}
+    with pytest.raises(SkinError, match="ends meet") as caught:
+        Skin(columns=64, **fields)
+    most = int(str(caught.value).split()[-2])
+    Skin(columns=most, **fields)
+    with pytest.raises(SkinError, match="ends meet"):
+        Skin(columns=most + 1, **fields)
+
+
 def test_a_small_baud_error_is_accepted():
     assert Derived(Skin(baud=921_600)).bit_clocks == 13
 
