@@ -9,13 +9,11 @@ from contactfpga_hdl.label.steps import step_layout
 from contactfpga_hdl.payloads import row_layout
 
 
-def _lowest(bits):
-    """The lowest bit that is set, alone."""
-    return (bits & -bits)[: len(bits)]
-
-
-def _without_lowest(bits):
-    return (bits & (bits - 1))[: len(bits)]
+def _split(m, bits):
+    """The lowest bit that is set, alone, and the others."""
+    lowest, others = Signal.like(bits), Signal.like(bits)
+    m.d.comb += [lowest.eq(bits & -bits), others.eq(bits & (bits - 1))]
+    return lowest, others
 
 
 def _index(one_hot, width):
@@ -59,9 +57,10 @@ class Walk(wiring.Component):
     def _walk_clusters(self, m):
         work = self._ends.any()
         inside = Signal.like(self._ends)  # columns up to the end of the first cluster
-        befores_left = _without_lowest(self._befores)
-        starts_left = _without_lowest(self._starts)
-        ends_left = _without_lowest(self._ends)
+        before, befores_left = _split(m, self._befores)
+        start, starts_left = _split(m, self._starts)
+        stop, stops_left = _split(m, self._stops)
+        _, ends_left = _split(m, self._ends)
         has_before = (self._befores & inside).any()
         has_run = (self._starts & inside).any()
         closes = Signal()
@@ -73,10 +72,10 @@ class Walk(wiring.Component):
             self._done.eq(closes & ~ends_left.any()),
             step.end.eq(~work),
             step.has_before.eq(has_before),
-            step.before.eq(_index(_lowest(self._befores), len(step.before))),
+            step.before.eq(_index(before, len(step.before))),
             step.has_run.eq(has_run),
-            step.start.eq(_index(_lowest(self._starts), len(step.start))),
-            step.stop.eq(_index(_lowest(self._stops), len(step.stop))),
+            step.start.eq(_index(start, len(step.start))),
+            step.stop.eq(_index(stop, len(step.stop))),
             step.opens.eq(opens),
             step.closes.eq(closes),
             step.row_done.eq(self._done),
@@ -90,7 +89,7 @@ class Walk(wiring.Component):
             with m.If(has_before):
                 m.d.sync += self._befores.eq(befores_left)
             with m.If(has_run):
-                m.d.sync += [self._starts.eq(starts_left), self._stops.eq(_without_lowest(self._stops))]
+                m.d.sync += [self._starts.eq(starts_left), self._stops.eq(stops_left)]
             with m.If(closes):
                 m.d.sync += self._ends.eq(ends_left)
 
