@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import builtins
 import collections
 import contextlib
 import math
@@ -286,7 +285,7 @@ def _forget(port: str | None) -> None:
 @atexit.register
 def _close_all() -> None:
     for port in list(_boards):
-        with contextlib.suppress(builtins.Exception):
+        with contextlib.suppress(Exception):
             _forget(port)
 
 
