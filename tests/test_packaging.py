@@ -123,9 +123,7 @@ def modules_in(package: str) -> list[str]:
 
 
 def complaints(modules: Iterable[str], faults) -> list[str]:
-    return [
-        f"{name}:{found.line} imports {found.name}" for name in modules for found in faults(imports_in(name))
-    ]
+    return [f"{name}:{found.line} imports {found.name}" for name in modules for found in faults(imports_in(name))]
 
 
 def test_host_imports_neither_gateware_nor_models_when_loaded():
@@ -253,6 +251,4 @@ def test_lock_covers_every_dependency():
             continue
         assert name in lock, f"constraints.txt has no line for {name}"
         exact = re.search(r"==([\w.]+)", requirement)
-        assert exact is None or exact[1] == lock[name], (
-            f"{requirement} in pyproject.toml, {lock[name]} locked"
-        )
+        assert exact is None or exact[1] == lock[name], f"{requirement} in pyproject.toml, {lock[name]} locked"

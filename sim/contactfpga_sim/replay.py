@@ -16,6 +16,7 @@ import numpy as np
 
 from contactfpga import protocol
 from contactfpga.derived import Derived
+from contactfpga.errors import ContactFPGAError
 from contactfpga.protocol import Frame
 from contactfpga.skin import MAX_LINES, Skin
 from contactfpga_sim.board import Board
@@ -30,7 +31,7 @@ BIT_CLOCKS = 2
 """The fastest UART a Skin admits."""
 
 
-class ReplayError(RuntimeError):
+class ReplayError(ContactFPGAError):
     """A frame of the input did not come out exactly once."""
 
 
