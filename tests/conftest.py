@@ -1,4 +1,4 @@
-"""What the tests of the gateware share: a stage in Amaranth's simulator, clock by clock."""
+"""What tests share: a stage in Amaranth's simulator, clock by clock, and a fake board on a pseudo-terminal."""
 
 import random
 import time
@@ -7,6 +7,10 @@ from collections.abc import Callable
 import pytest
 from amaranth.hdl import Cat, Value
 from amaranth.sim import Simulator
+from fake_board import FakeBoard
+
+from contactfpga import driver
+from contactfpga.skin import Skin
 
 
 class Source:
@@ -181,3 +185,18 @@ def bench():
 def rng(request):
     """A generator of random numbers that is the same whenever this test runs."""
     return random.Random(request.node.nodeid)
+
+
+@pytest.fixture
+def board():
+    """A fake board of the reference Skin on a pseudo-terminal."""
+    with FakeBoard(Skin()) as board:
+        yield board
+
+
+@pytest.fixture
+def _closed_ports():
+    """`read_zones` keeps its ports open in the process; the next test starts without them."""
+    yield
+    for port in list(driver._boards):
+        driver._forget(port)

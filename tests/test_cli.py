@@ -21,12 +21,6 @@ HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich sci
 
 
 @pytest.fixture
-def board():
-    with FakeBoard(SKIN) as board:
-        yield board
-
-
-@pytest.fixture
 def run(capsys):
     """Runs a command in this process; returns status, output and errors."""
 

@@ -7,17 +7,11 @@ import pytest
 from fake_board import background, wait_until
 
 import contactfpga
-from contactfpga import driver
+
+pytestmark = pytest.mark.usefixtures("_closed_ports")
 
 SKIN = contactfpga.Skin()
 LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
-
-
-@pytest.fixture(autouse=True)
-def _closed_ports():
-    yield
-    for port in list(driver._boards):
-        driver._forget(port)
 
 
 @pytest.fixture

@@ -8,21 +8,10 @@ from fake_board import FakeBoard
 import contactfpga
 from contactfpga import driver, ports
 
+pytestmark = pytest.mark.usefixtures("_closed_ports")
+
 SKIN = contactfpga.Skin()
 LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
-
-
-@pytest.fixture
-def board():
-    with FakeBoard(SKIN) as board:
-        yield board
-
-
-@pytest.fixture(autouse=True)
-def _closed_ports():
-    yield
-    for port in list(driver._boards):
-        driver._forget(port)
 
 
 def usb(device, vid=0x0403, pid=0x6010, interface=1):

@@ -1,27 +1,14 @@
 """What `record=` writes, `replay://` reads."""
 
 import pytest
-from fake_board import FakeBoard
 from wire import Wire
 
 import contactfpga
-from contactfpga import driver
+
+pytestmark = pytest.mark.usefixtures("_closed_ports")
 
 SKIN = contactfpga.Skin()
 LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
-
-
-@pytest.fixture
-def board():
-    with FakeBoard(SKIN) as board:
-        yield board
-
-
-@pytest.fixture(autouse=True)
-def _closed_ports():
-    yield
-    for port in list(driver._boards):
-        driver._forget(port)
 
 
 def test_recording_replays_the_same_frames(board, tmp_path):
