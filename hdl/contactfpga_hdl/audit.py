@@ -151,17 +151,15 @@ class _Counts(wiring.Component):
         m.d.comb += [tally.taken.eq(self.taken), tally.row.eq(self.row)]
         with m.If(self.taken & self.row.last):
             m.d.sync += self.last_tag.eq(self.tag)
+        m.d.sync += self.cells.eq(self.cells + tally.moments.area)
         with m.If(self.clear):
             m.d.sync += self.cells.eq(0)
-        with m.Elif(tally.valid):
-            m.d.sync += self.cells.eq(self.cells + tally.moments.area)
         unexplained = Signal(moments_layout(self.derived))
         for name in ("area", "sum_x", "sum_y"):
-            m.d.sync += unexplained[name].eq(
-                Mux(self.clear, 0, unexplained[name])
-                + Mux(tally.valid, tally.moments[name], 0)
-                - Mux(self.zone_valid, self.zone[name], 0)
-            )
+            zone = Mux(self.zone_valid, self.zone[name], 0)
+            m.d.sync += unexplained[name].eq(unexplained[name] + tally.moments[name] - zone)
+        with m.If(self.clear):  # all rows are counted by then
+            m.d.sync += unexplained.eq(0)
         m.d.comb += self.mismatch.eq(unexplained.as_value() != 0)
         if self.skin.send == "on_change":
             m.submodules.change = change = Change(self.skin)

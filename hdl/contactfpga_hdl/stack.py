@@ -3,9 +3,12 @@
 from amaranth.hdl import Elaboratable, Module, Mux, Signal
 from amaranth.lib import data, memory
 
+SHALLOW = 4
+"""Up to this depth registers alone are smaller than a memory with a register on top."""
+
 
 class Stack(Elaboratable):
-    """Stack of ``depth`` entries: the top in a register, the others in a memory that can be block RAM.
+    """Stack of ``depth`` entries whose top is a register; the others lie in registers or, if many, in a memory.
 
     In one cycle it takes ``pop``, then ``push``; with ``enable`` low it does nothing. Depth 0 keeps nothing.
     Popping an empty stack and pushing onto a full one are the caller's errors.
@@ -30,19 +33,34 @@ class Stack(Elaboratable):
             deeper.eq(self.enable & self.push & ~self.pop),
             shallower.eq(self.enable & self.pop & ~self.push),
         ]
-        with m.If(self.enable & self.push):
-            m.d.sync += self.top.eq(self.entry)
         with m.If(deeper):
             m.d.sync += self.level.eq(self.level + 1)
         with m.If(shallower):
             m.d.sync += self.level.eq(self.level - 1)
-        if self.depth > 1:
-            self._spill(m, deeper, shallower)
+        below = self._shift(m, deeper, shallower) if self.depth <= SHALLOW else self._spill(m, deeper, shallower)
+        with m.If(shallower):
+            m.d.sync += self.top.eq(below)
+        with m.If(self.enable & self.push):
+            m.d.sync += self.top.eq(self.entry)
         return m
 
+    def _shift(self, m, deeper, shallower):
+        """Entries below the top in registers, the next one first; returns that."""
+        entries = [self.top, *(Signal(self.entry.shape(), name=f"below_{i}") for i in range(1, self.depth))]
+        for index in range(1, self.depth):
+            with m.If(deeper):
+                m.d.sync += entries[index].eq(entries[index - 1])
+            if index + 1 < self.depth:
+                with m.If(shallower):
+                    m.d.sync += entries[index].eq(entries[index + 1])
+        return entries[1] if self.depth > 1 else self.top
+
     def _spill(self, m, deeper, shallower):
-        """Entries below the top, entry i at address i. The one next to the top is read ahead, or, when it was just
-        written, kept in a register: no address is read and written in the same clock."""
+        """Entries below the top in a memory, entry i at address i; returns the one next to the top.
+
+        That one is read ahead, or, when it was just written, kept in a register: no address is read and written in
+        the same clock.
+        """
         m.submodules.below = below = memory.Memory(shape=self.entry.shape(), depth=self.depth - 1, init=[])
         write = below.write_port()
         read = below.read_port()
@@ -58,4 +76,5 @@ class Stack(Elaboratable):
         with m.If(deeper):
             m.d.sync += [copy.eq(self.top), fresh.eq(1)]
         with m.If(shallower):
-            m.d.sync += [self.top.eq(Mux(fresh, copy, read.data)), fresh.eq(0)]
+            m.d.sync += fresh.eq(0)
+        return Mux(fresh, copy, read.data)

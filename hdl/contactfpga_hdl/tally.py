@@ -10,7 +10,7 @@ from contactfpga_hdl.payloads import moments_layout, row_layout
 
 
 class Tally(wiring.Component):
-    """Moments of each row, two clocks after ``taken``."""
+    """Moments of each row, for the one clock that lies two behind ``taken``; otherwise zero."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -19,7 +19,6 @@ class Tally(wiring.Component):
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
-                "valid": Out(1),
                 "moments": Out(moments_layout(self.derived)),
             }
         )
@@ -40,13 +39,9 @@ class Tally(wiring.Component):
             _count(cells[x] for x in range(columns) if x >> bit & 1) << bit for bit in range((columns - 1).bit_length())
         ]
         m.d.comb += area.eq(_count(cells))
-        m.d.sync += [
-            counting.eq(self.taken),
-            self.valid.eq(counting),
-            self.moments.area.eq(area),
-            self.moments.sum_x.eq(sum(weighted)),
-            y_counted.eq(y),
-        ]
+        m.d.sync += [counting.eq(self.taken), self.moments.area.eq(0), self.moments.sum_x.eq(0), y_counted.eq(y)]
+        with m.If(counting):
+            m.d.sync += [self.moments.area.eq(area), self.moments.sum_x.eq(sum(weighted))]
         m.d.comb += self.moments.sum_y.eq(self.moments.area[: len(area)] * y_counted)
         return m
 
