@@ -24,7 +24,7 @@ class Link(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._region = self.derived.max_stored_bytes
+        self._region = self.derived.max_stored_bytes + self.derived.max_stored_bytes % 2
         self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
         self._depth = 3 * self._region + len(self._hello)
         self.packer = Packer(skin, address_bits=(self._depth - 1).bit_length())

@@ -40,7 +40,7 @@ class Packer(wiring.Component):
 
     ``decide`` is high for the clock in which an end mark is taken; in it ``summary`` describes the frame and
     ``verdict`` says whether it is sent. ``commit`` is high for the clock in which a frame's last byte is written;
-    ``end`` is then the address behind it. ``base`` is then already the next region.
+    ``end`` is then the address behind it. ``base`` (even) is then already the next region.
 
     COBS writes a block's length in front of it. Every zero byte is the place of the next length, so a byte takes one
     write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero takes
@@ -135,7 +135,7 @@ class Packer(wiring.Component):
             self.write.data.eq(Mux(ends_block, length, self._byte)),
         ]
         with m.If(self._restart):
-            m.d.sync += [code.eq(self.base), place.eq(self.base + 1), length.eq(1)]
+            m.d.sync += [code.eq(self.base), place.eq(self.base | 1), length.eq(1)]
         with m.Elif(self._byte_valid):
             m.d.sync += place.eq(place + 1)
             with m.If(ends_block):

@@ -58,7 +58,7 @@ class Sum(wiring.Component):
             write.addr.eq(join.place),
             write.data.eq(group),
             self.records.valid.eq(self.valid & join.leaves),
-            self.records.payload.zone.eq(Mux(join.end, 0, group)),
+            self.records.payload.zone.eq(group),
             self.records.payload.end.eq(join.end),
         ]
         return m
