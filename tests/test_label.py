@@ -100,7 +100,7 @@ def frame_rule(cells, connectivity, start):
                 assert cycle + step + 2 not in leaving
                 leaving[cycle + step + 2] = zones[index]
         last = cycle
-        cycle += max(1, steps)
+        cycle += steps + 1
     return handed, leaving, last + steps + 3
 
 

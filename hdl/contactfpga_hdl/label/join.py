@@ -137,7 +137,7 @@ class Join(wiring.Component):
         join = Signal(self.join.shape())
         m.d.comb += [
             join.end.eq(step.end),
-            join.opens.eq(step.opens),
+            join.closes.eq(step.closes),
             join.pop.eq(pop),
             join.load.eq(passed),
             join.push.eq(step.closes & (group.open != 0)),

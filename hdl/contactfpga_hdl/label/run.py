@@ -26,8 +26,8 @@ from contactfpga_hdl.payloads import record_layout, row_layout
 class RunLabeller(wiring.Component):
     """Rows in, zone records out; work follows the runs of pressed cells.
 
-    A row with n steps takes ``max(1, n)`` clocks, the last one of a frame one more; a zone leaves two clocks after
-    the last step in which it has a cell (docs/timing.md). With C columns a row takes at most ceil(C/2) steps with
+    A row with n steps takes n + 1 clocks; a zone leaves two clocks after the last step in which it has a cell
+    (docs/timing.md). With C columns a row takes at most ceil(C/2) steps with
     8-connectivity and C with 4. Each step passes walk, join and sum in three clocks.
     """
 

@@ -33,7 +33,7 @@ def join_layout(derived: Derived) -> data.StructLayout:
     return data.StructLayout(
         {
             "end": 1,
-            "opens": 1,  # start from nothing
+            "closes": 1,  # the next step starts from nothing
             "run": moments_layout(derived),  # add the new run, a group from the stack, and a zone of the row before
             "pop": 1,
             "load": 1,

@@ -1,7 +1,7 @@
 """The moments of each zone: added up step by step, kept from row to row, let out when the zone is closed."""
 
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import Derived
@@ -35,18 +35,15 @@ class Sum(wiring.Component):
         write = table.write_port()
         read = table.read_port()
         kept = Signal(moments)
-        just_stored = Signal()  # what is to be loaded is what the step before put into the table
         group = Signal(moments)
-        loaded = Mux(just_stored, kept.as_value(), read.data.as_value())
-        loaded = data.View(moments, Mux(join.load, loaded, 0))
         for name in ("area", "sum_x", "sum_y"):
-            m.d.comb += group[name].eq(
-                (Mux(join.opens, 0, kept[name]) + join.run[name]) + (Mux(join.pop, stack.top[name], 0) + loaded[name])
-            )
+            waiting = Mux(join.pop, stack.top[name], 0)
+            loaded = Mux(join.load, read.data[name], 0)
+            m.d.comb += group[name].eq((kept[name] + join.run[name]) + (waiting + loaded))
         with m.If(works):
             m.d.sync += kept.eq(group)
-        with m.If(self.enable):
-            m.d.sync += just_stored.eq(write.en & (write.addr == read.addr))
+            with m.If(join.closes):
+                m.d.sync += kept.eq(0)
         m.d.comb += [
             stack.enable.eq(works),
             stack.pop.eq(join.pop),

@@ -48,7 +48,6 @@ class Walk(wiring.Component):
         self._stops = Signal(columns)
         self._ends = Signal(columns)
         self._last = Signal()
-        self._done = Signal()  # the row's last cluster ends in this step
         self._y = Signal(self.step.y.shape())
         self._walk_clusters(m)
         self._take_row(m)
@@ -69,7 +68,6 @@ class Walk(wiring.Component):
         m.d.comb += [
             inside.eq(self._ends ^ (self._ends - 1)),
             closes.eq(~(befores_left & inside).any() & ~(starts_left & inside).any()),
-            self._done.eq(closes & ~ends_left.any()),
             step.end.eq(~work),
             step.has_before.eq(has_before),
             step.before.eq(_index(before, len(step.before))),
@@ -78,7 +76,7 @@ class Walk(wiring.Component):
             step.stop.eq(_index(stop, len(step.stop))),
             step.opens.eq(opens),
             step.closes.eq(closes),
-            step.row_done.eq(self._done),
+            step.row_done.eq(closes & ~ends_left.any()),
             step.y.eq(self._y),
             step.final.eq(self._last),
         ]
@@ -100,7 +98,7 @@ class Walk(wiring.Component):
         work = self._ends.any()
         with m.If(self.enable & ~work):
             m.d.sync += self._last.eq(0)  # its end mark is on its way
-        m.d.comb += self.rows.ready.eq(self.enable & (~work | self._done & ~self._last))
+        m.d.comb += self.rows.ready.eq(self.enable & ~work)
         with m.If(self.rows.valid & self.rows.ready):
             right_row, right_before = row.cells >> 1, before >> 1
             if self.derived.skin.connectivity == 8:

@@ -60,7 +60,7 @@ class Labeller:
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
             if facts.moments:
-                self._free = cycle + (work.steps[row] + 1 if last else max(1, work.steps[row]))
+                self._free = cycle + work.steps[row] + 1
         if facts.moments:
             records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
             end = handed[-1] + work.steps[-1] + 3
