@@ -109,6 +109,18 @@ def test_refusals_name_value_and_limit(board, changes, message):
     assert str(caught.value).startswith(message)
 
 
+def test_fastest_rate_of_the_ulx3s_is_the_one_the_page_names():
+    def taken(clocks):
+        try:
+            ULX3S.check(ULX3S.skin.replace(baud=25_000_000 // clocks))
+        except SkinError:
+            return False
+        return True
+
+    assert next(25_000_000 // clocks for clocks in range(2, 30) if taken(clocks)) == 1_470_588
+    assert "1,470,588" in (ROOT / PAGE).read_text()
+
+
 @every_board
 def test_a_sheet_that_takes_every_pin_is_taken(board):
     board.check(board.skin.replace(rows=board.lines - 4, columns=4))
