@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification figures campaign lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams constraints figures campaign lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -45,6 +45,22 @@ endif
 
 verification: $(VENV)/.stamp-test ## write docs/verification.md from the results of the last make test
 	$(PY) scripts/verification.py
+
+# Said before anything is installed.
+ifneq ($(filter bitstream,$(MAKECMDGOALS)),)
+ifeq ($(strip $(BOARD)),)
+$(error BOARD is missing: make bitstream BOARD=icebreaker, icestick, ulx3s-12f or ulx3s-85f)
+endif
+endif
+
+bitstream: $(VENV)/.stamp-boards ## build a bitstream: make bitstream BOARD=icebreaker [SKIN=file.toml]
+	$(VENV)/bin/contactfpga build $(BOARD) $(if $(SKIN),--skin $(SKIN)) $(ARGS)
+
+bitstreams: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## build one for every board and check size and timing
+	$(PY) -m pytest -m campaign $(ARGS) tests/test_bitstream.py
+
+constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
+	$(PY) -m contactfpga_hdl.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
 	$(PY) -m contactfpga_sim.figures README.md docs/use.md
@@ -97,6 +113,9 @@ endef
 
 $(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
 	$(call install,sim,downloads about 85 MB unless pip has it cached)
+
+$(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+	$(call install,boards,downloads about 145 MB unless installed or cached)
 
 $(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
 	$(call install,sim$(,)test,downloads about 180 MB unless installed or cached)

@@ -44,11 +44,11 @@ def test_help_names_every_command(capsys):
         cli.main(["--help"])
     assert caught.value.code == 0
     said = capsys.readouterr().out
-    for command in ("zones", "wire", "board", "doctor", "replay"):
+    for command in ("zones", "wire", "board", "doctor", "build", "flash", "replay"):
         assert f"\n    {command} " in said
 
 
-@pytest.mark.parametrize("command", ["zones", "wire", "board", "doctor", "replay"])
+@pytest.mark.parametrize("command", ["zones", "wire", "board", "doctor", "build", "flash", "replay"])
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit) as caught:
         cli.main([command, "--help"])
@@ -324,6 +324,8 @@ def test_bad_skin_file_is_named(tmp_path, run):
         (["board"], "contactfpga_sim.board", "sim"),
         (["replay", "x.npy"], "contactfpga_sim.replay", "sim"),
         (["zones", "--json", "sim://"], "contactfpga_sim.board", "sim"),
+        (["build", "icestick"], "amaranth.build", "boards"),
+        (["build", "icestick"], "amaranth_boards.icestick", "boards"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):

@@ -237,6 +237,11 @@ def test_golden_model_loads_no_amaranth():
     assert loaded_by("contactfpga_sim.golden").isdisjoint({"amaranth", "contactfpga_hdl"})
 
 
+def test_pin_tables_load_no_amaranth():
+    # so that `contactfpga flash` runs where only the host is installed
+    assert loaded_by("contactfpga_hdl.boards").isdisjoint({"amaranth", "amaranth_boards"})
+
+
 def test_what_a_module_loads_is_seen():
     assert "amaranth" in loaded_by("amaranth")
 

@@ -15,12 +15,15 @@ _COMMANDS = {
     "zones": "contactfpga.commands.zones",
     "wire": "contactfpga.commands.wire",
     "doctor": "contactfpga.commands.doctor",
+    "build": "contactfpga.commands.build",
+    "flash": "contactfpga.commands.flash",
     "board": "contactfpga_sim.board",
     "replay": "contactfpga_sim.replay",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
 _PORT = "device path, sim://, replay://FILE; none: the one supported board that is plugged in"
+_BOARD = "icebreaker, icestick, ulx3s-12f or ulx3s-85f"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,7 +48,10 @@ def _failed(error: Exception) -> int:
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
-    extra = "cli" if (error.name or "").split(".")[0] == "rich" else "sim"
+    if (error.name or "").split(".")[0] == "rich":
+        extra = "cli"
+    else:
+        extra = "boards" if command == "build" else "sim"
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
@@ -61,6 +67,8 @@ def _parser() -> argparse.ArgumentParser:
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))
     _board(commands.add_parser("board", help="run the virtual board on a pseudo-terminal"))
     _doctor(commands.add_parser("doctor", help="say what is wrong between this computer and the board"))
+    _build(commands.add_parser("build", help="build a bitstream for a board"))
+    _flash(commands.add_parser("flash", help="write a bitstream into a board"))
     _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
     return parser
 
@@ -93,6 +101,17 @@ def _board(parser: argparse.ArgumentParser) -> None:
 def _doctor(parser: argparse.ArgumentParser) -> None:
     _connection(parser)
     parser.add_argument("--seconds", type=float, default=1.0, help="how long frames are counted (default: 1)")
+
+
+def _build(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("board", metavar="BOARD", help=_BOARD)
+    parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board)")
+    parser.add_argument("--output", metavar="DIR", help="folder for what is built (default: build/BOARD)")
+
+
+def _flash(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("board", metavar="BOARD", help=_BOARD)
+    parser.add_argument("file", nargs="?", metavar="FILE", help="bitstream (default: the one in build/BOARD)")
 
 
 def _replay(parser: argparse.ArgumentParser) -> None:

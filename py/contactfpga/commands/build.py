@@ -1,0 +1,30 @@
+"""`contactfpga build`: a bitstream for a board, and what it takes of the FPGA."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_hdl import boards, build
+
+    board = boards.find(args.board)
+    skin = Skin.load(args.skin) if args.skin else board.skin
+    folder = Path(args.output or default_folder(args.board))
+    try:
+        report = build.build(skin, board, folder)
+    except build.BuildFailed as error:
+        raise ContactFPGAError(str(error)) from None
+    print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
+    print(f"{'bitstream':12} {report.bitstream}")
+    return 0
+
+
+def default_folder(board: str) -> Path:
+    """Where the bitstream of a board is put and looked for."""
+    return Path("build") / board

@@ -1,0 +1,32 @@
+"""`contactfpga flash`: hands a bitstream to the board's usual programmer."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+from pathlib import Path
+
+from contactfpga.commands.build import default_folder
+from contactfpga.errors import ContactFPGAError, MissingTool
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_hdl import boards  # the pin tables; nothing that needs more than the host
+
+    board = boards.find(args.board)
+    file = Path(args.file) if args.file else boards.bitstream_path(board, default_folder(args.board))
+    if not file.is_file():
+        raise ContactFPGAError(f"there is no file {file}; build it with: contactfpga build {args.board}")
+    programmer = board.programmer
+    tool = shutil.which(programmer.tool)
+    if tool is None:
+        raise MissingTool(f"writing a bitstream to {board.title}", programmer.tool, programmer.install)
+    status = subprocess.run([tool, *programmer.options, str(file)]).returncode
+    if status:
+        raise ContactFPGAError(
+            f"{programmer.tool} ended with status {status}; is {board.title} plugged in, may you write to its USB "
+            "device, and is no program using its serial port?"
+        )
+    return 0
