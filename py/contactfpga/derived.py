@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can be late behind a frame and still come every second."""
 
-STUCK_MAX = 7
-"""The stuck-line counter stops here."""
-
 TIME_BITS = 24
 SEQUENCE_BITS = 8
 STUCK_BITS = 3
+STUCK_MAX = (1 << STUCK_BITS) - 1
+"""The stuck-line counter stops here."""
+
 MIN_OVERWRITTEN_BITS = 4
 CHECK_BYTES = 3
 
