@@ -10,7 +10,8 @@ from contactfpga import Skin
 from contactfpga_hdl.audit import Audit, Bitmap
 
 SHEETS = ((1, 1), (1, 9), (9, 1), (5, 7), (6, 16))
-SUMMARY = ("cells", "zones", "overflow", "mismatch", "changed")
+AT_END = ("zones", "overflow", "changed")  # there one clock after the end mark
+COUNTED = ("cells", "mismatch")  # there when the last row is counted as well
 
 
 def skin_of(rows, columns, **options):
@@ -47,21 +48,22 @@ class Schedule:
 
     rows: dict  # cycle: (word, last)
     records: list  # (not before this cycle, moments or None for an end mark)
-    tags: dict  # cycle of a frame's last row: its tag
 
 
-def schedule(rng, frames, records, gap=3):
-    plan, cycle = Schedule({}, [], {}), 1
+def schedule(rng, frames, records, sheet):
+    """Rows as close as the shortest row time has them; after each at most as many records as it has columns."""
+    plan, cycle = Schedule({}, []), 1
+    row_clocks = max(10, sheet[1] + 6)
     for frame, zones in zip(frames, records):
-        first = cycle
+        after = []
         for y, word in enumerate(frame):
             plan.rows[cycle] = word, y == len(frame) - 1
             last = cycle
-            cycle += gap
-        plan.tags[last] = rng.randrange(1 << 28)
-        moments = sorted(rng.randrange(first, last + 3) for _ in zones)
+            after += sheet[1] * [cycle + 2]
+            cycle += row_clocks
+        moments = sorted(rng.sample(after, len(zones)))
         plan.records += list(zip(moments, zones)) + [(last + 3, None)]
-        cycle = max(last + 3, plan.records[-2][0] + len(zones) if zones else 0) + rng.randrange(1, 4)
+        cycle = max(cycle, last + len(zones) + 12) + rng.randrange(3)
     return plan
 
 
@@ -84,22 +86,24 @@ def run(bench, dut, plan, sheet, rng, ready=None):
     words = {cycle: word | last << columns for cycle, (word, last) in plan.rows.items()}
     sim.drive(dut.taken, lambda cycle: int(cycle in words))
     sim.drive(dut.row, lambda cycle: words.get(cycle, noise[cycle % 17]))
-    sim.drive(dut.tag, lambda cycle: plan.tags.get(cycle, noise[cycle % 17]))
     source = sim.source(
         dut.records,
         [record_word(zone, rows, columns) for _, zone in plan.records],
         not_before=[cycle for cycle, _ in plan.records],
     )
     items = sim.sink(dut.items, ready=ready or (lambda cycle: True))
-    fields = [sim.watch(dut.summary[name]) for name in SUMMARY]
-    tag = sim.watch(dut.summary.tag)
+    fields = {name: sim.watch(dut.summary[name]) for name in (*AT_END, *COUNTED)}
     sim.run(plan.records[-1][0] + 40 * len(plan.records) + 100)
     assert source.done
     ends = [cycle for cycle, (_, zone) in zip(source.transfers, plan.records) if zone is None]
-    summaries = [dict(zip(SUMMARY, (field[end + 1] for field in fields))) | {"tag": tag[end + 1]} for end in ends]
-    for values in [*(field.values for field in fields), tag.values]:
-        for end, following in zip(ends, [*ends[1:], len(values) - 1]):
-            assert len(set(values[end + 1 : following + 1])) == 1, "a summary holds until the next end mark"
+    lasts = [cycle for cycle, (_, last) in plan.rows.items() if last]
+    summaries = []
+    for end, last, following in zip(ends, lasts, [*ends[1:], None]):
+        # What is counted may hold up to a clock a zone, and the zones are before the end mark.
+        since = dict.fromkeys(AT_END, end + 1) | {name: max(last + 7, end + 2) + end - last for name in COUNTED}
+        summaries.append({name: watch[since[name]] for name, watch in fields.items()})
+        for name, watch in fields.items():
+            assert len(set(watch.values[since[name] : following and following + 1])) == 1, f"{name} holds"
     return items, source, summaries
 
 
@@ -109,16 +113,16 @@ def test_records_pass_without_delay_and_add_up_with_the_cells(bench, rng, sheet)
     zones = [zones_of(frame, most=math.ceil(sheet[0] * sheet[1] / 2)) for frame in frames]
     for group in zones:
         rng.shuffle(group)
-    plan = schedule(rng, frames, zones)
+    plan = schedule(rng, frames, zones, sheet)
     dut = Audit(skin_of(*sheet, connectivity=4))
     items, source, summaries = run(bench, dut, plan, sheet, rng)
     end = dut.items.payload.shape()["end"].offset
     assert [cycle for cycle, _ in items.transfers] == source.transfers
     wanted = [1 << end if zone is None else record_word(zone, *sheet) for _, zone in plan.records]
     assert [item if item >> end == 0 else 1 << end for _, item in items.transfers] == wanted
-    for frame, group, summary, tag in zip(frames, zones, summaries, plan.tags.values()):
+    for frame, group, summary in zip(frames, zones, summaries):
         cells = sum(word.bit_count() for word in frame)
-        wanted = {"cells": cells, "zones": len(group), "overflow": 0, "mismatch": 0, "changed": 1, "tag": tag}
+        wanted = {"cells": cells, "zones": len(group), "overflow": 0, "mismatch": 0, "changed": 1}
         assert summary == wanted
 
 
@@ -145,7 +149,7 @@ def test_one_wrong_record_is_flagged_in_its_frame_and_in_no_other(bench, rng):
     right = zones_of(frame)
     faults = list(planted(rng, right, sheet))
     records = [group for _, wrong in faults for group in (wrong, right)]
-    _, _, summaries = run(bench, dut, schedule(rng, [frame] * len(records), records), sheet, rng)
+    _, _, summaries = run(bench, dut, schedule(rng, [frame] * len(records), records, sheet), sheet, rng)
     flags = [summary["mismatch"] for summary in summaries]
     for (name, _), flagged in zip(faults, flags[::2]):
         assert flagged, name
@@ -159,7 +163,7 @@ def test_a_cell_that_the_records_lack_is_flagged(bench, rng):
     frames = [frame] + [
         [w ^ (1 << x if r == y else 0) for r, w in enumerate(frame)] for y in range(3) for x in range(4)
     ]
-    _, _, summaries = run(bench, Audit(skin_of(*sheet)), schedule(rng, frames, records), sheet, rng)
+    _, _, summaries = run(bench, Audit(skin_of(*sheet)), schedule(rng, frames, records, sheet), sheet, rng)
     assert [summary["mismatch"] for summary in summaries] == [0] + [1] * 12
 
 
@@ -167,7 +171,7 @@ def test_a_cell_that_the_records_lack_is_flagged(bench, rng):
 def test_zones_beyond_the_capacity_are_counted_and_flagged_but_not_carried(bench, rng, capacity):
     sheet = (4, 5)
     frames = [[0b10101] * rows + [0] * (4 - rows) for rows in (3, 1, 4, 0, 2)] + [[1, 0, 0, 0]]
-    plan = schedule(rng, frames, zones := [zones_of(frame) for frame in frames])
+    plan = schedule(rng, frames, zones := [zones_of(frame) for frame in frames], sheet)
     dut = Audit(skin_of(*sheet, connectivity=4, zone_capacity=capacity))
     end = dut.items.payload.shape()["end"].offset
     items, _, summaries = run(bench, dut, plan, sheet, rng)
@@ -187,7 +191,7 @@ def test_what_passes_waits_for_its_place_and_what_is_beyond_the_capacity_does_no
     sheet = (4, 5)
     frames = [[0b10101] * 4 for _ in range(4)]
     zones = [zones_of(frame) for frame in frames]
-    plan = schedule(rng, frames, zones)
+    plan = schedule(rng, frames, zones, sheet)
     ready = [rng.random() < 0.6 for _ in range(4000)]
     dut = Audit(skin_of(*sheet, connectivity=4, zone_capacity=10))
     items, source, summaries = run(bench, dut, plan, sheet, rng, ready=lambda cycle: ready[cycle])
@@ -219,7 +223,7 @@ def changing_frames(rng, rows, columns, count):
 def test_changed_tells_frames_that_differ_from_the_one_before(bench, rng):
     sheet = (5, 7)
     frames, changed = changing_frames(rng, *sheet, 20)
-    plan = schedule(rng, frames, [zones_of(frame) for frame in frames])
+    plan = schedule(rng, frames, [zones_of(frame) for frame in frames], sheet)
     dut = Audit(skin_of(*sheet, connectivity=4, send="on_change"))
     _, _, summaries = run(bench, dut, plan, sheet, rng)
     assert [summary["changed"] for summary in summaries] == changed
@@ -231,22 +235,20 @@ def test_changed_tells_frames_that_differ_from_the_one_before(bench, rng):
 def test_bitmap_rows_pass_as_they_are_and_the_end_mark_follows_three_clocks_later(bench, rng, sheet, stall):
     rows, columns = sheet
     frames, changed = changing_frames(rng, *sheet, 10)
-    tags = [rng.randrange(1 << 28) for _ in frames]
     dut = Bitmap(skin_of(*sheet, report="cells", send="on_change"))
     sim = bench(dut)
     words = [word | (y == rows - 1) << columns for frame in frames for y, word in enumerate(frame)]
-    source = sim.source(dut.rows, words, not_before=[10 * (index + 1) for index in range(len(words))])
+    source = sim.source(dut.rows, words, not_before=[(columns + 10) * (index + 1) for index in range(len(words))])
     items = sim.sink(dut.items, rng, stall=stall)
-    sim.drive(dut.tag, lambda cycle: tags[min(len(source.transfers) // rows, len(tags) - 1)])
-    fields = {name: sim.watch(dut.summary[name]) for name in (*SUMMARY, "tag")}
-    sim.run(10 * len(words) + 60)
+    fields = {name: sim.watch(dut.summary[name]) for name in (*AT_END, *COUNTED)}
+    sim.run((columns + 10) * len(words) + 160)
     end = dut.items.payload.shape()["end"].offset
     assert [item for _, item in items.transfers if not item >> end] == [word for frame in frames for word in frame]
     assert [cycle for cycle, item in items.transfers if not item >> end] == source.transfers
     ends = [index for index, (_, item) in enumerate(items.transfers) if item >> end]
     assert [items.offered[index] for index in ends] == [cycle + 3 for cycle in source.transfers[rows - 1 :: rows]]
-    for index, frame, change, tag in zip(ends, frames, changed, tags, strict=True):
-        after = items.transfers[index][0] + 1
+    for index, frame, change in zip(ends, frames, changed, strict=True):
+        after = items.transfers[index][0] + 5
         cells = sum(word.bit_count() for word in frame)
-        wanted = {"cells": cells, "zones": 0, "overflow": 0, "mismatch": 0, "changed": change, "tag": tag}
+        wanted = {"cells": cells, "zones": 0, "overflow": 0, "mismatch": 0, "changed": change}
         assert {name: watch[after] for name, watch in fields.items()} == wanted

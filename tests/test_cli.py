@@ -93,9 +93,11 @@ def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
 
 def test_help_starts_in_well_under_half_a_second():
     def seconds():
-        start = time.perf_counter()
+        """Of the processor, as other processes may have it now and then."""
+        before = os.times()
         subprocess.run([sys.executable, "-m", "contactfpga.cli", "--help"], check=True, capture_output=True)
-        return time.perf_counter() - start
+        after = os.times()
+        return sum(after[2:4]) - sum(before[2:4])
 
     assert min(seconds() for _ in range(5)) < 0.5
 

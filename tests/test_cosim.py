@@ -31,6 +31,9 @@ COCOTB = {
         keep_alive_ms=0.2,
         mask=((0, 0), (4, 8)),
         settle_us=2.5,
+        row_drive="74hc595",
+        column_read="74hc165",
+        column_chains=2,
     ),
 }
 SIMULATORS = [

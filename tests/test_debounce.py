@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 
 import pytest
 
@@ -15,7 +16,7 @@ DELAYS = ((0, 0), (0, 3), (1, 0), (1, 1), (2, 5), (5, 2), (9, 9))
 
 def skin_of(rows, columns, method, press, release):
     """A Skin whose times are ``press`` and ``release`` scans."""
-    row_us = max(16, columns + 6)
+    row_us = max(16, columns + 6, math.ceil((columns + 32) / rows))
     scan_us = row_us * rows
     return Skin(
         rows=rows,

@@ -221,7 +221,8 @@ def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
     timeline = stimulus(skin, cycles, seed=1)
     trace = predict(skin, timeline, cycles)
     rows = np.array([[word >> column & 1 for column in range(skin.columns)] for _, word, _ in trace.rows], bool)
-    late = known.settle + 2 + (skin.columns + 3 if known.debounced else 0)
+    strobe = known.row_shift + known.settle + 1 + known.column_shift
+    late = strobe + 1 + (skin.columns + 3 if known.debounced else 0)
     seen = 0
     for begun, plain in packets(trace):
         if protocol.kind_of(plain) == protocol.KIND_HELLO:
@@ -231,7 +232,7 @@ def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
         scans = [  # a few, where a scan takes less than a microsecond
             number
             for number in range(len(rows) // skin.rows)
-            if (number * known.scan_clocks + known.settle + 1) // known.clocks_per_us == frame.time_us
+            if (number * known.scan_clocks + strobe - known.column_shift) // known.clocks_per_us == frame.time_us
             and trace.rows[number * skin.rows][0] == number * known.scan_clocks + late < begun
         ]
         assert any(holds(skin, frame, rows[scan * skin.rows : (scan + 1) * skin.rows]) for scan in scans)

@@ -109,7 +109,7 @@ def run(bench_of_skin, skin, frames, ready, received=(), after=400):
     for name in SUMMARY:
         sim.drive(dut.summary[name], described(name))
     for name in TAG:
-        sim.drive(dut.summary.tag[name], described(name))
+        sim.drive(dut.tag[name], described(name))
     sim.drive(dut.received, lambda cycle: int(cycle in received))
     sink = sim.sink(dut.bytes, ready=ready)
     sim.run(frames[-1].not_before[-1] + after)

@@ -8,8 +8,8 @@ from contactfpga import Skin
 from contactfpga_hdl.scan import Scanner
 
 SKINS = {
-    "1x1": {"rows": 1, "columns": 1, "settle_us": 15, "release_us": 1},
-    "1x7": {"rows": 1, "columns": 7, "settle_us": 13, "release_us": 3},
+    "1x1": {"rows": 1, "columns": 1, "settle_us": 18, "release_us": 1},
+    "1x7": {"rows": 1, "columns": 7, "settle_us": 17, "release_us": 3},
     "7x1": {"rows": 7, "columns": 1, "settle_us": 6, "release_us": 4},
     "3x5": {"rows": 3, "columns": 5, "settle_us": 8, "release_us": 3, "mask": ((0, 1), (2, 1), (2, 4), (1, 1))},
     "2x20": {"rows": 2, "columns": 20, "settle_us": 1, "release_us": 25, "mask": ((0, 0), (1, 0), (1, 19))},
@@ -31,7 +31,7 @@ class Expected:
     driven: list  # number of the driven row in each cycle, or None
     rows: list  # (cycle, cells) of each transfer
     contact: list  # level in each cycle
-    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested)
+    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested), there one clock later
 
 
 def expected(skin, pressed, requests=()):
@@ -68,7 +68,8 @@ def expected(skin, pressed, requests=()):
             stuck = 0
             for slot in range(k - R, k):  # slots fR - 1 to fR + R - 2
                 stuck |= pressed[(slot + 1) * T - 1] & anywhere if slot >= 0 else 0
-            result.tags[strobe + 1] = (time, min(7, stuck.bit_count()), int(requested))
+            if strobe + 2 < cycles:
+                result.tags[strobe + 1] = (time, min(7, stuck.bit_count()), int(requested))
     result.contact = [int(value) for value in contact]
     return result
 
@@ -97,7 +98,7 @@ def run(bench, skin, pressed, requests=(), sink=None):
         driven,
         [(cycle, payload & mask) for cycle, payload in rows.transfers],
         contact.values,
-        {cycle: tuple(watch[cycle] for watch in tag) for cycle in lasts},
+        {cycle: tuple(watch[cycle + 1] for watch in tag) for cycle in lasts if cycle + 1 < len(pressed)},
     )
 
 
@@ -194,7 +195,7 @@ def test_a_column_that_is_masked_in_every_row_is_never_stuck_and_others_are(benc
 def test_a_stuck_column_is_told_in_one_frame_only(bench):
     skin = skin_of("3x5")
     for slot in range(2, 8):
-        pressed = [0] * 33 * 4
+        pressed = [0] * (33 * 4 + 1)
         pressed[11 * (slot + 1) - 1] = 1
         stuck = [tag[1] for tag in run(bench, skin, pressed).tags.values()]
         frame = (slot + 1) // 3
@@ -214,11 +215,11 @@ def test_a_request_is_answered_once_by_the_next_frame_to_start(bench):
     skin = skin_of("3x5")
     strobe = 33 + 8 + 1  # of frame 1
     for at, frame in ((strobe - 1, 1), (strobe, 2), (strobe + 1, 2), (0, 0)):
-        tags = run(bench, skin, [0] * 33 * 4, {at}).tags
+        tags = run(bench, skin, [0] * (33 * 4 + 1), {at}).tags
         assert [tag[2] for tag in tags.values()] == [int(index == frame) for index in range(4)]
 
 
-def test_a_frames_tag_holds_until_the_next_frames_first_strobe(bench):
+def test_a_frames_tag_holds_until_the_next_frames_last_strobe(bench):
     skin = skin_of("3x5")
     dut = Scanner(skin)
     sim = bench(dut)
@@ -227,8 +228,8 @@ def test_a_frames_tag_holds_until_the_next_frames_first_strobe(bench):
     tag = sim.watch(dut.tag)
     sim.run(33 * 4)
     for frame in range(3):
-        last, following = 33 * frame + 22 + 9, 33 * (frame + 1) + 9
-        assert len(set(tag.values[last + 1 : following + 1])) == 1
+        last, following = 33 * frame + 22 + 9, 33 * (frame + 1) + 22 + 9
+        assert len(set(tag.values[last + 2 : following + 1])) == 1
         assert tag[following] != tag[following + 1]
 
 

@@ -84,6 +84,25 @@ REFUSED = [
     ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 1.5}, "zone_capacity is 1.5; it must be a whole number"),
+    # shift registers
+    ({"row_drive": "74hc164"}, "row_drive is '74hc164'; it must be one of 'direct', '74hc595'"),
+    ({"column_read": "spi"}, "column_read is 'spi'; it must be one of 'direct', '74hc165'"),
+    ({"row_chains": 2}, "row_chains is 2; leave it out, or set row_drive = '74hc595'"),
+    ({"column_chains": 0}, "column_chains is 0; leave it out, or set column_read = '74hc165'"),
+    ({"row_drive": "74hc595", "row_chains": 0}, "row_chains is 0; it must lie between 1 and 16"),
+    ({"row_drive": "74hc595", "row_chains": 2.0}, "row_chains is 2.0; it must be a whole number"),
+    ({"column_read": "74hc165", "column_chains": 17}, "column_chains is 17; it must lie between 1 and 16"),
+    (
+        {"columns": 9, "column_read": "74hc165", "column_chains": 4},
+        "column_chains is 4; 9 columns in chains of 3 fill 3, set column_chains = 3",
+    ),
+    (
+        {"shift_hz": 4_000_000},
+        "shift_hz is 4000000; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'",
+    ),
+    ({"row_drive": "74hc595", "shift_hz": 9_999}, "shift_hz is 9999; it must lie between 10000 and 50000000 Hz"),
+    ({"row_drive": "74hc595", "shift_hz": 8e6}, "shift_hz is 8000000.0; it must be a whole number"),
+    # clock and line
     ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),
     ({"clock_hz": 401_000_000}, "clock_hz is 401000000; it must be a whole number of MHz from 1 to 400 MHz"),
@@ -107,6 +126,8 @@ def test_refused_with_value_and_limit(changes, message):
 
 
 JUST_WITHIN = [
+    {"row_drive": "74hc595", "column_read": "74hc165", "shift_hz": 10_000},
+    {"row_drive": "74hc595", "row_chains": 16, "column_read": "74hc165", "column_chains": 16, "shift_hz": 50_000_000},
     {"rows": 1, "columns": 1},
     {"rows": 64, "columns": 64, "settle_us": 100},
     {"pitch_x_mm": 0.01, "pitch_y_mm": 1000},
@@ -287,6 +308,8 @@ def test_fingerprints_tell_skins_apart(first, second):
 
 
 OTHER = {
+    "row_drive": "74hc595",
+    "column_read": "74hc165",
     "rows": 15,
     "columns": 15,
     "pitch_x_mm": 9.0,
@@ -311,7 +334,12 @@ OTHER = {
 def test_every_field_is_in_the_fingerprint():
     others = [Skin(**{name: value}) for name, value in OTHER.items()]
     others += [Skin(surface="cylinder", radius_mm=radius_mm) for radius_mm in (100.0, 101.0)]
-    assert set(OTHER) | {"surface", "radius_mm", "scan"} == {field.name for field in dataclasses.fields(Skin)}
+    registers = Skin(row_drive="74hc595", column_read="74hc165")
+    only_there = {"row_chains": 2, "column_chains": 2, "shift_hz": 4_000_000}
+    others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
+    assert set(OTHER) | {"surface", "radius_mm", "scan", *only_there} == {
+        field.name for field in dataclasses.fields(Skin)
+    }
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
 
 

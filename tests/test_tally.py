@@ -1,6 +1,7 @@
 """A row's moments and whether a frame changed, counted before the labeller."""
 
 import itertools
+import math
 
 import pytest
 
@@ -37,21 +38,36 @@ def row_word(row, columns):
     return cells | last << columns
 
 
+def spaced_rows(rng, rows, columns, frames):
+    """The shortest row time, and {cycle: (words, last)} with rows that far apart, the last frame full."""
+    words = [rng.randrange(1 << columns) for _ in range(frames * rows)] + [(1 << columns) - 1] * rows
+    row_clocks = max(10, columns + 6)
+    return row_clocks, {2 + row_clocks * k: (word, k % rows == rows - 1) for k, word in enumerate(words)}
+
+
+@pytest.mark.parametrize("hold", [0.0, 0.6])
 @pytest.mark.parametrize("sheet", SHEETS)
-def test_moments_of_each_row_come_two_clocks_after_it_and_nothing_between(bench, rng, sheet):
+def test_a_rows_moments_come_in_shares_from_two_clocks_after_it_on(bench, rng, sheet, hold):
     rows, columns = sheet
-    taken = taken_rows(rng, rows, columns, max(3, 100 // rows), shortest_gap=1)
-    taken |= {max(taken) + 1 + y: ((1 << columns) - 1, y == rows - 1) for y in range(rows)}  # the largest sums
+    row_clocks, taken = spaced_rows(rng, rows, columns, max(2, 60 // rows))
+    groups = math.ceil(columns / next(size for size in (4, 8, 16) if columns <= 4 * size))
+    holds = set()
+    for start in taken:  # at most as many as a row has steps
+        holds.update(rng.sample(range(start + 1, start + row_clocks - 1), k=round(hold * columns)))
     dut = Tally(skin_of(rows, columns))
     sim = bench(dut)
     drive_rows(sim, dut, taken, columns, rng)
-    got = [sim.watch(dut.moments[name]) for name in ("area", "sum_x", "sum_y")]
-    sim.run(max(taken) + 5)
-    counted = {cycle + 2 for cycle in taken}
-    assert not any(any(watch[cycle] for watch in got) for cycle in range(max(taken) + 5) if cycle not in counted)
-    for y, (cycle, (word, _)) in zip(itertools.cycle(range(rows)), taken.items()):
+    sim.drive(dut.hold, lambda cycle: int(cycle in holds))
+    shares = [sim.watch(dut.moments[name]) for name in ("area", "sum_x", "sum_y")]
+    busy = sim.watch(dut.busy)
+    sim.run(max(taken) + row_clocks + 1)
+    for y, (start, (word, _)) in zip(itertools.cycle(range(rows)), taken.items()):
+        free = [cycle for cycle in range(start + 1, start + row_clocks + 1) if cycle not in holds]
         pressed = [x for x in range(columns) if word >> x & 1]
-        assert [watch[cycle + 2] for watch in got] == [len(pressed), sum(pressed), len(pressed) * y]
+        totals = [sum(watch[cycle] for cycle in free[: groups + 1]) for watch in shares]
+        assert totals == [len(pressed), sum(pressed), len(pressed) * y]
+        assert not any(watch[cycle] for watch in shares for cycle in (start + 1, *free[groups + 1 :]))
+        assert [cycle for cycle in free if busy[cycle]] == free[: groups + 1]
 
 
 @pytest.mark.parametrize("sheet", SHEETS)

@@ -1,20 +1,21 @@
 """What a frame holds: its items for the packer, and a summary that was checked against its cells."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_hdl.payloads import item_layout, moments_layout, record_layout, row_layout, summary_layout, tag_layout
+from contactfpga_hdl.payloads import item_layout, moments_layout, record_layout, row_layout, summary_layout
 from contactfpga_hdl.tally import Change, Tally
 
 
 class Audit(wiring.Component):
     """Counts a frame before and behind the labeller; lets as many zones through as the frame can carry.
 
-    Records pass without delay. ``summary`` is complete one clock after the end mark and holds until the next one.
-    ``tag`` is read with the frame's last row: behind a debounce the next frame may begin before the end mark.
+    Records pass without delay. Of ``summary``, ``zones``, ``overflow`` and ``changed`` are there one clock after the
+    end mark, ``cells`` and ``mismatch`` at most seven, which is before the packer can come to them; all hold until
+    the next frame's.
     """
 
     def __init__(self, skin: Skin):
@@ -24,7 +25,6 @@ class Audit(wiring.Component):
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
-                "tag": In(tag_layout()),
                 "records": In(stream.Signature(record_layout(self.derived))),
                 "items": Out(stream.Signature(item_layout(self.derived))),
                 "summary": Out(summary_layout(self.derived)),
@@ -49,8 +49,7 @@ class Audit(wiring.Component):
             self.items.payload.end.eq(record.end),
             counts.taken.eq(self.taken),
             counts.row.eq(self.row),
-            counts.tag.eq(self.tag),
-            counts.clear.eq(ends),
+            counts.ends.eq(ends),
             counts.zone_valid.eq(zone),
             counts.zone.eq(record.zone),
         ]
@@ -62,9 +61,12 @@ class Audit(wiring.Component):
                 overflow.eq(0),
                 self.summary.zones.eq(zones),
                 self.summary.overflow.eq(overflow),
-                self.summary.mismatch.eq(counts.mismatch),
             ]
-            _summarise(m, self, counts)
+        m.d.comb += [
+            self.summary.cells.eq(counts.cells),
+            self.summary.mismatch.eq(counts.mismatch),
+            self.summary.changed.eq(counts.changed),
+        ]
         return m
 
 
@@ -80,7 +82,6 @@ class Bitmap(wiring.Component):
         super().__init__(
             {
                 "rows": In(stream.Signature(row_layout(self.derived))),
-                "tag": In(tag_layout()),
                 "items": Out(stream.Signature(item_layout(self.derived))),
                 "summary": Out(summary_layout(self.derived)),
             }
@@ -104,44 +105,33 @@ class Bitmap(wiring.Component):
             self.items.payload.end.eq(ends),
             counts.taken.eq(taken),
             counts.row.eq(self.rows.payload),
-            counts.tag.eq(self.tag),
-            counts.clear.eq(ends & self.items.ready),
+            counts.ends.eq(ends & self.items.ready),
+            self.summary.cells.eq(counts.cells),
+            self.summary.changed.eq(counts.changed),
         ]
-        with m.If(ends & self.items.ready):
-            _summarise(m, self, counts)
         return m
 
 
-def _summarise(m, stage, counts):
-    m.d.sync += [
-        stage.summary.tag.eq(counts.last_tag),
-        stage.summary.cells.eq(counts.cells),
-        stage.summary.changed.eq(counts.changed),
-    ]
-
-
 class _Counts(wiring.Component):
-    """Pressed cells of the frame, what the zones leave unexplained, whether it changed, and its tag.
+    """What a frame's rows say of it, and whether its zones explain all of its cells.
 
-    All of a row is counted three clocks after ``taken``. ``clear`` starts the next frame.
+    Rows come at least ``Derived.min_row_clocks`` apart. ``ends`` is the clock of the end mark. ``changed`` is captured
+    in it, ``cells`` and ``mismatch`` as soon as the last row is counted as well; all hold until the next frame's.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        moments = moments_layout(self.derived)
         super().__init__(
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
-                "tag": In(tag_layout()),
-                "clear": In(1),
+                "ends": In(1),
                 "zone_valid": In(1),
-                "zone": In(moments),
+                "zone": In(moments_layout(self.derived)),
                 "cells": Out(self.derived.area_bits),
                 "mismatch": Out(1),
                 "changed": Out(1),
-                "last_tag": Out(tag_layout()),
             }
         )
 
@@ -149,26 +139,39 @@ class _Counts(wiring.Component):
         m = Module()
         m.submodules.tally = tally = Tally(self.skin)
         m.d.comb += [tally.taken.eq(self.taken), tally.row.eq(self.row)]
-        with m.If(self.taken & self.row.last):
-            m.d.sync += self.last_tag.eq(self.tag)
-        m.d.sync += self.cells.eq(self.cells + tally.moments.area)
-        with m.If(self.clear):
-            m.d.sync += self.cells.eq(0)
-        unexplained = Signal(moments_layout(self.derived))
-        for name in ("area", "sum_x", "sum_y"):
-            zone = Mux(self.zone_valid, self.zone[name], 0)
-            m.d.sync += unexplained[name].eq(unexplained[name] + tally.moments[name] - zone)
-        with m.If(self.clear):  # all rows are counted by then
-            m.d.sync += unexplained.eq(0)
-        m.d.comb += self.mismatch.eq(unexplained.as_value() != 0)
+        self._explain(m, tally)
         if self.skin.send == "on_change":
-            m.submodules.change = change = Change(self.skin)
-            m.d.comb += [
-                change.taken.eq(self.taken),
-                change.row.eq(self.row),
-                change.clear.eq(self.clear),
-                self.changed.eq(change.changed),
-            ]
+            self._watch_change(m)
         else:
             m.d.comb += self.changed.eq(1)
         return m
+
+    def _explain(self, m, tally):
+        """Cells are added as they are counted, zones subtracted as they pass; for these the counting holds."""
+        cells = Signal.like(self.cells)
+        unexplained = Signal(self.zone.shape())
+        m.d.comb += tally.hold.eq(self.zone_valid)
+        with m.If(~self.zone_valid):
+            m.d.sync += cells.eq(cells + tally.moments.area)
+        for name in ("area", "sum_x", "sum_y"):
+            less = self.zone_valid.replicate(len(self.zone[name]))
+            share = Mux(self.zone_valid, self.zone[name], tally.moments[name])
+            # One adder does both: minus a number is plus its complement and one.
+            m.d.sync += unexplained[name].eq(
+                (Cat(self.zone_valid, unexplained[name]) + Cat(self.zone_valid, share ^ less))[1:]
+            )
+        ended = Signal()
+        m.d.sync += ended.eq(self.ends | ended & tally.busy)
+        with m.If(ended & ~tally.busy):
+            m.d.sync += [
+                self.cells.eq(cells),
+                self.mismatch.eq(unexplained.as_value() != 0),
+                cells.eq(0),
+                unexplained.eq(0),
+            ]
+
+    def _watch_change(self, m):
+        m.submodules.change = change = Change(self.skin)
+        m.d.comb += [change.taken.eq(self.taken), change.row.eq(self.row), change.clear.eq(self.ends)]
+        with m.If(self.ends):
+            m.d.sync += self.changed.eq(change.changed)

@@ -71,7 +71,9 @@ class Debounce(wiring.Component):
         last = Signal()
         busy = Signal()
         # Three clocks a column, overlapped: read its word, work out the next one, write it.
-        decide, store, finish = Signal(), Signal(), Signal()
+        decide = Signal()
+        store = Signal()
+        finish = Signal()
         address, store_address = Signal.like(write.addr), Signal.like(write.addr)
         m.d.comb += [
             read.addr.eq(Cat(column[:column_bits], row[:row_bits])),

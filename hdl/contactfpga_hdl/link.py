@@ -9,7 +9,7 @@ from contactfpga import protocol
 from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.pack import Packer
-from contactfpga_hdl.payloads import item_layout, summary_layout
+from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
 
 class Link(wiring.Component):
@@ -24,13 +24,13 @@ class Link(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._region = self.derived.max_stored_bytes + self.derived.max_stored_bytes % 2
         self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
-        self._depth = 3 * self._region + len(self._hello)
-        self.packer = Packer(skin, address_bits=(self._depth - 1).bit_length())
+        self._offset_bits = max(self.derived.max_stored_bytes, len(self._hello)).bit_length()
+        self.packer = Packer(skin, self._offset_bits)
         super().__init__(
             {
                 "items": In(stream.Signature(item_layout(self.derived))),
+                "tag": In(tag_layout()),
                 "summary": In(summary_layout(self.derived)),
                 "received": In(1),
                 "bytes": Out(stream.Signature(8)),
@@ -50,6 +50,7 @@ class Link(wiring.Component):
             packer.items.payload.eq(backlog.r_data),
             packer.items.valid.eq(backlog.r_rdy),
             backlog.r_en.eq(packer.items.ready),
+            packer.tag.eq(self.tag),
             packer.summary.eq(self.summary),
         ]
         self._take_frame = Signal()  # the wire takes the waiting frame
@@ -62,45 +63,43 @@ class Link(wiring.Component):
 
     def _place_frames(self, m):
         """Which region is written, waits, or is on the wire."""
-        filling, waiting, sending = Signal(2, init=0), Signal(2, init=1), Signal(2, init=2)
-        bases = Array(region * self._region for region in range(3))
-        self._waiting_base = bases[waiting]
-        self._waiting_end = Signal.like(self.packer.end)
+        self._filling = Signal(2, init=0)
+        waiting = Signal(2, init=1)
+        self._sending = Signal(2, init=2)
+        self._waiting_end = Signal(self._offset_bits)
         with m.If(self._take_frame):
-            m.d.sync += [self._waits.eq(0), sending.eq(waiting), waiting.eq(sending)]
+            m.d.sync += [self._waits.eq(0), self._sending.eq(waiting), waiting.eq(self._sending)]
         with m.If(self.packer.decide & self.packer.verdict.send):
             m.d.sync += self._waits.eq(0)
         with m.If(self.packer.commit):
             m.d.sync += [
                 self._waits.eq(1),
                 self._waiting_end.eq(self.packer.end),
-                waiting.eq(filling),
-                filling.eq(waiting),
+                waiting.eq(self._filling),
+                self._filling.eq(waiting),
             ]
-        m.d.comb += self.packer.base.eq(Mux(self.packer.commit, bases[waiting], bases[filling]))
 
     def _decide(self, m):
         """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known."""
         verdict = self.packer.verdict
-        tag = self.summary.tag
         sent = Signal(SEQUENCE_BITS)
         overwritten = Signal(self.derived.overwritten_bits)
-        waiting_requested = Signal()
+        requested = Signal()
         drops = self._waits & ~self._take_frame
         m.d.comb += [
-            verdict.sequence.eq(sent + self._take_frame),
-            verdict.overwritten.eq(overwritten + drops),
-            verdict.requested.eq(tag.requested | drops & waiting_requested),
+            verdict.sequence.eq(sent),
+            verdict.overwritten.eq(overwritten),
+            verdict.requested.eq(requested),
             verdict.send.eq(1),
         ]
-        m.d.sync += sent.eq(verdict.sequence)
+        m.d.sync += sent.eq(sent + self._take_frame)
         with m.If(self.packer.decide & verdict.send):
-            m.d.sync += [overwritten.eq(verdict.overwritten), waiting_requested.eq(verdict.requested)]
+            m.d.sync += [overwritten.eq(overwritten + drops), requested.eq(self.tag.requested | drops & requested)]
         if self.skin.send == "on_change":
             keep_alive = self.derived.keep_alive_frames
             idle = Signal(range(keep_alive), init=keep_alive - 1)  # frames since the last one sent
             due = idle == keep_alive - 1
-            m.d.comb += verdict.send.eq(self.summary.changed | tag.requested | due)
+            m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | due)
             with m.If(self.packer.decide):
                 m.d.sync += idle.eq(Mux(verdict.send, 0, idle + 1))
 
@@ -119,31 +118,38 @@ class Link(wiring.Component):
             m.d.sync += self._hello_due.eq(1)
 
     def _send(self, m):
-        init = [0] * (3 * self._region) + list(self._hello)
-        m.submodules.store = store = memory.Memory(shape=8, depth=self._depth, init=init)
+        region = 1 << self._offset_bits
+        hello = 3 * region
+        m.submodules.store = store = memory.Memory(
+            shape=8, depth=hello + len(self._hello), init=[0] * hello + list(self._hello)
+        )
         read, write = store.read_port(), store.write_port()
+        offset = Signal(self._offset_bits)
+        end = Signal(self._offset_bits)
+        sends_hello = Signal()
         m.d.comb += [
             write.en.eq(self.packer.write.en),
-            write.addr.eq(self.packer.write.addr),
+            write.addr.eq(Cat(self.packer.write.offset, self._filling)),
             write.data.eq(self.packer.write.data),
+            read.addr.eq(Cat(offset, Mux(sends_hello, 3, self._sending))),
         ]
-        address = Signal.like(read.addr)
-        end = Signal.like(self.packer.end)
-        m.d.comb += read.addr.eq(address)
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         tail = Signal(range(CHECK_BYTES + 1))
         m.d.comb += [check.data.eq(read.data), check.start.eq(self._take_hello | self._take_frame)]
         with m.FSM(name="wire"):
             with m.State("IDLE"):
                 m.d.comb += [self._take_hello.eq(self._hello_due), self._take_frame.eq(self._waits & ~self._hello_due)]
-                with m.If(self._take_hello):
-                    m.d.sync += [address.eq(3 * self._region), end.eq(self._depth - 1)]
-                    m.next = "FETCH"
-                with m.Elif(self._take_frame):
-                    m.d.sync += [address.eq(self._waiting_base), end.eq(self._waiting_end - 1)]
+                m.d.sync += [
+                    sends_hello.eq(self._hello_due),
+                    end.eq(Mux(self._hello_due, len(self._hello), self._waiting_end)),
+                    offset.eq(0),
+                ]
+                with m.If(self._hello_due | self._waits):
                     m.next = "FETCH"
             with m.State("FETCH"):
                 m.next = "BYTE"
+                with m.If(offset == end):
+                    m.next = "TAIL"
             with m.State("BYTE"):
                 m.d.comb += [
                     self.bytes.valid.eq(1),
@@ -151,10 +157,8 @@ class Link(wiring.Component):
                     check.valid.eq(self.bytes.ready),
                 ]
                 with m.If(self.bytes.ready):
-                    m.d.sync += [address.eq(address + 1), tail.eq(0)]
+                    m.d.sync += [offset.eq(offset + 1), tail.eq(0)]
                     m.next = "FETCH"
-                    with m.If(address == end):
-                        m.next = "TAIL"
             with m.State("TAIL"):
                 # The CRC in pieces of seven bits, so that none of its bytes is zero.
                 closing = [Cat(check.crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)]

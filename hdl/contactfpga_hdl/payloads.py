@@ -34,7 +34,6 @@ def summary_layout(derived: Derived) -> data.StructLayout:
     """What a frame's trailer says of it, valid when its end mark is packed."""
     return data.StructLayout(
         {
-            "tag": tag_layout(),
             "cells": derived.area_bits,
             "zones": derived.zones_bits,
             "overflow": 1,

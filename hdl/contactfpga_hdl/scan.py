@@ -1,23 +1,26 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
-from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import STUCK_MAX, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
+from contactfpga_hdl.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
+from contactfpga_hdl.popcount import popcount
+from contactfpga_hdl.shift import ColumnChain, RowChain
 
 
 class Scanner(wiring.Component):
     """Raster scan: a row a settle time, then a release time with no row driven.
 
-    A row's columns are sampled at the pins in the last clock it is driven and offered three clocks later
-    (two synchroniser stages and the row register). ``contact`` rises with the offer of the first row that holds a
-    pressed switch and falls with the last row of a scan without one. ``tag`` belongs to the frame whose last row is
-    being offered and holds until the next frame's first sample. A ``request`` is answered by ``requested`` in the tag
-    of the next frame to start.
+    A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchroniser
+    stages and the row register), and later by what its columns take on shift registers. ``contact`` rises with the
+    offer of the first row that holds a pressed switch and falls with the last row of a scan without one. ``tag``
+    belongs to the frame whose last row was offered; it is complete one clock after that and holds until the next
+    frame's last row. A ``request`` is answered by ``requested`` in the tag of the next frame to start. ``pins`` are
+    those of the row driver and of the column reader.
     """
 
     def __init__(self, skin: Skin):
@@ -25,7 +28,7 @@ class Scanner(wiring.Component):
         self.derived = Derived(skin)
         super().__init__(
             {
-                "pins": Out(wiring.Signature({"rows": Out(skin.rows), "columns": In(skin.columns)})),
+                "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
                 "rows": Out(stream.Signature(row_layout(self.derived))),
                 "tag": Out(tag_layout()),
                 "request": In(1),
@@ -35,55 +38,73 @@ class Scanner(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
+        self._connect_pins(m)
         self._drive_rows(m)
-        self._strobe(m)
-        self._read_columns(m)
+        self._sample_columns(m)
+        self._mask_row(m)
         self._offer_row(m)
         self._watch_contact(m)
         self._watch_stuck(m)
         self._tag_frame(m)
         return m
 
-    def _drive_rows(self, m):
-        """The pins come from registers, so that no row is selected by a glitch."""
-        derived = self.derived
-        clock = Signal(range(derived.row_clocks))
-        turn = Signal(self.skin.rows, init=1)  # the row whose slot it is, one-hot
-        selected = Signal(self.skin.rows, init=1)  # the same while it is driven
-        self._ends_settle = clock == derived.settle_clocks - 1
-        self._ends_release = clock == derived.row_clocks - 1
-        m.d.sync += clock.eq(clock + 1)
-        with m.If(self._ends_release):
-            following = turn.rotate_left(1)
-            m.d.sync += [clock.eq(0), turn.eq(following), selected.eq(following)]
-        with m.If(self._ends_settle):
-            m.d.sync += selected.eq(0)
-        m.d.comb += self.pins.rows.eq(~selected if self.skin.diodes == "col2row" else selected)
+    def _connect_pins(self, m):
+        skin = self.skin
+        self._driver = DirectRows(skin) if skin.row_drive == "direct" else RowChain(skin)
+        self._reader = DirectColumns(skin) if skin.column_read == "direct" else ColumnChain(skin)
+        m.submodules.driver, m.submodules.reader = self._driver, self._reader
+        connect_pins(m, self._driver.pins, self.pins)
+        connect_pins(m, self._reader.pins, self.pins)
 
-    def _strobe(self, m):
-        """The slot's two sampling moments, delayed by the two synchroniser stages."""
-        settle = Signal(2)
-        release = Signal(2)
-        m.d.sync += [
-            settle.eq(Cat(self._ends_settle, settle[0])),
-            release.eq(Cat(self._ends_release, release[0])),
+    def _drive_rows(self, m):
+        """Slots follow each other; before the first one there is the time to shift its row."""
+        derived, driver = self.derived, self._driver
+        slot, shifting = derived.row_clocks, derived.row_shift_clocks
+        begun = int(not shifting)
+        self._clock = Signal(range(slot), init=(slot - shifting) % slot)
+        self._scans = Signal(init=begun)  # in the first slot and after it
+        following = Signal(self.skin.rows, init=1 << begun % self.skin.rows)  # the row of the next slot, one-hot
+        self._in_last_slot = following[0] & self._scans
+        ends = self._clock == slot - 1
+        m.d.sync += self._clock.eq(self._clock + 1)
+        with m.If(ends):
+            m.d.sync += [self._clock.eq(0), self._scans.eq(1), following.eq(following.rotate_left(1))]
+        m.d.comb += [
+            driver.pattern.eq(following),
+            driver.shift.eq(self._clock == slot - shifting),
+            driver.drive.eq(ends),
+            driver.release.eq(self._clock == derived.settle_clocks - 1),
         ]
-        self._sampled = settle[1]
-        self._released = release[1]
-        self._row = Signal(range(max(2, self.skin.rows)))
+
+    def _sample_columns(self, m):
+        """A slot has two samples: in the last clock its row is driven, and in the last one that no row is."""
+        derived, reader = self.derived, self._reader
+        lead = derived.column_load_clocks + 1
+        self._begins_row = Signal()
+        begins_released = Signal()
+        done_is_row = Signal(init=1)  # the two come in turn
+        self._sampled = Signal()
+        self._released = Signal()
+        m.d.comb += [
+            self._begins_row.eq(self._scans & (self._clock == derived.settle_clocks - lead)),
+            begins_released.eq(self._scans & (self._clock == derived.row_clocks - lead)),
+            reader.begin.eq(self._begins_row | begins_released),
+            self._sampled.eq(reader.done & done_is_row),
+            self._released.eq(reader.done & ~done_is_row),
+        ]
+        m.d.sync += done_is_row.eq(done_is_row ^ reader.done)
+        self._row = Signal(range(max(2, self.skin.rows)))  # the next to be sampled
         self._first = self._row == 0
         self._last = self._row == self.skin.rows - 1
         with m.If(self._sampled):
             m.d.sync += self._row.eq(Mux(self._last, 0, self._row + 1))
 
-    def _read_columns(self, m):
-        inactive = (1 << self.skin.columns) - 1 if self.skin.diodes == "col2row" else 0
-        synced = Signal(self.skin.columns, init=inactive)
-        m.submodules.sync_columns = FFSynchronizer(self.pins.columns, synced, init=inactive)
+    def _mask_row(self, m):
+        levels = self._reader.levels
         self._columns = Signal(self.skin.columns)
         self._pressed = Signal(self.skin.columns)
         m.d.comb += [
-            self._columns.eq(~synced if self.skin.diodes == "col2row" else synced),
+            self._columns.eq(~levels if self.skin.diodes == "col2row" else levels),
             self._pressed.eq(self._columns),
         ]
         with m.Switch(self._row):
@@ -118,22 +139,38 @@ class Scanner(wiring.Component):
             if any((row, c) not in self.skin.mask for row in range(self.skin.rows))
         )
         stuck = Signal(self.skin.columns)
-        count = sum(stuck[1:], stuck[0])
         with m.If(self._released):
             m.d.sync += stuck.eq(stuck | self._columns & present)
+        # Counted in two clocks, as 64 columns are too many for one.
+        groups = [stuck[first : first + 8] for first in range(0, self.skin.columns, 8)]
+        counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
         with m.If(self._sampled & self._last):
-            m.d.sync += [stuck.eq(0), self.tag.stuck.eq(Mux(count > STUCK_MAX, STUCK_MAX, count))]
+            m.d.sync += [stuck.eq(0), *(count.eq(popcount(group)) for count, group in zip(counts, groups))]
+        total = popcount(counts)
+        m.d.sync += self.tag.stuck.eq(Mux(total > STUCK_MAX, STUCK_MAX, total))
 
     def _tag_frame(self, m):
-        per_us = self.derived.clocks_per_us
-        prescaler = Signal(range(max(2, per_us)))
-        time = Signal(TIME_BITS)
-        with m.If(prescaler == per_us - 1):
-            m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
-        with m.Else():
+        """Time and request at the first row's sample; the tag takes them over with the last row's strobe."""
+        per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
+        # The clock starts with the first slot of the last row, to tell at its strobe what it was at the first row's
+        # sample: so no register has to keep that.
+        ahead = self.derived.row_shift_clocks - late
+        prescaler = Signal(range(max(2, per_us)), init=ahead % per_us)
+        time = Signal(TIME_BITS, init=ahead // per_us % (1 << TIME_BITS))
+        runs = Signal()
+        with m.If(self._in_last_slot):
+            m.d.sync += runs.eq(1)
+        with m.If(runs | self._in_last_slot):
             m.d.sync += prescaler.eq(prescaler + 1)
-        waiting = Signal()
-        with m.If(self._sampled & self._first):
-            m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(waiting), waiting.eq(self.request)]
+            with m.If(prescaler == per_us - 1):
+                m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
+        waiting, requested = Signal(), Signal()
+        # What comes while columns are shifted in came after their sample: it asks for the next frame.
+        begins = (self._begins_row if late else self._sampled) & self._first
+        asked = requested if late else Mux(begins, waiting, requested)
+        with m.If(begins):
+            m.d.sync += [requested.eq(waiting), waiting.eq(self.request)]
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
+        with m.If(self._sampled & self._last):
+            m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked)]

@@ -1,5 +1,7 @@
 """What a row holds and whether it changed, seen before the labeller and apart from it."""
 
+import math
+
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import memory, wiring
 from amaranth.lib.wiring import In, Out
@@ -7,42 +9,70 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import moments_layout, row_layout
+from contactfpga_hdl.popcount import popcount
+
+GROUPS = 4
+"""The most groups of a row. Each of a row's steps may hold up the counting, and the next row comes six clocks later."""
 
 
 class Tally(wiring.Component):
-    """Moments of each row, for the one clock that lies two behind ``taken``; otherwise zero."""
+    """Moments of each row, a group of columns a clock.
+
+    The groups' shares come from two clocks behind ``taken`` on, one in each clock without ``hold``; before and after,
+    they are zero. A row has at most :data:`GROUPS`. No other may be taken until ``busy`` falls, behind the last one.
+    """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
+        self._columns = 4  # of a group; a power of two
+        while skin.columns > GROUPS * self._columns:
+            self._columns *= 2
+        self._groups = math.ceil(skin.columns / self._columns)
         super().__init__(
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
                 "moments": Out(moments_layout(self.derived)),
+                "hold": In(1),
+                "busy": Out(1),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        columns = self.skin.columns
-        cells = Signal(columns)
-        counting = Signal()
+        cells = Signal(self._groups * self._columns)
+        left = Signal(range(self._groups + 2))  # groups to come, and the one that is being added
         y = Signal(range(max(2, self.skin.rows)))
         y_next = Signal.like(y)
-        y_counted = Signal.like(y)
+        first = Signal(range(max(2, self._groups * self._columns)))  # column of the group
+        group = cells[: self._columns]
+        area = Signal(range(self._columns + 1))
+        offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
+        first_counted = Signal.like(first)
         with m.If(self.taken):
-            m.d.sync += [cells.eq(self.row.cells), y.eq(y_next), y_next.eq(Mux(self.row.last, 0, y_next + 1))]
-        area = Signal(range(columns + 1))
-        # Column numbers are summed bit by bit: for each bit, how many pressed columns have it in their number.
-        weighted = [
-            _count(cells[x] for x in range(columns) if x >> bit & 1) << bit for bit in range((columns - 1).bit_length())
+            m.d.sync += [
+                cells.eq(self.row.cells),
+                first.eq(0),
+                left.eq(self._groups + 1),
+                y.eq(y_next),
+                y_next.eq(Mux(self.row.last, 0, y_next + 1)),
+            ]
+        with m.Elif(self.busy & ~self.hold):
+            m.d.sync += [
+                cells.eq(cells >> self._columns),
+                first.eq(first + self._columns),
+                left.eq(left - 1),
+                area.eq(popcount(group)),
+                offsets.eq(_count_offsets(group)),
+                first_counted.eq(first),
+            ]
+        m.d.comb += [
+            self.busy.eq(left != 0),
+            self.moments.area.eq(area),
+            self.moments.sum_x.eq(area * first_counted + offsets),
+            self.moments.sum_y.eq(area * y),
         ]
-        m.d.comb += area.eq(_count(cells))
-        m.d.sync += [counting.eq(self.taken), self.moments.area.eq(0), self.moments.sum_x.eq(0), y_counted.eq(y)]
-        with m.If(counting):
-            m.d.sync += [self.moments.area.eq(area), self.moments.sum_x.eq(sum(weighted))]
-        m.d.comb += self.moments.sum_y.eq(self.moments.area[: len(area)] * y_counted)
         return m
 
 
@@ -73,10 +103,9 @@ class Change(wiring.Component):
         return m
 
 
-def _count(bits):
-    """How many of the bits are set, as a balanced tree of adders."""
-    numbers = list(bits)
-    while len(numbers) > 1:
-        pairs = [a + b for a, b in zip(numbers[::2], numbers[1::2], strict=False)]
-        numbers = pairs + numbers[len(pairs) * 2 :]
-    return numbers[0] if numbers else 0
+def _count_offsets(bits):
+    """The numbers of the bits that are set, summed: for each bit of the numbers, how many have it."""
+    return sum(
+        popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
+        for place in range((len(bits) - 1).bit_length())
+    )

@@ -10,12 +10,17 @@ from contactfpga_hdl.audit import Audit, Bitmap
 from contactfpga_hdl.debounce import Debounce
 from contactfpga_hdl.label import RunLabeller
 from contactfpga_hdl.link import Link
+from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
 
 
 class Top(wiring.Component):
-    """Row and column pins in, UART and ``contact`` pins out.
+    """Row and column pins, UART and ``contact`` pin.
+
+    The pins at the sheet are ``rows`` and ``columns``, or those of the shift registers in their place, one data pin a
+    chain: ``row_data``, ``row_clock``, ``row_latch``, ``row_enable_n``; ``column_load_n``, ``column_clock``,
+    ``column_data``.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), and bytes.
@@ -26,8 +31,8 @@ class Top(wiring.Component):
         self.probes = probes
         derived = Derived(skin)
         ports = {
-            "rows": Out(skin.rows),
-            "columns": In(skin.columns),
+            **row_pins(skin),
+            **column_pins(skin),
             "tx": Out(1, init=1),
             "rx": In(1, init=1),
             "contact": Out(1),
@@ -58,13 +63,13 @@ class Top(wiring.Component):
         else:
             self._cells(m, rows, scan, link)
         wiring.connect(m, link.bytes, transmitter.bytes)
+        connect_pins(m, scan.pins, self)
         m.d.comb += [
-            self.rows.eq(scan.pins.rows),
-            scan.pins.columns.eq(self.columns),
             self.contact.eq(scan.contact),
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
             scan.request.eq(receiver.received),
+            link.tag.eq(scan.tag),
             link.received.eq(receiver.received),
         ]
         if self.probes:
@@ -88,7 +93,6 @@ class Top(wiring.Component):
         m.d.comb += [
             audit.taken.eq(rows.valid & rows.ready),
             audit.row.eq(rows.payload),
-            audit.tag.eq(scan.tag),
             link.summary.eq(audit.summary),
         ]
         if self.probes:
@@ -99,7 +103,7 @@ class Top(wiring.Component):
         m.submodules.bitmap = bitmap = Bitmap(self.skin)
         wiring.connect(m, rows, bitmap.rows)
         wiring.connect(m, bitmap.items, link.items)
-        m.d.comb += [bitmap.tag.eq(scan.tag), link.summary.eq(bitmap.summary)]
+        m.d.comb += link.summary.eq(bitmap.summary)
         if self.probes:
             item = bitmap.items.payload
             self._probe(m, "record", bitmap.items, data=item.data, end=item.end)

@@ -107,6 +107,7 @@ def _build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("board", metavar="BOARD", help=_BOARD)
     parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board)")
     parser.add_argument("--output", metavar="DIR", help="folder for what is built (default: build/BOARD)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="where place and route starts (default: 1)")
 
 
 def _flash(parser: argparse.ArgumentParser) -> None:

@@ -34,17 +34,50 @@ class Derived:
     def clocks_per_us(self) -> int:
         return self.skin.clock_hz // 1_000_000
 
+    def clocks(self, us: float) -> int:
+        """Clocks that last at least so many microseconds."""
+        return _whole(us * self.clocks_per_us)
+
     @property
     def settle_clocks(self) -> int:
-        return _whole(self.skin.settle_us * self.clocks_per_us)
+        """A row is driven so long: as asked, and until the columns of the slot before and the next row are shifted."""
+        row = self.row_shift_clocks - self.release_clocks
+        return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
     def release_clocks(self) -> int:
-        return _whole(self.skin.release_us * self.clocks_per_us)
+        """No row is driven so long: as asked, and until the columns are shifted and the next row is latched."""
+        column = self.column_load_clocks + self.column_shift_clocks
+        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks)
 
     @property
     def row_clocks(self) -> int:
         return self.settle_clocks + self.release_clocks
+
+    @property
+    def shift_clocks(self) -> int:
+        """A bit on a chain of shift registers; two at least, as its clock has to rise and fall."""
+        return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
+
+    @property
+    def row_latch_clocks(self) -> int:
+        """The pulse that puts a shifted row pattern on the outputs; 0 with direct rows."""
+        return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
+
+    @property
+    def row_shift_clocks(self) -> int:
+        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
+
+    @property
+    def column_load_clocks(self) -> int:
+        """The pulse that takes all columns at once, in whose last clock they are sampled; 0 with direct columns."""
+        return self.shift_clocks if self.skin.column_read == "74hc165" else 0
+
+    @property
+    def column_shift_clocks(self) -> int:
+        """How much later than direct ones the columns of a sample are known; 0 with direct columns."""
+        return self.column_chain_lines * self.column_load_clocks
 
     @property
     def frame_clocks(self) -> int:
@@ -56,10 +89,11 @@ class Derived:
 
     @property
     def min_row_clocks(self) -> int:
-        """A row must last until debounce and labeller are done with the one before it, and a frame until
-        its items are packed."""
-        packing = self.max_stored_bytes + 4
-        return max(self.skin.columns + 6, 10, math.ceil(packing / self.skin.rows))
+        """A row must last until debounce and labeller are done with the one before it, and a frame until the one
+        before it is packed: the scanner's tag is kept for no longer."""
+        debouncing = 0 if self.skin.debounce == "none" else self.skin.columns + 3
+        packed = 1 + debouncing + self.max_steps + 3 + 2 + self.max_stored_bytes + 4
+        return max(self.skin.columns + 6, 10, math.ceil(packed / self.skin.rows))
 
     @property
     def keep_alive_frames(self) -> int:
@@ -152,12 +186,25 @@ class Derived:
         """The longest frame on the wire: with its check bytes and its delimiter."""
         return self.max_stored_bytes + CHECK_BYTES + 1
 
-    # ---- sizes of tables
+    # ---- sizes of tables and chains
+
+    @property
+    def row_chain_lines(self) -> int:
+        return math.ceil(self.skin.rows / self.skin.row_chains)
+
+    @property
+    def column_chain_lines(self) -> int:
+        return math.ceil(self.skin.columns / self.skin.column_chains)
 
     @functools.cached_property
     def open_zones(self) -> int:
         """The most zones two adjacent rows can hold between them: C/2 with 8-connectivity, C with 4."""
         return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
+
+    @property
+    def max_steps(self) -> int:
+        """The most clocks, but one, that the labeller takes for a row."""
+        return self.open_zones if self.skin.report == "moments" else 0
 
     @functools.cached_property
     def backlog(self) -> int:

@@ -17,16 +17,22 @@ MAX_LINES = 64
 MAX_BAUD_ERROR = 0.015
 MAX_KEEP_ALIVE_MS = 100.0
 MAX_DEBOUNCE_SCANS = 4095
+SHIFT_HZ = 8_000_000
+MIN_SHIFT_HZ, MAX_SHIFT_HZ = 10_000, 50_000_000
 
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "surface": ("plane", "cylinder"),
     "connectivity": (4, 8),
     "diodes": ("col2row", "row2col"),
     "scan": ("raster",),
+    "row_drive": ("direct", "74hc595"),
+    "column_read": ("direct", "74hc165"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
 }
+
+_WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "clock_hz", "baud")
 
 
 class SkinError(ContactFPGAError, ValueError):
@@ -66,6 +72,17 @@ class Skin:
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
     """Time without a driven row before the next one, in us."""
+    row_drive: str = "direct"
+    """``direct``: a pin a row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
+    row_chains: int = 1
+    """Chains of 74HC595 that are shifted at once; chain j drives rows j n to j n + n - 1, n = ceil(rows / chains)."""
+    column_read: str = "direct"
+    """``direct``: a pin a column; ``74hc165``: columns on shift registers, which settle and release may have to wait
+    for."""
+    column_chains: int = 1
+    """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
+    shift_hz: int = SHIFT_HZ
+    """The shift clock in Hz at most; it is clock_hz divided by a whole number, at least 2."""
     debounce: str = "none"
     """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
     debounce_press_us: float = 5000.0
@@ -148,7 +165,7 @@ class Skin:
             value = getattr(self, name)
             if value not in choices or isinstance(value, bool):
                 raise SkinError(f"{name} is {value!r}; it must be one of {', '.join(map(repr, choices))}")
-        for name in ("rows", "columns", "clock_hz", "baud", "zone_capacity"):
+        for name in (*_WHOLE, "zone_capacity"):
             value = getattr(self, name)
             if value is None and name == "zone_capacity":
                 continue
@@ -170,6 +187,7 @@ class Skin:
         for name in ("pitch_x_mm", "pitch_y_mm"):
             _within(name, getattr(self, name), 0.01, 1000.0, "mm")
         self._check_mask()
+        self._check_registers()
         if self.surface == "plane":
             if self.radius_mm is not None:
                 raise SkinError(f"radius_mm is {self.radius_mm}; a plane has none, leave it out")
@@ -203,6 +221,27 @@ class Skin:
             raise SkinError(f"mask lists all {len(set(cells))} switches; at least one must be left")
         object.__setattr__(self, "mask", tuple(sorted(set(cells))))
 
+    def _check_registers(self) -> None:
+        for kind, wiring, registers in (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165")):
+            lines, chains = getattr(self, f"{kind}s"), getattr(self, f"{kind}_chains")
+            if getattr(self, wiring) == "direct":
+                if chains != 1:
+                    raise SkinError(f"{kind}_chains is {chains}; leave it out, or set {wiring} = '{registers}'")
+                continue
+            _within(f"{kind}_chains", chains, 1, lines)
+            length = math.ceil(lines / chains)
+            filled = math.ceil(lines / length)
+            if filled < chains:
+                raise SkinError(
+                    f"{kind}_chains is {chains}; {lines} {kind}s in chains of {length} fill {filled}, set "
+                    f"{kind}_chains = {filled}"
+                )
+        _within("shift_hz", self.shift_hz, MIN_SHIFT_HZ, MAX_SHIFT_HZ, "Hz")
+        if self.row_drive == self.column_read == "direct" and self.shift_hz != SHIFT_HZ:
+            raise SkinError(
+                f"shift_hz is {self.shift_hz}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
+            )
+
     def _check_link(self) -> None:
         if self.clock_hz % 1_000_000 or not 1_000_000 <= self.clock_hz <= 400_000_000:
             raise SkinError(f"clock_hz is {self.clock_hz}; it must be a whole number of MHz from 1 to 400 MHz")
@@ -227,8 +266,8 @@ class Skin:
             _within(name, getattr(self, name), 0.0, 10_000.0, "us")
         derived = Derived(self)
         megahertz = self.clock_hz // 1_000_000
-        for name, clocks in (("settle_us", derived.settle_clocks), ("release_us", derived.release_clocks)):
-            if clocks < 1:
+        for name in ("settle_us", "release_us"):
+            if derived.clocks(getattr(self, name)) < 1:
                 raise SkinError(f"{name} is {getattr(self, name)}; it must be at least one clock, {1 / megahertz:g} us")
         if derived.row_clocks < derived.min_row_clocks:
             raise SkinError(

@@ -25,13 +25,15 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
     stimulus = Stimulus(skin, timeline)
     levels = Cat(*(getattr(top, name) for name in LEVELS))
     payloads = [getattr(top, name) for name in PAYLOADS]
+    reads = {name: getattr(top, name) for name in stimulus.reads}
+    drives = Cat(*(getattr(top, name) for name in stimulus.drives))
+    above = len(getattr(top, stimulus.drives[0]))
     deadline = time.monotonic() + limit_s
 
     async def bench(ctx):
         for cycle in range(cycles):
-            columns, rx = stimulus.pins(cycle, ctx.get(top.rows))
-            ctx.set(top.columns, columns)
-            ctx.set(top.rx, rx)
+            sheet, rx = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
+            ctx.set(drives, sheet | rx << above)
             _, _, level, *values = await ctx.tick().sample(levels, *payloads)
             recorder.note(cycle, level, dict(zip(PAYLOADS, values, strict=True)).__getitem__)
             if cycle % 256 == 0 and time.monotonic() > deadline:

@@ -2,32 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from contactfpga.skin import Skin
+from contactfpga_sim import native
 from contactfpga_sim.board import Board
 from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
 
 
-def run(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
-    """What the compiled board does in cycles 0 to ``cycles`` - 1."""
-    with Board(skin, BOUNDARIES) as board:
-        changes = {cycle: (cells, stuck) for cycle, cells, stuck in timeline.pieces}
-        requests = set(timeline.requests)
-        moments = sorted(cycle for cycle in {*changes, *requests} if cycle < cycles)
-        for now, until in zip(moments, [*moments[1:], cycles]):
-            board.run(now - board.cycle)
-            if now in changes:
-                cells, stuck = changes[now]
-                board.press(cells)
-                board.stick(stuck)
-            if now in requests:
-                board.send(b"\x01")
-            board.run(until - now)
-        board.run(cycles - board.cycle)
-        trace = Trace(cycles)
-        for name in BOUNDARIES:
-            events = board.take(name)
-            columns = [events["cycle"].tolist(), events["data"].tolist()]
-            if name in ("rows", "records"):
-                columns.append(events["mark"].astype(bool).tolist())
-            setattr(trace, name, list(zip(*columns)))
-    return trace
+def run(skin: Skin, timeline: Timeline, cycles: int, model: native.Model | None = None) -> Trace:
+    """What the compiled board does in cycles 0 to ``cycles`` - 1; ``model`` as in :class:`Board`."""
+    with Board(skin, BOUNDARIES, model) as board:
+        play(board, timeline, cycles)
+        return trace({name: board.take(name) for name in BOUNDARIES}, cycles)
+
+
+def play(board: Board, timeline: Timeline, until: int) -> None:
+    """Let the board live through the timeline from the cycle it is at up to cycle ``until`` - 1."""
+    changes = {cycle: (cells, stuck) for cycle, cells, stuck in timeline.pieces}
+    requests = set(timeline.requests)
+    for now in sorted(cycle for cycle in {*changes, *requests} if board.cycle <= cycle < until):
+        board.run(now - board.cycle)
+        if now in changes:
+            cells, stuck = changes[now]
+            board.press(cells)
+            board.stick(stuck)
+        if now in requests:
+            board.send(bytes([now % 256]))  # any byte is the same request
+    board.run(until - board.cycle)
+
+
+def trace(events: Mapping[str, np.ndarray], cycles: int) -> Trace:
+    """The trace of a board that ran ``cycles``, from its events (dtype ``EVENT``) at each boundary."""
+    result = Trace(cycles)
+    for name in BOUNDARIES:
+        columns = [events[name]["cycle"].tolist(), events[name]["data"].tolist()]
+        if name in ("rows", "records"):
+            columns.append(events[name]["mark"].astype(bool).tolist())
+        setattr(result, name, list(zip(*columns)))
+    return result

@@ -17,13 +17,14 @@ from contactfpga_sim.cells import to_words
 if TYPE_CHECKING:
     import argparse
 
-BOUNDARIES = ("rows", "records", "bytes", "line", "contact", "received")
-"""What a board notes: transfers of rows, zone records and bytes, changes of the transmit and of the contact pin,
-and bytes decoded from the line. The order is that of the driver."""
+BOUNDARIES = ("rows", "records", "bytes", "line", "contact", "driven", "received")
+"""What a board notes: transfers of rows, zone records and bytes, changes of the transmit and of the contact pin and
+of the rows that are driven, and bytes decoded from the line. The order is that of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte or the level; and for a row whether it is the frame's last, for a record whether it is the end mark."""
+wire, the byte, the level or the driven rows; and for a row whether it is the frame's last, for a record whether it is
+the end mark."""
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -32,13 +33,14 @@ CHUNK_S = 0.2e-3
 class Board:
     """A compiled board, stepped by the clock. Cycle 0 is the first after power-up, as in docs/timing.md.
 
-    ``capture`` names the :data:`BOUNDARIES` to note, besides ``received``. The first Board of a Skin takes some
-    seconds to build (:mod:`contactfpga_sim.native`, also for what can go wrong).
+    ``capture`` names the :data:`BOUNDARIES` to note, besides ``received``. ``model`` is the gateware, by default what
+    :func:`model_of` says. The first Board of a Skin takes some seconds to build (:mod:`contactfpga_sim.native`, also
+    for what can go wrong).
     """
 
-    def __init__(self, skin: Skin, capture: Iterable[str] = ()):
+    def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
         self.skin = skin
-        self._library = _library(skin)
+        self._library = _library(model or model_of(skin))
         self._board = ctypes.c_void_p(self._library.board_new())
         captured = sum(1 << BOUNDARIES.index(name) for name in set(capture))
         self._library.board_capture(self._board, ctypes.c_uint(captured))
@@ -56,6 +58,10 @@ class Board:
     def press(self, cells: np.ndarray) -> None:
         """From the next cycle on these (rows, columns) bool cells are pressed."""
         self.hold(cells[None], 0)
+
+    def restart(self, mutant: int = 0) -> None:
+        """Power up anew, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
+        self._library.board_restart(self._board, ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
         """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
@@ -161,24 +167,33 @@ def main(args: argparse.Namespace) -> int:
     return PtyBoard(skin, args.scene, link=args.link).serve()
 
 
-def _library(skin: Skin) -> ctypes.CDLL:
+def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
+    """What the board of a Skin is built from: its gateware, or a netlist with the gateware's pins and no probes,
+    which notes neither rows nor records nor bytes."""
+
     def elaborate() -> Any:
         from contactfpga_hdl.top import Top
 
-        return Top(skin, probes=True)
+        return netlist or Top(skin, probes=True)
 
-    model = native.Model(
-        title=f"the {skin.rows}x{skin.columns} board",
+    return native.Model(
+        title=f"the {skin.rows}x{skin.columns} board" + (" from its netlist" if netlist else ""),
         driver="board.cpp",
-        key=native.skin_key(skin),
+        key=netlist.key if netlist else native.skin_key(skin),
         elaborate=elaborate,
         defines={
             "ROWS": skin.rows,
             "COLUMNS": skin.columns,
             "COL2ROW": int(skin.diodes == "col2row"),
+            "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
+            "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
             "BIT_CLOCKS": Derived(skin).bit_clocks,
+            "PROBES": int(netlist is None),
         },
     )
+
+
+def _library(model: native.Model) -> ctypes.CDLL:
     library = native.load(model)
     library.board_new.restype = ctypes.c_void_p
     library.board_cycle.restype = ctypes.c_uint64

@@ -23,11 +23,13 @@ async def record(dut) -> None:
     levels = [getattr(dut, name) for name in LEVELS]
     payloads = {name: getattr(dut, name) for name in PAYLOADS}
     deadline = time.monotonic() + job["limit_s"]
+    reads = {name: getattr(dut, name) for name in stimulus.reads}
+    drives = [getattr(dut, name) for name in stimulus.drives]
     driven = None
 
     dut.rst.value = 0
-    dut.rx.value = 1
-    dut.columns.value = 0
+    for handle in drives:
+        handle.value = 0
     dut.clk.value = 0
     await Timer(1, "ns")
     falling = FallingEdge(dut.clk)
@@ -36,9 +38,11 @@ async def record(dut) -> None:
             Clock(dut.clk, 10, "ns", impl="gpi").start(start_high=True)
         if cycle:
             await falling
-        pins = stimulus.pins(cycle, int(dut.rows.value))
+        pins = stimulus.pins(cycle, {name: int(handle.value) for name, handle in reads.items()})
         if pins != driven:
-            dut.columns.value, dut.rx.value = driven = pins
+            driven = pins
+            for handle, value in zip(drives, pins, strict=True):
+                handle.value = value
         level = sum(int(handle.value) << place for place, handle in enumerate(levels))
         recorder.note(cycle, level, lambda name: int(payloads[name].value))
         if cycle % 256 == 0 and time.monotonic() > deadline:

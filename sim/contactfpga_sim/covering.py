@@ -24,6 +24,9 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "capacity": ("default", "one", "half"),
     "surface": ("plane", "cylinder"),
     "link": ((12, 3_000_000), (12, 4_000_000), (1, 500_000), (50, 5_500_000)),
+    "row_chains": (0, 1, 3),  # of shift registers, 0 for none; at most so many
+    "column_chains": (0, 1, 3),
+    "shift_hz": (8_000_000, 5_000_000),
     "row_time": ("tight", "uneven", "long"),
     "keep_alive_scans": (1, 3, 1000),
 }
@@ -86,16 +89,29 @@ def skin_for(choice: dict[str, Any]) -> Skin:
         values["mask"] = ((rows - 1, 0), (0, columns - 1)) if rows * columns > 2 else ((0, 0),)
     elif columns > 1 and choice["mask"] == "column":
         values["mask"] = tuple((row, columns // 2) for row in range(rows))
+    values |= _registers(choice)
     most = Skin(rows=rows, columns=columns, connectivity=choice["connectivity"], settle_us=1000.0).max_zones()
     if choice["capacity"] != "default":
         values["zone_capacity"] = 1 if choice["capacity"] == "one" else -(-most // 2)
+    values |= {"debounce_press_us": 0.0, "debounce_release_us": 0.0}  # until the scan time is known
     settle, release = _row_time(values, choice["row_time"], megahertz)
     values |= {"settle_us": settle, "release_us": release}
-    scan_us = facts(Skin(**values | {"debounce": "none", "send": "always"})).scan_clocks / megahertz
+    scan_us = facts(Skin(**values | {"send": "always"})).scan_clocks / megahertz
     press, back = choice["debounce_scans"]
     values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
     values["keep_alive_ms"] = min(100.0, (choice["keep_alive_scans"] + 0.5) * scan_us / 1000)
     return Skin(**values)
+
+
+def _registers(choice: dict[str, Any]) -> dict[str, Any]:
+    """Which lines are on shift registers, in as many of the chains as they fill."""
+    values: dict[str, Any] = {}
+    kinds = (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165"))
+    for (kind, wiring, registers), lines in zip(kinds, choice["sheet"], strict=True):
+        if chains := choice[f"{kind}_chains"]:
+            length = -(-lines // chains)
+            values |= {wiring: registers, f"{kind}_chains": -(-lines // length), "shift_hz": choice["shift_hz"]}
+    return values
 
 
 def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float, float]:
@@ -104,7 +120,7 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
     for settle in range(1, 10_000):
         exact = (settle / megahertz, release / megahertz)
         try:
-            Skin(**values | {"settle_us": exact[0], "release_us": exact[1], "debounce": "none", "send": "always"})
+            Skin(**values | {"settle_us": exact[0], "release_us": exact[1], "send": "always"})
         except SkinError:
             continue
         if kind == "tight":

@@ -9,7 +9,7 @@ import argparse
 import math
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,6 +33,15 @@ SETTINGS = {
     "reference, 1 Mbaud": Skin(baud=1_000_000),
     "32x32": Skin(rows=32, columns=32),
     "64x64": Skin(rows=64, columns=64),
+    "64x64, 74HC595 and 74HC165, 4 us release": Skin(
+        rows=64,
+        columns=64,
+        release_us=4.0,
+        row_drive="74hc595",
+        row_chains=2,
+        column_read="74hc165",
+        column_chains=4,
+    ),
 }
 
 
@@ -141,21 +150,21 @@ def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
 TABLES: dict[str, Callable[[], str]] = {"reference": reference_table, "labeller": labeller_table}
 
 
-def update(text: str) -> str:
-    """The text of a page with each `<!-- figures: NAME -->` section measured anew."""
+def update(text: str, tables: Mapping[str, Callable[[], str]] = TABLES) -> str:
+    """The text of a page with each `<!-- figures: NAME -->` section that is in ``tables`` measured anew."""
 
     def measured(match: re.Match[str]) -> str:
-        return f"{match[1]}\n{TABLES[match[2]]()}\n{match[3]}"
+        return f"{match[1]}\n{tables[match[2]]()}\n{match[3]}" if match[2] in tables else match[0]
 
     return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", measured, text, flags=re.DOTALL)
 
 
-def main() -> int:
-    """Update the files named."""
+def main(tables: Mapping[str, Callable[[], str]] = TABLES) -> int:
+    """Update the files named on the command line."""
     parser = argparse.ArgumentParser(description="Measure the tables in these pages anew.")
     parser.add_argument("pages", type=Path, nargs="+")
     for page in parser.parse_args().pages:
-        page.write_text(update(page.read_text()))
+        page.write_text(update(page.read_text(), tables))
         print(f"measured {page}")
     return 0
 

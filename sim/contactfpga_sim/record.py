@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.matrix import Matrix
+from contactfpga_sim.shift import Sheet
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -27,22 +27,27 @@ class OutOfTime(RuntimeError):
 
 
 class Stimulus:
-    """Column and receive pin levels, cycle by cycle; cycles must be asked for in order."""
+    """What the sheet and the line give the board, cycle by cycle; cycles must be asked for in order.
+
+    ``reads`` names the top's outputs that this depends on, ``drives`` the inputs it gives.
+    """
 
     def __init__(self, skin: Skin, timeline: Timeline):
-        self._matrix = Matrix(skin)
+        self._sheet = Sheet(skin)
+        self.reads = self._sheet.reads
+        self.drives = (self._sheet.drives, "rx")
         self._pieces = list(reversed(timeline.pieces))
         self._bit_clocks = facts(skin).bit_clocks
         self._requests = list(reversed(timeline.requests))
         self._random = random.Random(0)
         self._start, self._bits = 0, 0
 
-    def pins(self, cycle: int, rows: int) -> tuple[int, int]:
-        """Levels of the columns (bit c is column c) and of the receive pin, given those of the rows."""
+    def pins(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, int]:
+        """Levels of ``drives``, given those of ``reads``."""
         if self._pieces and self._pieces[-1][0] <= cycle:
             _, cells, stuck = self._pieces.pop()
-            self._matrix.press(cells, stuck)
-        return self._matrix.levels(rows), self._rx(cycle)
+            self._sheet.matrix.press(cells, stuck)
+        return self._sheet.step(pins), self._rx(cycle)
 
     def _rx(self, cycle: int) -> int:
         if self._requests and self._requests[-1] == cycle:

@@ -33,7 +33,7 @@ class Join(wiring.Component):
                 "has_run": 1,  # in the new row, and then the numbers of the first and the last one
                 "first": range(self._runs),
                 "last": range(self._runs),
-                "place": range(derived.open_zones),  # of the last one in the table
+                "place": range(derived.open_zones),  # of the first one in the table
             }
         )
 
@@ -48,6 +48,7 @@ class Join(wiring.Component):
         earlier, later = self._brackets(m)
         pop = self.step.has_before & earlier & (current.open == 0)
         passed = self.step.has_before & ~later  # the last run of its zone
+        begun = self.step.has_before & ~earlier  # the first one
         joined = self._take_in(m, current, pop, stack.top)
         group = self._add_run(m, joined)
         m.d.comb += [
@@ -58,7 +59,7 @@ class Join(wiring.Component):
             stack.entry.eq(group),
         ]
         self._mark(m, current, pop, stack.top, joined)
-        join = self._decide(m, group, pop, passed)
+        join = self._decide(m, group, pop, begun)
         with m.If(self._works):
             m.d.sync += kept.eq(group)
         with m.If(self.enable):
@@ -70,7 +71,8 @@ class Join(wiring.Component):
 
         Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
         """
-        old_after, old_before = Signal(self._runs), Signal(self._runs)  # runs after one, before one, of the same zone
+        old_after = Signal(self._runs)  # runs after one of the same zone
+        old_before = Signal(self._runs)  # runs before one of the same zone
         self._after, self._before = Signal(self._runs), Signal(self._runs)  # the same in the new row, as known so far
         self._new_after, self._new_before = Signal(self._runs), Signal(self._runs)
         self._number = Signal(range(self._runs))  # of the step's new run
@@ -102,7 +104,7 @@ class Join(wiring.Component):
                 joined.has_run.eq(waiting.has_run | current.has_run),
                 joined.first.eq(Mux(waiting.has_run, waiting.first, current.first)),
                 joined.last.eq(Mux(current.has_run, current.last, waiting.last)),
-                joined.place.eq(Mux(current.has_run, current.place, waiting.place)),
+                joined.place.eq(Mux(waiting.has_run, waiting.place, current.place)),
             ]
         return joined
 
@@ -114,7 +116,7 @@ class Join(wiring.Component):
                 group.has_run.eq(1),
                 group.first.eq(Mux(joined.has_run, joined.first, self._number)),
                 group.last.eq(self._number),
-                group.place.eq(place_of(self.derived, self.step.start)),
+                group.place.eq(Mux(joined.has_run, joined.place, place_of(self.derived, self.step.start))),
             ]
         return group
 
@@ -131,7 +133,7 @@ class Join(wiring.Component):
             self._new_after.eq(self._after | bit(over, current.first) | bit(onto, self._number)),
         ]
 
-    def _decide(self, m, group, pop, passed):
+    def _decide(self, m, group, pop, begun):
         step = self.step
         closed = step.closes & (group.open == 0)
         join = Signal(self.join.shape())
@@ -139,7 +141,7 @@ class Join(wiring.Component):
             join.end.eq(step.end),
             join.closes.eq(step.closes),
             join.pop.eq(pop),
-            join.load.eq(passed),
+            join.load.eq(begun),
             join.push.eq(step.closes & (group.open != 0)),
             join.store.eq(closed & group.has_run),
             join.leaves.eq(step.end | closed & (step.final | ~group.has_run)),

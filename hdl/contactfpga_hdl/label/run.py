@@ -6,7 +6,7 @@ bits a run: whether a run of the same zone comes before it in its row, and wheth
 cross in the plane, so these bits nest like brackets, and a stack replaces equivalence tables: a zone that has more
 runs to the right waits on the stack, and the innermost one is always the next that is needed.
 
-A zone's moments lie in a table at the start column of its last run in the row (halved with 8-connectivity). Two
+A zone's moments lie in a table at the start column of its first run in the row (halved with 8-connectivity). Two
 runs of different zones in the same row, or in two adjacent rows, never share such a place, so the table
 cannot overflow and needs no allocation.
 """

@@ -37,9 +37,9 @@ class Sum(wiring.Component):
         kept = Signal(moments)
         group = Signal(moments)
         for name in ("area", "sum_x", "sum_y"):
-            waiting = Mux(join.pop, stack.top[name], 0)
-            loaded = Mux(join.load, read.data[name], 0)
-            m.d.comb += group[name].eq((kept[name] + join.run[name]) + (waiting + loaded))
+            # Only the first run of its zone loads, and only the later ones can find it on the stack.
+            before = Mux(join.pop, stack.top[name], Mux(join.load, read.data[name], 0))
+            m.d.comb += group[name].eq((kept[name] + join.run[name]) + before)
         with m.If(works):
             m.d.sync += kept.eq(group)
             with m.If(join.closes):

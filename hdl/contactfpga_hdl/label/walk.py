@@ -12,7 +12,7 @@ from contactfpga_hdl.payloads import row_layout
 def _split(m, bits):
     """The lowest bit that is set, alone, and the others."""
     lowest, others = Signal.like(bits), Signal.like(bits)
-    m.d.comb += [lowest.eq(bits & -bits), others.eq(bits & (bits - 1))]
+    m.d.comb += [others.eq(bits & (bits - 1)), lowest.eq(bits & ~others)]
     return lowest, others
 
 
@@ -42,11 +42,12 @@ class Walk(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         columns = self.derived.skin.columns
-        # Columns still to be walked: where runs start and stop, and where clusters end.
+        # Columns still to be walked: where runs start and stop, and where clusters behind the first one end.
         self._befores = Signal(columns)
         self._starts = Signal(columns)
         self._stops = Signal(columns)
         self._ends = Signal(columns)
+        self._inside = Signal(columns)  # all columns up to the end of the first cluster; none: no work
         self._last = Signal()
         self._y = Signal(self.step.y.shape())
         self._walk_clusters(m)
@@ -54,19 +55,17 @@ class Walk(wiring.Component):
         return m
 
     def _walk_clusters(self, m):
-        work = self._ends.any()
-        inside = Signal.like(self._ends)  # columns up to the end of the first cluster
+        work = self._inside[0]
+        inside = self._inside
         before, befores_left = _split(m, self._befores)
         start, starts_left = _split(m, self._starts)
         stop, stops_left = _split(m, self._stops)
-        _, ends_left = _split(m, self._ends)
         has_before = (self._befores & inside).any()
         has_run = (self._starts & inside).any()
         closes = Signal()
         opens = Signal(init=1)
         step = Signal.like(self.step)
         m.d.comb += [
-            inside.eq(self._ends ^ (self._ends - 1)),
             closes.eq(~(befores_left & inside).any() & ~(starts_left & inside).any()),
             step.end.eq(~work),
             step.has_before.eq(has_before),
@@ -76,7 +75,7 @@ class Walk(wiring.Component):
             step.stop.eq(_index(stop, len(step.stop))),
             step.opens.eq(opens),
             step.closes.eq(closes),
-            step.row_done.eq(closes & ~ends_left.any()),
+            step.row_done.eq(closes & ~self._ends.any()),
             step.y.eq(self._y),
             step.final.eq(self._last),
         ]
@@ -89,13 +88,13 @@ class Walk(wiring.Component):
             with m.If(has_run):
                 m.d.sync += [self._starts.eq(starts_left), self._stops.eq(stops_left)]
             with m.If(closes):
-                m.d.sync += self._ends.eq(ends_left)
+                self._next_cluster(m, self._ends)
 
     def _take_row(self, m):
         row = self.rows.payload
         before = Signal.like(row.cells)  # the row last taken, empty before a frame
         y_next = Signal.like(self._y)
-        work = self._ends.any()
+        work = self._inside[0]
         with m.If(self.enable & ~work):
             m.d.sync += self._last.eq(0)  # its end mark is on its way
         m.d.comb += self.rows.ready.eq(self.enable & ~work)
@@ -109,9 +108,17 @@ class Walk(wiring.Component):
                 self._befores.eq(before & ~(before << 1)),
                 self._starts.eq(row.cells & ~(row.cells << 1)),
                 self._stops.eq(row.cells & ~right_row),
-                self._ends.eq((row.cells | before) & ~joined),
                 self._last.eq(row.last),
                 self._y.eq(y_next),
                 before.eq(Mux(row.last, 0, row.cells)),
                 y_next.eq(Mux(row.last, 0, y_next + 1)),
             ]
+            ends = Signal(len(joined))
+            m.d.comb += ends.eq((row.cells | before) & ~joined)
+            self._next_cluster(m, ends)
+
+    def _next_cluster(self, m, ends):
+        """Of the clusters that end there, the first one is next."""
+        upto, others = Signal.like(self._ends), Signal.like(self._ends)
+        m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]
+        m.d.sync += [self._ends.eq(others), self._inside.eq(upto)]

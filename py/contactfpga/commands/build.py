@@ -17,11 +17,11 @@ def main(args: argparse.Namespace) -> int:
     skin = Skin.load(args.skin) if args.skin else board.skin
     folder = Path(args.output or default_folder(args.board))
     try:
-        report = build.build(skin, board, folder)
+        report = build.build(skin, board, folder, args.seed)
     except build.BuildFailed as error:
         raise ContactFPGAError(str(error)) from None
     print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
-    print(f"{'bitstream':12} {report.bitstream}")
+    print(f"{'bitstream':12} {boards.bitstream_path(board, folder).resolve()}")
     return 0
 
 

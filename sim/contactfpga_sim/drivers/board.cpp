@@ -1,16 +1,16 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
-// Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS.
+// Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
+// 0 for a netlist, which has the pins only. With MUTANTS the gateware has an input that picks a mutant.
 #include <deque>
 
 #include "clocked.h"
+#include "shift.h"
 
-enum Boundary { ROW, RECORD, BYTE, LINE, CONTACT, RECEIVED, BOUNDARIES };
+enum Boundary { ROW, RECORD, BYTE, LINE, CONTACT, DRIVEN, RECEIVED, BOUNDARIES };
 
 struct Event {
     uint64_t cycle, data, mark;
 };
-
-constexpr uint64_t mask(unsigned bits) { return bits == 64 ? ~0ull : (1ull << bits) - 1; }
 
 // A pressed switch passes the selecting level of its row to its column, and nothing else: the diode sees to that.
 class Matrix {
@@ -18,11 +18,12 @@ public:
     uint64_t pressed[ROWS] = {};
     uint64_t stuck = 0;
 
-    uint64_t levels(uint64_t row_pins) const {
-        uint64_t selected = (COL2ROW ? ~row_pins : row_pins) & mask(ROWS);
+    static uint64_t driven(uint64_t row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROWS); }
+
+    uint64_t levels(uint64_t driven) const {
         uint64_t reads = stuck;
-        for (; selected; selected &= selected - 1)
-            reads |= pressed[__builtin_ctzll(selected)];
+        for (; driven; driven &= driven - 1)
+            reads |= pressed[__builtin_ctzll(driven)];
         return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
     }
 };
@@ -88,36 +89,65 @@ private:
 };
 
 class Board {
+#if ROW_CHAINS
+    RowRegisters<ROWS, ROW_CHAINS> row_registers_;
+
+    uint64_t rows() {
+        const auto &top = model_.top;
+        const auto data = static_cast<uint64_t>(get(top.p_row__data));
+        const bool clock = get(top.p_row__clock), latch = get(top.p_row__latch), enable_n = get(top.p_row__enable__n);
+        return row_registers_.step(data, clock, latch, enable_n, COL2ROW ? mask(ROWS) : 0);
+    }
+#else
+    uint64_t rows() { return static_cast<uint64_t>(get(model_.top.p_rows)); }
+#endif
+
+#if COLUMN_CHAINS
+    ColumnRegisters<COLUMNS, COLUMN_CHAINS> column_registers_;
+
+    uint64_t read(uint64_t levels) {
+        return column_registers_.step(get(model_.top.p_column__load__n), get(model_.top.p_column__clock), levels);
+    }
+    auto &columns() { return model_.top.p_column__data; }
+#else
+    uint64_t read(uint64_t levels) { return levels; }
+    auto &columns() { return model_.top.p_columns; }
+#endif
+
 public:
     Matrix matrix;
     Sender sender;
     Reader reader;
     uint64_t cycle = 0;
     unsigned captured = 1u << RECEIVED;
+    unsigned mutant = 0;
     std::vector<Event> events[BOUNDARIES];
 
     void run(uint64_t cycles) {
         for (const uint64_t end = cycle + cycles; cycle < end; cycle++) {
             put(model_.top.p_rx, sender.level());
+#ifdef MUTANTS
+            put(model_.top.p_mutant, mutant);
+#endif
             model_.settle();
-            const auto rows = static_cast<uint64_t>(get(model_.top.p_rows));
-            const uint64_t levels = matrix.levels(rows);
+            const uint64_t driven = Matrix::driven(rows());
+            const uint64_t levels = read(matrix.levels(driven));
             if (levels != levels_) {
                 // Columns enter flip-flops only, so the second evaluation changes nothing but what those take.
-                put(model_.top.p_columns, levels_ = levels);
+                put(columns(), levels_ = levels);
                 model_.settle();
             }
-            watch();
+            watch(driven);
             model_.finish();
         }
     }
 
 private:
     Clocked model_;
-    uint64_t levels_ = 0;
+    uint64_t levels_ = 0, driven_ = 0;
     bool line_ = true, contact_ = false;
 
-    void watch() {
+    void watch(uint64_t driven) {
         auto &top = model_.top;
         const bool line = get(top.p_tx);
         uint8_t byte;
@@ -128,12 +158,16 @@ private:
         const bool contact = get(top.p_contact);
         if (contact != contact_)
             note(CONTACT, contact_ = contact, 0, cycle);
+        if (driven != driven_)
+            note(DRIVEN, driven_ = driven, 0, cycle);
+#if PROBES
         if (get(top.p_row__transfer))
             note(ROW, static_cast<uint64_t>(get(top.p_row__cells)), get(top.p_row__last), cycle);
         if (get(top.p_record__transfer))
             note(RECORD, static_cast<uint64_t>(get(top.p_record__data)), get(top.p_record__end), cycle);
         if (get(top.p_byte__transfer))
             note(BYTE, static_cast<uint64_t>(get(top.p_byte__data)), 0, cycle);
+#endif
     }
 
     void note(Boundary boundary, uint64_t data, uint64_t mark, uint64_t at) {
@@ -147,6 +181,13 @@ EXPORT void board_free(Board *board) { delete board; }
 EXPORT uint64_t board_cycle(Board *board) { return board->cycle; }
 EXPORT uint64_t board_broken(Board *board) { return board->reader.broken; }
 EXPORT void board_capture(Board *board, unsigned boundaries) { board->captured = boundaries | 1u << RECEIVED; }
+EXPORT void board_restart(Board *board, unsigned mutant) {
+    const unsigned captured = board->captured;
+    board->~Board();
+    new (board) Board;
+    board->captured = captured;
+    board->mutant = mutant;
+}
 EXPORT void board_stick(Board *board, uint64_t columns) { board->matrix.stuck = columns; }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 

@@ -36,7 +36,7 @@ def downwards(value: Fraction) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class Facts:
-    """What the rules call R, C, M, S, L, T, D, P and Q, and the widths of the fields on the wire."""
+    """What the rules call R, C, M, E, X, Z, S, L, T, D, P and Q, and the widths of the fields on the wire."""
 
     skin: Skin
 
@@ -61,12 +61,45 @@ class Facts:
         return self.skin.clock_hz // 1_000_000
 
     @functools.cached_property
+    def shift_bit(self) -> int:
+        """E: clocks a bit takes in the shift registers; 0 where there are none."""
+        if self.skin.row_drive == "direct" and self.skin.column_read == "direct":
+            return 0
+        return max(2, -(-self.skin.clock_hz // self.skin.shift_hz))
+
+    @functools.cached_property
+    def column_shift(self) -> int:
+        """X: clocks that the columns of a sample are shifted."""
+        if self.skin.column_read == "direct":
+            return 0
+        return -(-self.columns // self.skin.column_chains) * self.shift_bit
+
+    @functools.cached_property
+    def row_shift(self) -> int:
+        """Z: clocks from which on a row pattern is shifted before its slot, and the first slot begins."""
+        if self.skin.row_drive == "direct":
+            return 0
+        return 1 + -(-self.rows // self.skin.row_chains) * self.shift_bit + self.shift_bit
+
+    @functools.cached_property
+    def load(self) -> int:
+        """Clocks of the pulse that takes the columns."""
+        return 0 if self.skin.column_read == "direct" else self.shift_bit
+
+    @functools.cached_property
+    def release(self) -> int:
+        asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
+        latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
+        return max(asked, self.load + self.column_shift, latch)
+
+    @functools.cached_property
     def settle(self) -> int:
-        return upwards(exact(self.skin.settle_us) * self.clocks_per_us)
+        asked = upwards(exact(self.skin.settle_us) * self.clocks_per_us)
+        return max(asked, self.load + self.column_shift, self.row_shift - self.release)
 
     @functools.cached_property
     def row_clocks(self) -> int:
-        return self.settle + upwards(exact(self.skin.release_us) * self.clocks_per_us)
+        return self.settle + self.release
 
     @functools.cached_property
     def scan_clocks(self) -> int:

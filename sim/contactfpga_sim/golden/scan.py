@@ -22,14 +22,24 @@ class Scan:
     stuck: int
     """Columns that read pressed while no row was driven."""
     time_us: int
-    """Device time of the first row's strobe, unbounded."""
+    """Device time of the first row's strobe, less what the columns were shifted; unbounded."""
     requested: bool
     """A byte came in since the scan before began."""
 
 
 def strobe(facts: Facts, slot: int) -> int:
-    """The cycle in which the sample of a row slot has come through the synchronisers."""
-    return slot * facts.row_clocks + facts.settle + 1
+    """The cycle in which the sample of a row slot has come through shift registers and synchronisers."""
+    return sampled(facts, slot) + 2 + facts.column_shift
+
+
+def sampled(facts: Facts, slot: int) -> int:
+    """The cycle whose column levels count for the row of a slot."""
+    return facts.row_shift + slot * facts.row_clocks + facts.settle - 1
+
+
+def _asked_before(facts: Facts, slot: int) -> int:
+    """The cycle from which on a request comes too late for a frame that begins with this slot."""
+    return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
 def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int) -> list[Scan]:
@@ -39,14 +49,15 @@ def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int)
     for index in range(count):
         slots = range(index * facts.rows, (index + 1) * facts.rows)
         begin = strobe(facts, slots[0])
-        before = strobe(facts, slots[0] - facts.rows) if index else 0
+        late = _asked_before(facts, slots[0])
+        early = _asked_before(facts, slots[0] - facts.rows) if index else 0
         result.append(
             Scan(
                 cells=np.array([_sample(facts, timeline, slot) for slot in slots]),
                 offered=[strobe(facts, slot) + 1 for slot in slots],
                 stuck=_stuck(facts, timeline, slots),
-                time_us=begin // facts.clocks_per_us,
-                requested=any(before <= cycle < begin for cycle in requests),
+                time_us=(begin - facts.column_shift) // facts.clocks_per_us,
+                requested=any(early <= cycle < late for cycle in requests),
             )
         )
     return result
@@ -73,7 +84,7 @@ def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
 
 def _sample(facts: Facts, timeline: Timeline, slot: int) -> np.ndarray:
     row = slot % facts.rows
-    cells, stuck = timeline.at(strobe(facts, slot) - 2)
+    cells, stuck = timeline.at(sampled(facts, slot))
     columns = np.zeros(facts.columns, bool)
     if cells is not None:
         columns |= np.asarray(cells[row], bool)
@@ -87,7 +98,16 @@ def _stuck(facts: Facts, timeline: Timeline, slots: range) -> int:
     for slot in range(slots[0] - 1, slots[-1]):
         if slot < 0:
             continue
-        _, stuck = timeline.at((slot + 1) * facts.row_clocks - 1)
+        _, stuck = timeline.at(facts.row_shift + (slot + 1) * facts.row_clocks - 1)
         if stuck is not None:
             columns |= np.asarray(stuck, bool)
     return int(np.sum(columns & ~facts.mask.all(axis=0)))
+
+
+def driven(facts: Facts, cycles: int) -> list[tuple[int, int]]:
+    """(cycle, rows) of every change of the rows that are driven before ``cycles``; bit r is row r."""
+    changes = []
+    for slot in range(cycles // facts.row_clocks + 1):
+        start = facts.row_shift + slot * facts.row_clocks
+        changes += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
+    return [change for change in changes if change[0] < cycles]

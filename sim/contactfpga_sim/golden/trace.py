@@ -48,11 +48,12 @@ class Timeline:
         stuck: Iterable[np.ndarray | None] | None = None,
         requests: Sequence[int] = (),
     ) -> Timeline:
-        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan."""
+        """Each (R, C) frame, with its stuck columns if any, held for exactly one scan; the first one from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
         lines = list(stuck) if stuck is not None else [None] * len(held)
-        scan = facts(skin).scan_clocks
-        pieces = [(i * scan, cells, line) for i, (cells, line) in enumerate(zip(held, lines, strict=True))]
+        first, scan = facts(skin).row_shift, facts(skin).scan_clocks
+        starts = [first * (i > 0) + i * scan for i in range(len(held))]
+        pieces = list(zip(starts, held, lines, strict=True))
         return cls(pieces, requests)
 
     def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -85,3 +86,12 @@ class Trace:
         """The same trace, ended before ``cycles``."""
         kept = {name: [event for event in self.events(name) if event[0] < cycles] for name in BOUNDARIES}
         return Trace(min(cycles, self.cycles), **kept)
+
+    def at_the_pins(self) -> Trace:
+        """The same trace without what only probes see."""
+        return Trace(self.cycles, line=self.line, contact=self.contact)
+
+    def since(self, cycle: int) -> Trace:
+        """The same trace, ``cycle`` counted as 0."""
+        shifted = {name: [(at - cycle, *rest) for at, *rest in self.events(name)] for name in BOUNDARIES}
+        return Trace(self.cycles - cycle, **shifted)
