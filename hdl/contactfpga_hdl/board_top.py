@@ -3,11 +3,14 @@
 import importlib
 
 from amaranth.build import Attrs, Pins, Resource
-from amaranth.hdl import Elaboratable, Module
+from amaranth.hdl import ClockDomain, Elaboratable, Module
 from amaranth.lib import io
+from amaranth.lib.wiring import Out
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.boards import Board
+from contactfpga_hdl.clock import PllClock
+from contactfpga_hdl.pins import column_pins, row_pins
 from contactfpga_hdl.top import Top
 
 
@@ -27,21 +30,21 @@ class BoardTop(Elaboratable):
     def __init__(self, board: Board, skin: Skin):
         self.board = board
         self.skin = skin
+        self._sheet = row_pins(skin) | column_pins(skin)
 
     def elaborate(self, platform):
         m = Module()
         m.submodules.core = core = Top(self.skin)
+        if self.skin.clock_hz != self.board.clock_hz:
+            m.domains.sync = ClockDomain()
+            m.submodules.clock = PllClock(self.board, self.skin.clock_hz)
         platform.add_resources(self._resources())
         uart = platform.request("uart", 0, dir="-")
-        ports = {name: platform.request(name, 0, dir="-") for name in ("rows", "columns", "contact")}
         m.submodules.rx = rx = io.Buffer("i", uart.rx)
         m.submodules.tx = tx = io.Buffer("o", uart.tx)
-        m.submodules.rows = rows = io.Buffer("o", ports["rows"])
-        m.submodules.columns = columns = io.Buffer("i", ports["columns"])
-        m.submodules.contact = contact = io.Buffer("o", ports["contact"])
+        m.submodules.contact = contact = io.Buffer("o", platform.request("contact", 0, dir="-"))
+        self._connect_sheet(m, platform, core)
         m.d.comb += [
-            rows.o.eq(core.rows),
-            core.columns.eq(columns.i),
             contact.o.eq(core.contact),
             tx.o.eq(core.tx),
             core.rx.eq(rx.i),
@@ -52,15 +55,21 @@ class BoardTop(Elaboratable):
             m.d.comb += held_high.o.eq(~0)
         return m
 
+    def _connect_sheet(self, m, platform, core):
+        for name, member in self._sheet.items():
+            direction = "o" if member.flow == Out else "i"
+            m.submodules[name] = buffer = io.Buffer(direction, platform.request(name, 0, dir="-"))
+            m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
+
     def _resources(self):
         board, skin = self.board, self.skin
         attrs = Attrs(**board.standard)
-        column_attrs = Attrs(**board.standard, **board.pulls[skin.diodes])
-        resources = [
-            Resource("rows", 0, Pins(" ".join(board.rows(skin.rows)), dir="o"), attrs),
-            Resource("columns", 0, Pins(" ".join(board.columns(skin.columns)), dir="i"), column_attrs),
-            Resource("contact", 0, Pins(board.contact, dir="o"), attrs),
-        ]
+        resources = [Resource("contact", 0, Pins(board.contact, dir="o"), attrs)]
+        for name, pins in board.pins(skin).items():
+            direction = "o" if self._sheet[name].flow == Out else "i"
+            # Only what hangs on switches needs a level of its own; a shift register drives its data pin.
+            pulls = board.pulls[skin.diodes] if name == "columns" else {}
+            resources.append(Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **pulls)))
         if board.held_high:
             resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))
         return resources

@@ -1,16 +1,19 @@
 """The supported boards, each described once: clock, pins, bridge, programmer. Loads no Amaranth.
 
 Sheet lines sit on two rows of header pins. Rows take the first one from its start, columns the second one, and
-whichever runs out goes on at the far end of the other: row k and column k are on the same pin in every sheet.
+whichever runs out goes on at the far end of the other: row k and column k are on the same pin in every sheet. Where a
+Skin has shift registers, their few wires take the place of the rows or the columns.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.skin import Skin, SkinError
+from contactfpga_hdl import pll
 
 NAME = "contactfpga"
 """Of the files that a build leaves."""
@@ -54,6 +57,8 @@ class Board:
     """``module:class`` in amaranth_boards."""
     clock_hz: int
     """Its crystal. An on-chip oscillator is never used: it is off by too much for a UART."""
+    pll: str
+    """The cell that makes other clocks from it; which one depends on the crystal's pin."""
     connectors: Mapping[str, str]
     """What is printed beside each connector."""
     row_side: tuple[str, ...]
@@ -76,16 +81,19 @@ class Board:
 
     @property
     def lines(self) -> int:
-        """How many rows and columns together can be wired to pins."""
+        """How many wires to the sheet can be on pins."""
         return len(self.row_side) + len(self.column_side)
 
-    def rows(self, count: int) -> tuple[str, ...]:
-        """Pins of the first ``count`` rows."""
-        return (self.row_side + self.column_side[::-1])[:count]
+    def pins(self, skin: Skin) -> dict[str, tuple[str, ...]]:
+        """Pins of each port that the gateware has at the sheet, lowest bit first."""
+        return self._dealt(row_wires(skin), self.row_side + self.column_side[::-1]) | self._dealt(
+            column_wires(skin), self.column_side + self.row_side[::-1]
+        )
 
-    def columns(self, count: int) -> tuple[str, ...]:
-        """Pins of the first ``count`` columns."""
-        return (self.column_side + self.row_side[::-1])[:count]
+    @staticmethod
+    def _dealt(wires: Mapping[str, int], side: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+        pins = iter(side)
+        return {name: tuple(itertools.islice(pins, count)) for name, count in wires.items()}
 
     def label(self, pin: str) -> str:
         """What is printed on the board beside a pin."""
@@ -95,15 +103,8 @@ class Board:
     def check(self, skin: Skin) -> None:
         """Raise SkinError where ``skin`` cannot be built for this board."""
         if skin.clock_hz != self.clock_hz:
-            raise SkinError(
-                f"clock_hz is {skin.clock_hz}, the crystal of {self.title} has {self.clock_hz} Hz; "
-                f"set clock_hz = {self.clock_hz} (a PLL is not supported yet)"
-            )
-        if skin.rows + skin.columns > self.lines:
-            raise SkinError(
-                f"{skin.rows} rows and {skin.columns} columns are {skin.rows + skin.columns} lines, {self.title} has "
-                f"{self.lines} free pins beside `contact`; shift registers, which need fewer, are not supported yet"
-            )
+            pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
+        self._check_wires(skin)
         if skin.baud > self.bridge.max_baud:
             raise SkinError(
                 f"baud is {skin.baud}, the {self.bridge.chip} of {self.title} reaches {self.bridge.max_baud} at most"
@@ -115,6 +116,36 @@ class Board:
                 f"baud is {skin.baud}: {self.title} sends {sent:.0f} and its {self.bridge.chip} reads at "
                 f"{self.bridge.nearest(skin.baud):.0f}, {100 * error:+.1f} %; the limit is {100 * MAX_BRIDGE_ERROR:g} %"
             )
+
+    def _check_wires(self, skin: Skin) -> None:
+        rows, columns = sum(row_wires(skin).values()), sum(column_wires(skin).values())
+        if rows + columns <= self.lines:
+            return
+        direct_rows, direct_columns = skin.row_drive == "direct", skin.column_read == "direct"
+        if direct_rows and (4 + columns <= self.lines or not direct_columns):
+            remedy = 'set row_drive = "74hc595"'
+        elif direct_columns:
+            remedy = 'set column_read = "74hc165"'
+        else:
+            remedy = "use fewer chains"
+        raise SkinError(
+            f"{skin.rows} rows and {skin.columns} columns take {rows} + {columns} wires, {self.title} has {self.lines} "
+            f"free pins beside `contact`; {remedy}"
+        )
+
+
+def row_wires(skin: Skin) -> dict[str, int]:
+    """Bits of each port at the rows, in the order of their pins."""
+    if skin.row_drive == "direct":
+        return {"rows": skin.rows}
+    return {"row_clock": 1, "row_latch": 1, "row_enable_n": 1, "row_data": skin.row_chains}
+
+
+def column_wires(skin: Skin) -> dict[str, int]:
+    """Bits of each port at the columns, in the order of their pins."""
+    if skin.column_read == "direct":
+        return {"columns": skin.columns}
+    return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}
 
 
 def _pins(connector: str, numbers: str) -> tuple[str, ...]:
@@ -141,6 +172,7 @@ _ICEBREAKER = Board(
     fpga="iCE40UP5K",
     platform="amaranth_boards.icebreaker:ICEBreakerPlatform",
     clock_hz=12_000_000,
+    pll="SB_PLL40_PAD",
     connectors={"pmod_0": "PMOD1A", "pmod_1": "PMOD1B", "pmod_2": "PMOD2"},
     row_side=_pins("pmod_0", _PMOD) + _pins("pmod_1", "1 2 3 4"),
     column_side=_pins("pmod_2", "1 2 3 4 7 8 9") + _pins("pmod_1", "7 8 9 10"),
@@ -151,7 +183,7 @@ _ICEBREAKER = Board(
     programmer=_ICEPROG,
     bitstream="bin",
     constraints="icebreaker.pcf",
-    skin=Skin(rows=12, columns=11),
+    skin=Skin(row_drive="74hc595", release_us=2.0),  # a switched-off row has to be lifted by the pull-ups
 )
 
 _ICESTICK = Board(
@@ -160,6 +192,7 @@ _ICESTICK = Board(
     fpga="iCE40HX1K",
     platform="amaranth_boards.icestick:ICEStickPlatform",
     clock_hz=12_000_000,
+    pll="SB_PLL40_CORE",
     connectors={"j_1": "J1", "j_3": "J3", "pmod_0": "J2"},
     row_side=_pins("j_1", "3 4 5 6 7 8 9 10") + _pins("pmod_0", "1 2 3 4"),
     column_side=_pins("j_3", "3 4 5 6 7 8 9 10") + _pins("pmod_0", "7 8 9"),
@@ -170,7 +203,7 @@ _ICESTICK = Board(
     programmer=_ICEPROG,
     bitstream="bin",
     constraints="icestick.pcf",
-    skin=Skin(rows=8, columns=8, report="cells"),  # the labeller does not fit beside the rest
+    skin=Skin(rows=8, columns=8),
 )
 
 _ULX3S_12F = Board(
@@ -179,6 +212,7 @@ _ULX3S_12F = Board(
     fpga="LFE5U-12F",
     platform="amaranth_boards.ulx3s:ULX3S_12F_Platform",
     clock_hz=25_000_000,
+    pll="EHXPLLL",
     connectors={"gpio_0": "GPIO"},
     row_side=_pairs(0, 10),  # 11 to 13 lead to the ESP32, 14 to 17 to the ADC
     column_side=_pairs(18, 27)[:-1],
