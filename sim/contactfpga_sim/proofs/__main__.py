@@ -1,0 +1,66 @@
+"""All proofs with their planted bugs, as a table: ``make formal``, or ``python -m contactfpga_sim.proofs [words]``."""
+
+import argparse
+import sys
+import time
+
+from contactfpga_sim.proofs import label, link, pack, records, scan, serial, streams
+from contactfpga_sim.proofs.case import Case
+
+CASES: tuple[Case, ...] = (
+    *scan.CASES,
+    *label.CASES,
+    *records.CASES,
+    *streams.CASES,
+    *pack.CASES,
+    *link.CASES,
+    *serial.CASES,
+)
+_WIDTHS = (34, 32, 16, 8, 16, 10)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run them and print a line each; returns 1 if one does not hold or does not find its bugs."""
+    parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.proofs", description=__doc__)
+    parser.add_argument("words", nargs="*", help="only proofs whose claim or size holds one of these")
+    parser.add_argument("--quick", action="store_true", help="leave out what takes more than a minute")
+    options = parser.parse_args(arguments)
+    cases = [
+        case
+        for case in CASES
+        if not (options.quick and case.campaign)
+        and (not options.words or any(word in case.name for word in options.words))
+    ]
+    started = time.monotonic()
+    _line("claim", "size", "holds", "seconds", "result", "bugs found")
+    good = [_report(case, f"{number} of {len(cases)}") for number, case in enumerate(cases, 1)]
+    print(f"{len(cases)} proofs in {time.monotonic() - started:.0f} s")
+    return 0 if cases and all(good) else 1
+
+
+def _report(case: Case, number: str) -> bool:
+    """One line of the table, with what is done shown before on a terminal."""
+    _progress(f"{number}: {case.name}")
+    verdict = case.run()
+    found = 0
+    for bug in case.bugs:
+        _progress(f"{number}: {case.name}: {bug.name}")
+        found += case.run_with(bug).outcome == "counterexample"
+    _progress("")
+    holds = "for ever" if not case.bounded else f"{case.clocks} clock{'s' if case.clocks > 1 else ''}"
+    bugs = f"{found} of {len(case.bugs)}" if case.bugs else ""
+    _line(case.claim, case.size, holds, f"{verdict.seconds:.1f}", verdict.outcome, bugs)
+    return verdict.outcome == "proved" and found == len(case.bugs)
+
+
+def _line(*fields: str) -> None:
+    print("  ".join(f"{field:{width}}" for field, width in zip(fields, _WIDTHS)).rstrip(), flush=True)
+
+
+def _progress(text: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

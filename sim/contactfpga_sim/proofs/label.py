@@ -1,0 +1,201 @@
+"""The labeller: nothing runs over or empty, nothing is left behind, and no stall changes what it does."""
+
+from functools import partial
+
+from amaranth.hdl import Array, Const, Mux, Signal, Value
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.steps import nesting, place_of
+from contactfpga_hdl.label.sum import Sum
+from contactfpga_hdl.label.walk import Walk
+from contactfpga_hdl.stack import Stack
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+
+def skin_of(rows: int, columns: int, connectivity: int) -> Skin:
+    return Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=100, zone_capacity=1)
+
+
+def rows_into(proof: Proof, dut: RunLabeller):
+    """Any rows, whenever they come; returns ``valid``, ``cells`` and ``last``."""
+    valid, last = proof.free(1, "valid"), proof.free(1, "last")
+    cells = proof.free(dut.derived.skin.columns, "cells")
+    proof.m.d.comb += [
+        dut.rows.valid.eq(valid),
+        dut.rows.payload.cells.eq(cells),
+        dut.rows.payload.last.eq(last),
+    ]
+    return valid, cells, last
+
+
+def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
+    """Free: any rows at any time. Assumed: records are taken as they come; ``stalls_change_nothing`` shows that this
+    is no restriction.
+
+    Claimed: the stacks neither overflow nor run empty; no place of the table is written while an open zone lies there,
+    or read while none does or in the clock in which it is written; behind a frame's last row no zone is open, in the table or on a stack.
+    """
+    m = proof.m
+    dut = RunLabeller(skin_of(2, columns, connectivity))
+    derived = dut.derived
+    inside = proof.put(dut)
+    valid, cells, last = rows_into(proof, dut)
+    m.d.comb += dut.records.ready.eq(1)
+    walk, join, stack = inside.part("walk"), inside.part("join"), inside.part("join.stack")
+    step, step_valid, joined = walk.step, walk.step_valid, join.join
+    works = step_valid & ~step.end
+    with m.If(works & stack.pop):
+        proof.claim(stack.level != 0)
+    with m.If(works & stack.push & ~stack.pop):
+        proof.claim(stack.level < nesting(derived))
+
+    # Which places of the table hold an open zone; all of it is a clock behind the stack of `join`.
+    summing = join.join_valid & ~joined.end
+    load_place = proof.before(place_of(derived, step.before))
+    live, taken, stored = (Signal(derived.open_zones, name=name) for name in ("live", "taken", "stored"))
+    m.d.comb += [
+        taken.eq(Mux(summing & joined.load, Const(1) << load_place, 0)),
+        stored.eq(Mux(summing & joined.store, Const(1) << joined.place, 0)),
+    ]
+    m.d.sync += live.eq((live & ~taken) | Mux(joined.leaves, 0, stored))  # in the last row zones are stored, too
+    proof.claim((taken & ~live) == 0)
+    proof.claim((taken & proof.before(stored)) == 0)  # its word was read in the clock before
+    proof.claim((live & ~taken & stored) == 0)
+    with m.If(summing & joined.store):
+        proof.claim(joined.place < derived.open_zones)
+    summed_level = inside.part("sum.stack").level
+    with m.If(join.join_valid & joined.end):
+        proof.claim((live == 0) & (summed_level == 0))
+
+    # Between two rows nothing is known of the one before but its brackets, and they nest.
+    walked, walked_last = Signal(columns), Signal()  # the row in the walk
+    with m.If(valid & dut.rows.ready):
+        m.d.sync += [walked.eq(cells), walked_last.eq(last)]
+    stepped = proof.before(walked)  # the row of the step that comes out of the walk
+    open_row, midst = Signal(columns), Signal()  # the row that was joined last, and whether another is half joined
+    with m.If(works):
+        m.d.sync += midst.eq(~step.row_done)
+        with m.If(step.row_done):
+            m.d.sync += open_row.eq(Mux(step.final, 0, stepped))
+    nests, first_runs = _brackets(m, open_row, inside["join.old_after"], inside["join.old_before"])
+    places = (Mux(is_first, 1 << place_of(derived, x), 0) for x, is_first in enumerate(first_runs))
+    open_places = sum(places, Const(0, derived.open_zones))  # no two are the same
+    with m.If(~midst):
+        proof.lemma((open_row == 0) | nests)
+        proof.lemma((stack.level == 0) & (join._after == 0) & (join._before == 0) & (join._number == 0))
+    with m.If(~proof.before(midst)):
+        proof.lemma(live == proof.before(open_places))
+    proof.lemma(summed_level == proof.before(stack.level))
+    with m.If(step_valid & step.end):
+        proof.lemma(~midst & (open_row == 0))
+    proof.lemma(inside["walk.before"] == Mux(walked_last, 0, walked))
+    with m.If((midst | works) & ~(works & step.row_done)):
+        proof.lemma(walk._inside[0])
+    proof.lemma(mask_of_first_cluster(walk))
+    with m.If(~walk._inside[0]):
+        proof.lemma(inside["walk.opens"])
+        proof.lemma(inside["walk.before"] == Mux(works, Mux(step.final, 0, stepped), open_row))
+
+
+def mask_of_first_cluster(walk: Walk):
+    """Whether the walk's mask is a run of ones from column 0 on, with the other clusters' ends behind it."""
+    inside, ends = walk._inside, walk._ends
+    return ((inside & (inside + 1)) == 0) & ((ends & inside) == 0) & (inside[0] | (ends == 0))
+
+
+def _brackets(m, row, earlier, later):
+    """Whether a row's brackets nest, and for each column whether the first run of a zone starts there."""
+    starts = Signal(len(row))
+    m.d.comb += starts.eq(row & ~(row << 1))
+    runs = sum(starts[1:], starts[0])
+    depth = Const(0, len(row).bit_length() + 1)
+    nests = Const(1, 1)
+    for i in range(len(earlier)):
+        nests &= ~(earlier[i] & (depth == 0)) & ((i < runs) | ~(earlier[i] | later[i]))
+        after = Signal(len(row).bit_length() + 1, name=f"depth_{i}")
+        m.d.comb += after.eq(depth + (later[i] & ~earlier[i]) - (earlier[i] & ~later[i]))
+        depth = after
+    numbers = [sum(starts[:x], Const(0, 1)) for x in range(len(row))]
+    return nests & (depth == 0), [starts[x] & ~Array(earlier)[numbers[x]] for x in range(len(row))]
+
+
+def stalls_change_nothing(proof: Proof, columns: int, connectivity: int) -> None:
+    """Free: any rows at any time, and when records are taken.
+
+    Claimed: while a record waits it stays as it is, no row is taken and nothing changes inside. So the records are
+    those that would come without the stall.
+    """
+    m = proof.m
+    dut = RunLabeller(skin_of(4, columns, connectivity))
+    inside = proof.put(dut)
+    rows_into(proof, dut)
+    m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
+    waits = dut.records.valid & ~dut.records.ready
+    with m.If(waits):
+        proof.claim(~dut.rows.ready)
+        proof.claim(~inside["sum.write__en"])
+    with m.If(proof.before(waits)):
+        for register in (dut.records.valid, dut.records.payload, *inside.registers()):
+            proof.claim(Value.cast(register) == proof.before(register))
+
+
+def an_end_mark_a_frame(proof: Proof, columns: int, connectivity: int) -> None:
+    """Free: any rows at any time, and when records are taken.
+
+    Claimed: the end marks that came are the last rows that were taken, but for those still inside: three at most.
+    """
+    m = proof.m
+    dut = RunLabeller(skin_of(4, columns, connectivity))
+    inside = proof.put(dut)
+    valid, _, last = rows_into(proof, dut)
+    m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
+    owed = Signal(range(5))
+    m.d.sync += owed.eq(
+        owed + (valid & last & dut.rows.ready) - (dut.records.valid & dut.records.ready & dut.records.payload.end)
+    )
+    walk, join = inside.part("walk"), inside.part("join")
+    proof.claim(owed <= 3)
+    with m.If(dut.records.valid & dut.records.payload.end):
+        proof.claim(owed != 0)
+    held = walk._last + (walk.step_valid & walk.step.end) + (join.join_valid & join.join.end)
+    proof.lemma(owed == held)
+
+
+_OVERFLOW_BUGS = (
+    Bug("brackets forgotten", Join, "_brackets", "old_before.eq(self._new_before)", "old_before.eq(0)"),
+    Bug("never pushed", Join, "elaborate", "stack.push.eq(self.step.closes & (group.open != 0))", "stack.push.eq(0)"),
+    Bug("always in the first place", Join, "_decide", "join.place.eq(group.place)", "join.place.eq(0)"),
+    Bug("the last row is a row like others", Walk, "_take_row", "self._last.eq(row.last)", "self._last.eq(0)"),
+    Bug("a zone stays open", Walk, "_take_row", "before.eq(Mux(row.last, 0, row.cells))", "before.eq(row.cells)"),
+)
+_STALL_BUGS = (
+    Bug("the walk runs on", Walk, "_walk_clusters", "m.If(self.enable & work)", "m.If(work)"),
+    Bug("the join runs on", Join, "elaborate", "self.enable & self.valid", "self.valid"),
+    Bug("the stack runs on", Stack, "elaborate", "self.enable & self.push & ~self.pop", "self.push & ~self.pop"),
+    Bug("the table is written", Sum, "elaborate", "works = self.enable & self.valid", "works = self.valid"),
+    Bug("rows are taken", Walk, "_take_row", "rows.ready.eq(self.enable & ~work)", "rows.ready.eq(~work)"),
+)
+_END_BUGS = (
+    Bug("no mark behind the first row", Walk, "_walk_clusters", "| self._last", "| self._last & self._y.any()"),
+    Bug("the mark comes again", Walk, "_take_row", "self._last.eq(0)", "self._last.eq(self._last)"),
+)  # fmt: skip
+CASES = (
+    *(
+        Case("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected",
+             partial(nothing_overflows, columns=columns, connectivity=connectivity), clocks,
+             _OVERFLOW_BUGS if (columns, connectivity) == (4, 8) else (), bug_clocks=14, campaign=columns == 8)
+        for columns, connectivity, clocks in ((4, 8, 9), (4, 4, 12), (8, 8, 14), (8, 4, 24))
+    ),
+    Case("a stall changes nothing", "8 columns, 8-connected",
+         partial(stalls_change_nothing, columns=8, connectivity=8), 2, _STALL_BUGS, bug_clocks=16),
+    Case("a stall changes nothing", "8 columns, 4-connected",
+         partial(stalls_change_nothing, columns=8, connectivity=4), 2),
+    Case("an end mark a frame", "8 columns, 8-connected",
+         partial(an_end_mark_a_frame, columns=8, connectivity=8), 2, _END_BUGS),
+    Case("an end mark a frame", "8 columns, 4-connected",
+         partial(an_end_mark_a_frame, columns=8, connectivity=4), 2),
+)  # fmt: skip

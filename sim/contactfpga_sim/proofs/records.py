@@ -1,0 +1,183 @@
+"""The labeller's records are the zones of the frame."""
+
+from functools import partial
+
+from amaranth.hdl import Cat, Const, Mux, Signal
+
+from contactfpga.derived import Derived
+from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.steps import place_of
+from contactfpga_hdl.label.sum import Sum
+from contactfpga_hdl.label.walk import Walk
+from contactfpga_hdl.payloads import moments_layout
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.label import mask_of_first_cluster, rows_into, skin_of
+from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.zones import OpenRow, flood_fill, next_row
+
+
+def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+    """Free: any rows at any time. Assumed: records are taken as they come.
+
+    Claimed: what comes from the second clock behind a row to the second clock behind the next one are the zones that
+    end with it, each once, and behind a last row one end mark.
+    """
+    m = proof.m
+    dut = RunLabeller(skin_of(rows, columns, connectivity))
+    inside = proof.put(dut)
+    valid, cells, last = rows_into(proof, dut)
+    m.d.comb += dut.records.ready.eq(1)
+    wanted = proof.chosen(len(dut.records.payload.zone.as_value()), "wanted")
+    handed = valid & dut.rows.ready
+    y_next = Signal(range(rows))
+    with m.If(handed):
+        m.d.sync += y_next.eq(Mux(last, 0, y_next + 1))
+    delayed = proof.before(Cat(handed, last, cells, y_next))
+    taken, taken_last, row_and_y = _split(proof.before(delayed))
+    row, y = row_and_y[:columns], row_and_y[columns:]
+
+    open_row = OpenRow(dut.derived, "open")
+    after, ended_zones = next_row(m, dut.derived, open_row, row, taken_last, y, wanted)
+    expected, expected_end = Signal(range(2 * columns + 1)), Signal()
+    seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
+    record = dut.records.payload
+    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
+    ends_now = seen_ends + (dut.records.valid & record.end)
+    steps = (columns + 1) // 2 if connectivity == 8 else columns
+    age = Signal(range(steps + 2), init=steps + 1)
+    done = age == steps + 1
+    with m.If(taken):
+        m.d.sync += [*open_row.copy(after, when=~taken_last), expected.eq(ended_zones), expected_end.eq(taken_last)]
+        m.d.sync += [seen.eq(0), seen_ends.eq(0), age.eq(0)]
+    with m.Else():
+        m.d.sync += [seen.eq(seen_now), seen_ends.eq(ends_now), age.eq(age + ~done)]
+    newest = Signal(columns)  # the row last handed over, empty before a frame
+    with m.If(handed):
+        m.d.sync += newest.eq(Mux(last, 0, cells))
+    proof.lemma((inside["walk.before"] == newest) & (inside["walk.y_next"] == y_next) & (age <= steps + 1))
+    with m.If(taken | done):
+        proof.claim(seen_now == expected)
+        proof.claim(ends_now == expected_end)
+    _lemmas(proof, dut, inside, open_row, taken | done, done & ~taken & ~delayed[0])
+    next_taken, next_last, next_and_y = _split(delayed)
+    with m.If(next_taken):
+        row_before = Mux(taken, Mux(taken_last, 0, row), open_row.cells)
+        _loaded(proof, dut, inside, row_before, next_and_y[:columns], next_last, next_and_y[columns:])
+
+
+def _split(value):
+    return value[0], value[1], value[2:]
+
+
+def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, rest, idle) -> None:
+    """Between two rows the brackets and the table say of the open row what the specification knows of it."""
+    m, columns = proof.m, range(dut.derived.skin.columns)
+    join = inside.part("join")
+    starts = Signal(len(columns))
+    m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
+    numbers = [sum(starts[:x], Const(0, 1)) for x in columns]  # of the run that starts there
+    earlier = [starts[x] & open_row.reach[x][:x].any() for x in columns]
+    later = [starts[x] & (open_row.reach[x] & starts)[x + 1 :].any() for x in columns]
+    words = [inside.word("sum.table", place) for place in range(dut.derived.open_zones)]
+    with m.If(rest):
+        for brackets, ones in (("join.old_after", earlier), ("join.old_before", later)):
+            for x in columns:
+                proof.lemma(~starts[x] | (inside[brackets].bit_select(numbers[x], 1) == ones[x]))
+        for x in columns:
+            with m.If(starts[x] & ~earlier[x]):
+                proof.lemma(words[place_of(dut.derived, x)] == open_row.moments[x].as_value())
+        proof.lemma((join._after == 0) & (join._before == 0) & (join._number == 0) & (inside["sum.kept"] == 0))
+        proof.lemma((inside.part("join.stack").level == 0) & (inside.part("sum.stack").level == 0))
+    with m.If(idle):
+        proof.lemma(~inside.part("walk")._last & ~inside.part("walk").step_valid & ~join.join_valid)
+        proof.lemma(~inside.part("walk")._inside[0] & (inside["walk.before"] == open_row.cells))
+    proof.lemma(mask_of_first_cluster(inside.part("walk")))
+    with m.If(~inside.part("walk")._inside[0]):
+        proof.lemma(inside["walk.opens"])
+    for x in columns:
+        reach, moments = open_row.reach[x], open_row.moments[x].as_value()
+        proof.lemma((reach & ~open_row.cells) == 0)
+        proof.lemma(reach[x] == open_row.cells[x])
+        proof.lemma(open_row.cells[x] | (reach == 0) & (moments == 0))
+        for j in columns[x + 1 :]:
+            same = (reach == open_row.reach[j]) & (moments == open_row.moments[j].as_value())
+            proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
+        if x:
+            proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
+
+
+def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
+    """In the clock behind the one in which a row was handed over the walk has it all before it."""
+    walk = inside.part("walk")
+    proof.lemma((walk._befores == (before & ~(before << 1))) & (walk._last == last) & (walk._y == y))
+    proof.lemma((walk._starts == (row & ~(row << 1))) & (walk._stops == (row & ~(row >> 1))))
+    if dut.derived.skin.connectivity == 8:
+        joined = (row | before) & ((row | before) >> 1)
+    else:
+        joined = row & (row >> 1) | before & (before >> 1)
+    ends = (row | before) & ~joined
+    proof.lemma(walk._ends == (ends & (ends - 1)))
+    proof.lemma(walk._inside == Mux(ends == 0, 0, ends ^ (ends - 1)))
+    proof.lemma(~walk.step_valid | walk.step.end)
+
+
+def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int) -> None:
+    """The specification itself, without the labeller. Free: a frame and a zone's moments.
+
+    Claimed: row by row as many zones with these moments end as a flood fill of the whole frame finds.
+    """
+    m = proof.m
+    derived = Derived(skin_of(rows, columns, connectivity))
+    frame = proof.free(rows * columns, "frame")
+    wanted = Signal(moments_layout(derived), name="wanted")
+    m.d.comb += wanted.eq(proof.free(wanted.shape().size, "moments"))
+    open_row, found = OpenRow(derived, "none"), 0
+    for y in range(rows):
+        cells, last = frame.word_select(y, columns), Const(y == rows - 1)
+        open_row, ended = next_row(m, derived, open_row, cells, last, Const(y, range(rows)), wanted.as_value())
+        found += ended
+    proof.claim(found == flood_fill(m, derived, frame, wanted))
+
+
+_BUGS = (
+    Bug("clusters end with the row before", Walk, "_take_row", "(row.cells | before) & ~joined", "before & ~joined"),
+    Bug("always in the first row", Walk, "_take_row", "self._y.eq(y_next)", "self._y.eq(0)"),
+    Bug("the group on the stack is forgotten", Sum, "elaborate", "join.pop, stack.top[name],", "join.pop, 0,"),
+    Bug("the table is not read", Sum, "elaborate", "Mux(join.load, read.data[name], 0)", "0"),
+    Bug("a zone leaves a row early", Join, "_decide", "step.final | ~group.has_run", "step.final | group.has_run"),
+    Bug("runs do not join", Join, "_mark", "self._before | bit(over, waiting.last) | bit(onto, joined.last)",
+        "self._before"),
+)  # fmt: skip
+_SPECIFICATION_BUGS = (
+    Bug("zones of one row do not merge", OpenRow, "leaders", "cell & ~self.reach[x][:x].any() if x else cell", "cell"),
+)
+
+
+def _case(columns: int, connectivity: int, clocks: int, rows: int = 4, **options) -> Case:
+    build = partial(records_are_the_zones, columns=columns, connectivity=connectivity, rows=rows)
+    return Case(
+        "records are the zones", f"{columns} columns, {rows} rows, {connectivity}-connected", build, clocks, **options
+    )
+
+
+CASES = (
+    _case(1, 8, 6),
+    _case(1, 4, 6),
+    _case(2, 8, 7),
+    _case(2, 4, 7),
+    _case(3, 8, 7, bugs=_BUGS, bug_clocks=12),
+    _case(3, 4, 8, campaign=True),
+    _case(4, 8, 7, campaign=True),
+    _case(4, 4, 9, campaign=True),
+    _case(8, 8, 7, rows=2, bounded=True, campaign=True),
+    _case(8, 4, 7, rows=2, bounded=True, campaign=True),
+    *(
+        Case("rows find the zones", f"{rows}x{columns}, {connectivity}-connected",
+             partial(rows_find_the_zones, rows=rows, columns=columns, connectivity=connectivity), 1, bugs,
+             bug_clocks=1, bounded=True, campaign=columns == 4)
+        for rows, columns, bugs in ((3, 3, _SPECIFICATION_BUGS), (3, 4, ()))
+        for connectivity in (8, 4)
+    ),
+)  # fmt: skip

@@ -1,0 +1,105 @@
+"""The scanner: which row is driven when, and that each sample is offered once."""
+
+from functools import partial
+
+from amaranth.hdl import Cat, Mux, Signal
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.pins import DirectColumns, DirectRows
+from contactfpga_hdl.scan import Scanner
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Inside, Proof
+
+
+def skin_of(diodes: str) -> Skin:
+    return Skin(rows=4, columns=2, diodes=diodes, settle_us=1, mask=((1, 0),), zone_capacity=1)
+
+
+def one_row_at_a_time(proof: Proof, diodes: str) -> None:
+    """Claimed: in each clock the row whose slot it is, alone, is driven, or in the release none."""
+    skin = skin_of(diodes)
+    dut = Scanner(skin)
+    inside = proof.put(dut)
+    slot, row = _slots(proof, dut.derived)
+    driven = Signal(skin.rows)
+    proof.m.d.comb += driven.eq(~dut.pins.rows if diodes == "col2row" else dut.pins.rows)
+    proof.claim(driven & (driven - 1) == 0)
+    proof.claim(driven == Mux(slot < dut.derived.settle_clocks, 1 << row, 0))
+    proof.lemma(inside["driver.selected"] == Mux(slot < dut.derived.settle_clocks, 1 << row, 0))
+    _slot_lemmas(proof, inside, dut, slot, row)
+
+
+def each_sample_once(proof: Proof, diodes: str) -> None:
+    """Free: the columns. Assumed: a row is taken before the next one comes, as the Skin's limits see to.
+
+    Claimed: a row is offered from the clock after its strobe until it is taken, unchanged, as the pins were two clocks
+    before the strobe.
+    """
+    m, skin = proof.m, skin_of(diodes)
+    dut = Scanner(skin)
+    inside = proof.put(dut)
+    columns, ready = proof.free(skin.columns, "columns"), proof.free(1, "ready")
+    m.d.comb += [dut.pins.columns.eq(columns), dut.rows.ready.eq(ready)]
+    settled = dut.derived.settle_clocks
+    slot, row = _slots(proof, dut.derived)
+    inactive = (1 << skin.columns) - 1 if diodes == "col2row" else 0
+    at_pins = proof.before(proof.before(columns, init=inactive), init=inactive)
+    strobe = slot == settled + 1
+    waits, sample = Signal(), Signal(skin.columns + 1)
+    with m.If(strobe):
+        present = Mux(row == 1, 0b10, 0b11)
+        pressed = (~at_pins if diodes == "col2row" else at_pins) & present
+        m.d.sync += [waits.eq(1), sample.eq(Cat(pressed[: skin.columns], row == skin.rows - 1))]
+    with m.Elif(ready):
+        m.d.sync += waits.eq(0)
+    proof.given(~(strobe & waits & ~ready))
+    proof.claim(dut.rows.valid == waits)
+    with m.If(waits):
+        proof.claim(dut.rows.payload.as_value() == sample)
+    next_row = Mux(slot > settled + 1, row + 1, row)[:2]
+    _slot_lemmas(proof, inside, dut, slot, row)
+    released = Signal()  # a slot is over: its released sample is on its way at the beginning of the next one
+    with m.If(slot == dut.derived.row_clocks - 1):
+        m.d.sync += released.eq(1)
+    proof.lemma(inside["_row"] == next_row)
+    proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
+    proof.lemma(inside["reader.done"] == (strobe | released & (slot == 1)))
+    proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))
+
+
+def _slot_lemmas(proof: Proof, inside: Inside, dut: Scanner, slot, row) -> None:
+    following = 1 << (row + 1)[:2]
+    proof.lemma((inside["_clock"] == slot) & (slot < dut.derived.row_clocks))
+    proof.lemma((inside["following"] == following) & inside["_scans"])
+
+
+def _slots(proof: Proof, derived):
+    """The clock within its slot, and the row whose slot it is, counted apart from the scanner."""
+    slot = Signal(range(derived.row_clocks))
+    row = Signal(range(derived.skin.rows))
+    ends = slot == derived.row_clocks - 1
+    proof.m.d.sync += [slot.eq(Mux(ends, 0, slot + 1)), row.eq(row + ends)]
+    return slot, row
+
+
+_DRIVE_BUGS = (
+    Bug("no release", DirectRows, "elaborate", "m.Elif(self.release)", "m.Elif(0)"),
+    Bug("the next row early", DirectRows, "elaborate", "selected.eq(0)", "selected.eq(self.pattern)"),
+    Bug("two rows from power-up", DirectRows, "elaborate", "selected = Signal(self.skin.rows, init=1)",
+        "selected = Signal(self.skin.rows, init=3)"),
+    Bug("a row twice", Scanner, "_drive_rows", "init=1 << begun", "init=1 << 0 * begun"),
+)  # fmt: skip
+_OFFER_BUGS = (
+    Bug("offered for one clock", Scanner, "_offer_row", "m.Elif(self.rows.ready)", "m.Else()"),
+    Bug("never taken back", Scanner, "_offer_row", "m.Elif(self.rows.ready)", "m.Elif(0)"),
+    Bug("a strobe early", DirectColumns, "elaborate", "self.done.eq(begun)", "self.done.eq(self.begin)"),
+    Bug("the released sample is a row", Scanner, "_sample_columns", "reader.done & done_is_row", "reader.done"),
+    Bug("unmasked", Scanner, "_mask_row", "self._columns & present", "self._columns"),
+)
+CASES = (
+    Case("one row at a time", "4 rows, col2row", partial(one_row_at_a_time, diodes="col2row"), 2, _DRIVE_BUGS, 80),
+    Case("one row at a time", "4 rows, row2col", partial(one_row_at_a_time, diodes="row2col"), 2),
+    Case("each sample once", "4x2, col2row", partial(each_sample_once, diodes="col2row"), 2, _OFFER_BUGS, 160),
+    Case("each sample once", "4x2, row2col", partial(each_sample_once, diodes="row2col"), 2),
+)

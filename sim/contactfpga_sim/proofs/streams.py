@@ -1,0 +1,203 @@
+"""Stages that hand on what they take: an offer stays until it is taken, nothing is lost, nothing comes twice."""
+
+from functools import partial
+
+from amaranth.hdl import Cat, Mux, Signal, Value
+from amaranth.lib.fifo import SyncFIFOBuffered
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.audit import Audit, Bitmap
+from contactfpga_hdl.debounce import Debounce
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+
+def feed(proof: Proof, port, name: str):
+    """Offers to a stream at any time; assumed is that each stays until it is taken, as it was."""
+    payload = Value.cast(port.payload)
+    valid, value = proof.free(1, f"{name}_valid"), proof.free(len(payload), name)
+    proof.m.d.comb += [port.valid.eq(valid), payload.eq(value)]
+    with proof.m.If(proof.before(valid & ~port.ready)):
+        proof.given(valid & (value == proof.before(value)))
+
+
+def drain(proof: Proof, port, name: str):
+    """Takes from a stream at any time; claimed is that each offer stays until then, as it was."""
+    proof.m.d.comb += port.ready.eq(proof.free(1, f"{name}_ready"))
+    offers_stay(proof, port)
+
+
+def offers_stay(proof: Proof, port) -> None:
+    payload = Value.cast(port.payload)
+    with proof.m.If(proof.before(port.valid & ~port.ready)):
+        proof.claim(port.valid & (payload == proof.before(payload)))
+
+
+def debounce(proof: Proof, method: str) -> None:
+    """Free: rows at any time, and when they are taken. Without a debounce time the stage changes nothing.
+
+    Claimed: each row is offered once, ``columns + 3`` clocks after it was taken, as it was, until it is taken.
+    """
+    m = proof.m
+    skin = Skin(rows=4, columns=3, debounce=method, debounce_press_us=0, debounce_release_us=0, settle_us=20)
+    dut = Debounce(skin)
+    inside = proof.put(dut)
+    feed(proof, dut.raw, "raw")
+    drain(proof, dut.rows, "rows")
+    latency = skin.columns + 3
+    age = Signal(range(latency + 1))  # clocks since a row was taken that is still inside; 0: none is
+    row = Signal(dut.raw.payload.shape())
+    with m.If(dut.raw.valid & dut.raw.ready):
+        m.d.sync += [age.eq(1), row.eq(dut.raw.payload)]
+    with m.Elif(dut.rows.valid & dut.rows.ready):
+        m.d.sync += age.eq(0)
+    with m.Elif((age != 0) & (age != latency)):
+        m.d.sync += age.eq(age + 1)
+    proof.claim(dut.raw.ready == (age == 0))
+    proof.claim(dut.rows.valid == (age == latency))
+    with m.If(dut.rows.valid):
+        proof.claim(dut.rows.payload.as_value() == row.as_value())
+    phases = [(age >= first) & (age <= last) for first, last in ((1, 3), (2, 4), (3, 5), (5, 5))]
+    proof.lemma(age <= latency)
+    proof.lemma(Cat(inside[name] for name in ("busy", "decide", "store", "finish")) == Cat(phases))
+    with m.If(inside["busy"]):
+        proof.lemma(inside["column"] == age - 1)
+
+
+def audit(proof: Proof, capacity: int = 2) -> None:
+    """Free: records at any time, and when items are taken. Assumed: no more zones a frame than there can be.
+
+    Claimed: of each frame the first ``capacity`` zones and the end mark pass, each in the clock in which it is taken;
+    the others are taken and go no further. The summary counts them all and says whether some are missing.
+    """
+    m = proof.m
+    dut = Audit(Skin(rows=3, columns=4, connectivity=4, zone_capacity=capacity, settle_us=20))
+    inside = proof.put(dut)
+    feed(proof, dut.records, "records")
+    drain(proof, dut.items, "items")
+    m.d.comb += [dut.taken.eq(proof.free(1, "taken")), dut.row.eq(proof.free(len(Value.cast(dut.row)), "row"))]
+    record, item = dut.records.payload, dut.items.payload
+    zones = Signal(dut.derived.zones_bits + 1)
+    counted = Signal.like(zones)
+    ended = Signal()
+    taken = dut.records.valid & dut.records.ready
+    with m.If(taken):
+        m.d.sync += zones.eq(Mux(record.end, 0, zones + 1))
+        with m.If(record.end):
+            m.d.sync += [counted.eq(zones), ended.eq(1)]
+    proof.given(zones <= dut.derived.skin.max_zones())
+    passes = record.end | (zones < capacity)
+    proof.claim((dut.items.valid & dut.items.ready) == (taken & passes))
+    proof.claim(dut.items.valid == (dut.records.valid & passes))
+    proof.claim(~(dut.records.valid & ~passes) | dut.records.ready)
+    with m.If(dut.items.valid):
+        proof.claim((item.end == record.end) & (item.data == record.zone.as_value()))
+    with m.If(ended):
+        proof.claim((dut.summary.zones == counted) & (dut.summary.overflow == (counted > capacity)))
+    proof.lemma((inside["zones"] == zones) & (inside["overflow"] == (zones > capacity)))
+    proof.lemma(counted <= dut.derived.skin.max_zones())
+
+
+def bitmap(proof: Proof) -> None:
+    """Free: rows at any time, and when items are taken.
+
+    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks behind a last one an end mark is
+    offered, once, and no row is taken before that is.
+    """
+    m = proof.m
+    dut = Bitmap(Skin(rows=3, columns=4, report="cells", settle_us=20))
+    inside = proof.put(dut)
+    feed(proof, dut.rows, "rows")
+    drain(proof, dut.items, "items")
+    behind = Signal(2)  # clocks since a last row whose end mark is to come, 3 at most; 0: none is
+    row, item = dut.rows.payload, dut.items.payload
+    with m.If(behind == 0):
+        m.d.sync += behind.eq(dut.rows.valid & dut.rows.ready & row.last)
+        proof.claim(dut.items.valid == dut.rows.valid)
+        proof.claim(dut.rows.ready == dut.items.ready)
+        proof.claim(~dut.items.valid | (item.data == row.cells) & ~item.end)
+    with m.Else():
+        with m.If(behind != 3):
+            m.d.sync += behind.eq(behind + 1)
+        with m.Elif(dut.items.ready):
+            m.d.sync += behind.eq(0)
+        proof.claim(~dut.rows.ready)
+        proof.claim(dut.items.valid == (behind == 3))
+        proof.claim(~dut.items.valid | item.end)
+    proof.lemma(inside["countdown"] == Mux(behind == 0, 0, 4 - behind))
+
+
+def backlog(proof: Proof, depth: int) -> None:
+    """The FIFO in front of the packer. Free: items at any time, when they are taken, and one item that is followed.
+
+    Claimed: the item comes out as it was, behind those that were in before it and no others; an item that is inside for
+    two clocks is offered; no room is wanting before all but one place are taken.
+    """
+    m = proof.m
+    dut = SyncFIFOBuffered(width=4, depth=depth)
+    inside = proof.put(dut)
+    puts, takes = proof.free(1, "puts") & dut.w_rdy, proof.free(1, "takes") & dut.r_rdy
+    item, follow = proof.free(4, "item"), proof.free(1, "follow")
+    m.d.comb += [dut.w_en.eq(puts), dut.w_data.eq(item), dut.r_en.eq(takes)]
+    count, ahead = Signal(range(depth + 1)), Signal(range(depth + 1))
+    followed, kept = Signal(), Signal(4)
+    m.d.sync += count.eq(count + puts - takes)
+    with m.If(followed & takes):
+        m.d.sync += [followed.eq(ahead != 0), ahead.eq(ahead - 1)]
+    with m.Elif(~followed & puts & follow):
+        m.d.sync += [followed.eq(1), kept.eq(item), ahead.eq(count - takes)]
+    next_out = followed & (ahead == 0)
+    proof.claim(~(next_out & dut.r_rdy) | (dut.r_data == kept))
+    proof.claim((count <= depth) & (~dut.r_rdy | (count != 0)) & (dut.w_rdy | (count >= depth - 1)))
+    with m.If(proof.before((count != 0) & ~takes)):
+        proof.claim(dut.r_rdy)
+    with m.If(proof.before(dut.r_rdy & ~takes)):
+        proof.claim(dut.r_rdy & (dut.r_data == proof.before(dut.r_data)))
+    places = depth - 1
+
+    def moved(start, by):
+        there = Signal(range(2 * places))
+        m.d.comb += there.eq(start + by)
+        return Mux(there >= places, there - places, there)
+
+    stored, produce, consume = inside["inner_level"], inside["produce"], inside["consume"]
+    place = Signal(range(places))
+    m.d.comb += place.eq(moved(consume, ahead - dut.r_rdy))
+    word = inside.word("storage", place)
+    proof.lemma((stored + dut.r_rdy == count) & (stored <= places) & (produce < places) & (consume < places))
+    proof.lemma(produce == moved(consume, stored))
+    proof.lemma(~followed | (ahead < count))
+    proof.lemma(~followed | (dut.r_rdy & (ahead == 0)) | (word == kept))
+
+
+_DEBOUNCE_BUGS = (
+    Bug("withdrawn", Debounce, "_walk_columns", "m.Elif(self.rows.ready)", "m.Else()"),
+    Bug("a row taken while one waits", Debounce, "_walk_columns", " & ~self.rows.valid", ""),
+    Bug("columns swapped", Debounce, "_walk_columns", "self._next_pressed)[1:]", "self._next_pressed)[:-1]"),
+    Bug("a column short", Debounce, "_walk_columns", "column != columns - 1", "column != columns - 2"),
+)
+_AUDIT_BUGS = (
+    Bug("one too many", Audit, "elaborate", "zones < self", "zones <= self"),
+    Bug("the end mark is dropped", Audit, "elaborate", "record.end | fits", "fits"),
+    Bug("taken without being passed on", Audit, "elaborate", "self.items.ready | ~passes", "1"),
+    Bug("not counted anew", Audit, "elaborate", "zones.eq(0)", "zones.eq(zones)"),
+)
+_BITMAP_BUGS = (
+    Bug("the mark comes again", Bitmap, "elaborate", "(~ends | self.items.ready)", "~ends"),
+    Bug("the mark is withdrawn", Bitmap, "elaborate", "(~ends | self.items.ready)", "1"),
+    Bug("a row is lost", Bitmap, "elaborate", "~counting & self.items.ready", "self.items.ready"),
+)
+_BACKLOG_BUGS = (
+    Bug("one too many", SyncFIFOBuffered, "elaborate", "inner_level != inner_depth", "1"),
+    Bug("an item comes again", SyncFIFOBuffered, "elaborate", "m.Elif(self.r_en)", "m.Elif(0)"),
+    Bug("an item is passed over", SyncFIFOBuffered, "elaborate", "(~self.r_rdy | self.r_en)", "1"),
+)
+CASES = (
+    Case("debounce hands on each row", "3 columns, sym_defer_pk", partial(debounce, method="sym_defer_pk"), 10,
+         _DEBOUNCE_BUGS, bug_clocks=20),
+    Case("audit passes each record", "4 columns, 2 zones", audit, 2, _AUDIT_BUGS),
+    Case("bitmap passes each row", "3x4", bitmap, 2, _BITMAP_BUGS),
+    Case("backlog keeps each item", "4 items", partial(backlog, depth=4), 3, _BACKLOG_BUGS, bug_clocks=14),
+    Case("backlog keeps each item", "18 items", partial(backlog, depth=18), 3),
+)  # fmt: skip

@@ -1,0 +1,108 @@
+"""What the labeller's records are held against: the zones of a frame, found a row at a time with all their cells.
+
+No runs, clusters, brackets or places here: the cells of two adjacent rows are the nodes of a graph, and what belongs
+together is its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame.
+"""
+
+from amaranth.hdl import Cat, Module, Mux, Signal
+
+from contactfpga.derived import Derived
+from contactfpga_hdl.payloads import moments_layout
+
+FIELDS = ("area", "sum_x", "sum_y")
+
+
+class OpenRow:
+    """A row and the zones it belongs to: for each column the columns of the same zone, and that zone's moments."""
+
+    def __init__(self, derived: Derived, name: str):
+        columns = range(derived.skin.columns)
+        self.cells = Signal(len(columns), name=f"{name}_cells")
+        self.reach = [Signal(len(columns), name=f"{name}_reach_{x}") for x in columns]
+        self.moments = [Signal(moments_layout(derived), name=f"{name}_moments_{x}") for x in columns]
+
+    def copy(self, other: "OpenRow", when=1) -> list:
+        """Statements that take over another row, or with ``when`` 0 an empty one."""
+        pairs = [(self.cells, other.cells), *zip(self.reach, other.reach)]
+        pairs += [(mine.as_value(), theirs.as_value()) for mine, theirs in zip(self.moments, other.moments)]
+        return [mine.eq(Mux(when, theirs, 0)) for mine, theirs in pairs]
+
+    def leaders(self) -> list:
+        """For each column whether it is the first one of its zone."""
+        return [cell & ~self.reach[x][:x].any() if x else cell for x, cell in enumerate(self.cells)]
+
+
+def next_row(m: Module, derived: Derived, before: OpenRow, cells, last, y, wanted):
+    """The open row behind ``cells``, and how many zones with the moments ``wanted`` end there.
+
+    Zones end that have no cell in the new row, and in the last row all others, too.
+    """
+    columns = range(derived.skin.columns)
+    after = OpenRow(derived, "next")
+    reach = _closure(m, before, cells, derived.skin.connectivity)
+    m.d.comb += after.cells.eq(cells)
+    for x in columns:
+        old, new = reach[len(columns) + x][: len(columns)], reach[len(columns) + x][len(columns) :]
+        m.d.comb += after.reach[x].eq(new)
+        merged = [leader & old[j] for j, leader in enumerate(before.leaders())]
+        for field, weights in zip(FIELDS, ([1] * len(columns), columns, [y] * len(columns))):
+            parts = [Mux(merged[j], before.moments[j][field], 0) for j in columns]
+            parts += [Mux(new[k], weights[k], 0) for k in columns]
+            m.d.comb += after.moments[x][field].eq(sum(parts))
+    ends = [
+        leader & ~reach[j][len(columns) :].any() & (before.moments[j].as_value() == wanted)
+        for j, leader in enumerate(before.leaders())
+    ]
+    ends += [last & leader & (after.moments[x].as_value() == wanted) for x, leader in enumerate(after.leaders())]
+    return after, sum(ends)
+
+
+def _closure(m: Module, before: OpenRow, cells, connectivity: int) -> list:
+    """For each cell of two rows, first those of the row before, the cells of both rows that belong to its zone."""
+    count = len(cells)
+    pressed = [*before.cells, *cells]
+
+    def adjacent(x, other):
+        return abs(x - other) <= (1 if connectivity == 8 else 0)
+
+    reach = []
+    for x in range(count):
+        down = Cat(cells[j] & adjacent(x, j) for j in range(count))
+        reach.append(Cat(before.reach[x], Mux(before.cells[x], down, 0)))
+    for x in range(count):
+        up = Cat(before.cells[j] & adjacent(x, j) for j in range(count))
+        beside = Cat(cells[j] & (abs(x - j) <= 1) for j in range(count))
+        reach.append(Mux(cells[x], Cat(up, beside), 0))
+    for through in range(len(pressed)):
+        closer = [Signal(len(pressed), name=f"through_{through}_{i}") for i in range(len(pressed))]
+        for i, closed in enumerate(closer):
+            m.d.comb += closed.eq(reach[i] | Mux(reach[i][through], reach[through], 0))
+        reach = closer
+    return reach
+
+
+def flood_fill(m: Module, derived: Derived, frame, wanted):
+    """How many zones of a frame have the moments ``wanted``: every pressed cell spreads over the whole frame."""
+    skin = derived.skin
+    cells = [(y, x) for y in range(skin.rows) for x in range(skin.columns)]
+    steps = [(-1, 0), (1, 0), (0, -1), (0, 1)]
+    if skin.connectivity == 8:
+        steps += [(-1, -1), (-1, 1), (1, -1), (1, 1)]
+    reach = [Mux(frame[i], 1 << i, 0) for i in range(len(cells))]
+    for turn in range(len(cells) - 1):
+        spread = [Signal(len(cells), name=f"spread_{turn}_{i}") for i in range(len(cells))]
+        for i, (y, x) in enumerate(cells):
+            beside = [reach[cells.index((y + dy, x + dx))] for dy, dx in steps if (y + dy, x + dx) in cells]
+            found = reach[i]
+            for other in beside:
+                found = found | other
+            m.d.comb += spread[i].eq(Mux(frame[i], found, 0))
+        reach = spread
+    count = 0
+    for i in range(len(cells)):
+        zone, moments = reach[i], Signal(moments_layout(derived), name=f"zone_moments_{i}")
+        for field, weights in zip(FIELDS, ([1] * len(cells), [x for _, x in cells], [y for y, _ in cells])):
+            m.d.comb += moments[field].eq(sum(Mux(zone[j], weight, 0) for j, weight in enumerate(weights)))
+        first = frame[i] & ~zone[:i].any() if i else frame[i]
+        count += first & (moments.as_value() == wanted.as_value())
+    return count
