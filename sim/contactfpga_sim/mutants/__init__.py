@@ -1,0 +1,1 @@
+"""Mutation testing of the gateware: does the comparison with the golden model notice a change of the netlist?"""

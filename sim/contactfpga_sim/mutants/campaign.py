@@ -1,0 +1,133 @@
+"""``make mutants``: mutants of the gateware, how many of them the comparison with the golden model tells, and the rest.
+
+For each Skin mutants are drawn at random. For those that short stimuli leave a proof of equivalence is tried, and what
+is not proved goes through long stimuli. What is left then is listed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import re
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from contactfpga.skin import Skin
+from contactfpga_sim.mutants import netlist, proof, trial
+from contactfpga_sim.mutants.netlist import STAGES, Mutant
+from contactfpga_sim.mutants.stimuli import SKINS, Stimulus, quick, thorough, until_time_wraps
+
+BATCH = 500
+"""Mutants in one board: with more of them it runs slower."""
+
+_SECTION = re.compile(r"(<!-- mutants -->).*?(<!-- end -->)", re.DOTALL)
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """What became of a mutant: ``killed``, ``equivalent`` or ``alive``."""
+
+    skin: str
+    mutant: Mutant
+    fate: str
+
+
+def left_by(skin: Skin, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) -> list[Mutant]:
+    """The mutants that behave as the golden model says under every stimulus."""
+    given = list(stimuli)
+    left: list[Mutant] = []
+    for start in range(0, len(mutants), BATCH):
+        batch = mutants[start : start + BATCH]
+        model = netlist.model(skin, batch)
+        left += [batch[n - 1] for n in trial.survivors(skin, model, range(1, len(batch) + 1), given)]
+    return left
+
+
+def examine(name: str, count: int, seed: int, say: Callable[[str], None] = lambda _: None) -> list[Result]:
+    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`."""
+    skin = SKINS[name]
+    say("draw")
+    drawn = netlist.draw(netlist.candidates(skin), count, seed)
+    say(f"{len(drawn)} mutants, short stimuli")
+    left = left_by(skin, drawn, quick(skin))
+    say(f"{len(left)} left, proofs")
+    proved = {mutant for mutant, same in zip(left, proof.equivalent(skin, left)) if same}
+    say(f"{len(left) - len(proved)} left, long stimuli")
+    long = [*thorough(skin), until_time_wraps(skin)]
+    alive = set(left_by(skin, [mutant for mutant in left if mutant not in proved], long))
+    say(f"{len(alive)} alive")
+    fates = (
+        (mutant, "equivalent" if mutant in proved else "alive" if mutant in alive else "killed") for mutant in drawn
+    )
+    return [Result(name, mutant, fate) for mutant, fate in fates]
+
+
+def table(results: Sequence[Result]) -> str:
+    """Counts by stage, as Markdown; the share is that of the mutants not proved equivalent."""
+    lines = [
+        f"| stage | mutants | killed | equivalent, proved at depth {proof.DEPTH} | alive | killed of the rest |",
+        "|---|---|---|---|---|---|",
+    ]
+    for stage in [*dict.fromkeys(STAGES.values()), "all"]:
+        fates = [result.fate for result in results if stage in ("all", result.mutant.stage)]
+        killed, equivalent, alive = (fates.count(fate) for fate in ("killed", "equivalent", "alive"))
+        share = f"{100 * killed / (killed + alive):.1f} %" if killed + alive else ""
+        lines.append(f"| {stage} | {len(fates):,} | {killed:,} | {equivalent} | {alive} | {share} |")
+    return "\n".join(lines)
+
+
+def share_killed(results: Iterable[Result]) -> float:
+    """Share of the killed among the mutants that are not proved equivalent."""
+    fates = [result.fate for result in results]
+    return fates.count("killed") / (fates.count("killed") + fates.count("alive"))
+
+
+def listed(results: Iterable[Result]) -> str:
+    """What is alive, a line each: stage, source place, change, Skin."""
+    alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
+    return "\n".join(f"{mutant}  ({skin})" for mutant, skin in alive)
+
+
+def main() -> int:
+    """Run the campaign; with a page named, write the table into it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--each", type=int, default=40, help="mutants of each Skin (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="for the choice of mutants (default %(default)s)")
+    parser.add_argument("--skin", action="append", choices=SKINS, help="only this Skin; can be repeated")
+    parser.add_argument("--jobs", type=int, default=2, help="Skins at once (default %(default)s)")
+    parser.add_argument("--page", type=Path, help="write the table into this page")
+    args = parser.parse_args()
+    results = _run(args.skin or list(SKINS), args.each, args.seed, args.jobs)
+    print(listed(results))
+    print()
+    print(table(results))
+    if args.page:
+        text = _SECTION.sub(lambda found: f"{found[1]}\n{table(results)}\n{found[2]}", args.page.read_text())
+        args.page.write_text(text)
+        print(f"wrote {args.page}")
+    return 0
+
+
+def _run(names: Sequence[str], each: int, seed: int, jobs: int) -> list[Result]:
+    """All Skins, each with its line of progress."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    steps = 5
+    columns = (TextColumn("{task.fields[skin]}"), BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns) as progress, ThreadPoolExecutor(jobs) as pool:
+
+        def one(name: str) -> list[Result]:
+            task = progress.add_task("", total=steps, skin=name)
+
+            def say(step: str) -> None:
+                progress.update(task, description=step, advance=1)
+
+            return examine(name, each, seed, say)
+
+        return [result for results in pool.map(one, names) for result in results]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

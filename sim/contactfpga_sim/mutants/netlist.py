@@ -1,0 +1,119 @@
+"""Mutants: small changes of the gateware's netlist, all of them in one compiled board whose input picks one."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+import re
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from contactfpga.skin import Skin
+from contactfpga_sim import board, native
+
+STAGES = {
+    "scan": "scan",
+    "debounce": "debounce",
+    "label": "label",
+    "audit": "report",
+    "bitmap": "report",
+    "link.packer": "pack",
+    "link": "link",
+    "transmitter": "serial",
+    "receiver": "serial",
+}
+"""Modules of the design, as Top names them, and the stage they count for."""
+
+# No test drives the reset: registers start from their initial values. Bits that are constant anyway are dropped, as a
+# mutant of them would be none. Memories stay whole: what is in them is no logic.
+PREPARE = (
+    "delete -port w:rst; setundef -undriven -zero; opt_expr; opt_merge; opt_clean; "
+    "wreduce; opt_expr; opt_clean; memory -nomap; opt_clean"
+)
+# A fault at Q is one at D a clock later, one at a clock no change of the logic; no memory here has a reset.
+_LEFT_OUT = ("Q", "CLK", "RD_CLK", "WR_CLK", "RD_ARST", "RD_SRST")
+_ALL = 1_000_000
+_SELECT_BITS = 16
+
+
+@dataclasses.dataclass(frozen=True)
+class Mutant:
+    """One bit of one port of a cell: inverted, held at a level, or inverted by another bit of the port."""
+
+    stage: str
+    place: str
+    """Where in the source of the gateware: file and line."""
+    change: str
+    """The options of Yosys' ``mutate``."""
+
+    def __str__(self) -> str:
+        return f"{self.stage} {self.place}: {self.change}"
+
+
+def candidates(skin: Skin) -> list[Mutant]:
+    """Every mutant of the stages of a Skin's board."""
+    with tempfile.TemporaryDirectory(prefix="contactfpga-") as name:
+        folder = Path(name)
+        (folder / "model.il").write_text(_with_places(native.rtlil(board.model_of(skin).elaborate(), sources=True)))
+        commands = ("read_rtlil model.il", native.FLATTEN, PREPARE, f"mutate -list {_ALL} -o list.txt")
+        native.yosys("; ".join(commands), folder)
+        lines = (folder / "list.txt").read_text().splitlines()
+    return [mutant for line in lines if (mutant := _parsed(line))]
+
+
+def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
+    """``count`` of the mutants at random, or all; the same for a seed."""
+    return random.Random(seed).sample(mutants, min(count, len(mutants)))
+
+
+def model(skin: Skin, mutants: Sequence[Mutant]) -> native.Model:
+    """The board in which ``Board.restart(n)`` picks ``mutants[n - 1]``."""
+    changes = [f"mutate -ctrl mutant {_SELECT_BITS} {n} {m.change}" for n, m in enumerate(mutants, 1)]
+    if len(changes) >= 1 << _SELECT_BITS:
+        raise ValueError(f"{len(changes)} mutants in one board; at most {(1 << _SELECT_BITS) - 1}")
+    plain = board.model_of(skin)
+    return dataclasses.replace(
+        plain,
+        title=f"{len(mutants)} mutants of {plain.title}",
+        passes="\n".join((PREPARE, *changes, "opt_expr; opt_merge; opt_clean")),
+        quiet=True,
+        defines={**plain.defines, "MUTANTS": len(mutants)},
+    )
+
+
+def _parsed(line: str) -> Mutant | None:
+    """A line of Yosys' list, None for a mutant that is left out."""
+    options = re.findall(r"-(\w+) (\S+)", line)
+    values = dict(options)
+    if values["port"] in _LEFT_OUT or (stage := _stage(values["cell"])) is None:
+        return None
+    places = [value for name, value in options if name == "src"]
+    own = [place for place in places if "contactfpga_hdl/" in place] or places or ["unknown"]
+    change = " ".join(f"-{name} {value}" for name, value in options if name not in ("wire", "wirebit", "src"))
+    return Mutant(stage, re.sub(r".*(contactfpga_hdl|site-packages)/", "", own[-1]), change)
+
+
+def _stage(cell: str) -> str | None:
+    """The stage of a cell by its path in the flattened design; None for one that is in no stage."""
+    path = cell.removeprefix("$flatten").replace("\\", "")
+    for module in sorted(STAGES, key=len, reverse=True):
+        if path.startswith(f"{module}."):
+            return STAGES[module]
+    return None
+
+
+def _with_places(rtlil: str) -> str:
+    """RTLIL in which the switches of a process have the process' source place: multiplexers are made of them."""
+    lines, place, above = [], "", ""
+    for line in rtlil.splitlines():
+        word = line.split(maxsplit=1)[:1]
+        if word == ["process"]:
+            place = above
+        elif word == ["switch"] and place:
+            lines.append(place)
+        elif line == "  end":
+            place = ""
+        above = line if line.lstrip().startswith("attribute \\src") else ""
+        lines.append(line)
+    return "\n".join(lines) + "\n"

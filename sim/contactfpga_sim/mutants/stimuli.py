@@ -1,0 +1,156 @@
+"""Skins in which every option's logic exists, and what is done to their boards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim import covering, shapes
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Timeline
+
+# Slow clocks bring what comes once in half a second within reach.
+SKINS = {
+    "8x8": Skin(rows=8, columns=8, clock_hz=1_000_000, baud=250_000, settle_us=30.0),
+    "8x8, 4-connectivity": Skin(
+        rows=8,
+        columns=8,
+        connectivity=4,
+        diodes="row2col",
+        mask=((0, 0), (7, 7), *((row, 3) for row in range(8))),
+        zone_capacity=5,
+        clock_hz=2_000_000,
+        baud=250_000,
+        settle_us=20.5,
+        release_us=1.5,
+    ),
+    "4x4, debounced": Skin(
+        rows=4,
+        columns=4,
+        debounce="sym_defer_pk",
+        debounce_press_us=250.0,
+        debounce_release_us=150.0,
+        send="on_change",
+        keep_alive_ms=0.7,
+        clock_hz=1_000_000,
+        baud=500_000,
+        settle_us=20.0,
+        release_us=2.0,
+    ),
+    "5x6, eager, 4-connectivity": Skin(
+        rows=5,
+        columns=6,
+        connectivity=4,
+        debounce="asym_eager_defer_pk",
+        debounce_press_us=400.0,
+        debounce_release_us=200.0,
+        mask=((2, 1), (4, 5)),
+        zone_capacity=1,
+        clock_hz=1_000_000,
+        baud=500_000,
+        settle_us=28.0,
+    ),
+    "5x9, cells": Skin(
+        rows=5,
+        columns=9,
+        diodes="row2col",
+        report="cells",
+        send="on_change",
+        keep_alive_ms=1.0,
+        mask=((1, 1),),
+        clock_hz=1_000_000,
+        baud=500_000,
+        settle_us=14.0,
+        release_us=3.0,
+    ),
+    "4x4, fast": Skin(rows=4, columns=4, clock_hz=1_000_000, baud=250_000, settle_us=10.0, release_us=1.0),
+    "64x32, cells, shift registers": Skin(
+        rows=64,
+        columns=32,
+        report="cells",
+        row_drive="74hc595",
+        row_chains=2,
+        column_read="74hc165",
+        column_chains=4,
+        shift_hz=500_000,
+        clock_hz=1_000_000,
+        baud=500_000,
+        settle_us=80.0,
+        release_us=30.0,
+    ),
+    "1x5, slow": Skin(rows=1, columns=5, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0),
+}
+
+_TIME_WRAPS_US = 1 << 24
+_ALL_FRAMES = 16
+"""Cells of a sheet of which every frame is tried."""
+
+
+class Stimulus(NamedTuple):
+    """What is done to a board, and for how many clock cycles."""
+
+    name: str
+    timeline: Timeline
+    cycles: int
+
+
+def quick(skin: Skin) -> Iterator[Stimulus]:
+    """Cells that come and go at any time, requests and stuck columns; then every adversarial shape for one scan."""
+    for seed in range(3):
+        yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks))
+    yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
+
+
+def thorough(skin: Skin) -> Iterator[Stimulus]:
+    """For the mutants that :func:`quick` leaves: the same for longer, all frames of a small sheet, random ones of a
+    larger one, and more than half a second of board time, after which a hello comes unasked."""
+    for seed in range(3, 9):
+        yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks))
+    yield _frames(skin, "frames", _various_frames(skin))
+    yield _rare(skin, "a second", 1_100_000)
+
+
+def until_time_wraps(skin: Skin) -> Stimulus:
+    """Little happens, until the device time has begun anew: the only way to its upper bits."""
+    return _rare(skin, "until the time wraps", _TIME_WRAPS_US + 500_000)
+
+
+def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
+    """Requests come all along, in bursts and one by one."""
+    rng = np.random.default_rng([seed, 11])
+    known = facts(skin)
+    byte, scan = 10 * known.bit_clocks, known.scan_clocks
+    gaps = byte + rng.choice([0, 0, 1, 7, scan, 8 * scan, 30 * scan], size=cycles // byte)
+    starts = np.cumsum(gaps) + int(rng.integers(scan))
+    pieces = covering.stimulus(skin, cycles, seed).pieces
+    return Stimulus(f"random {seed}", Timeline(pieces, [int(cycle) for cycle in starts if cycle < cycles]), cycles)
+
+
+def _various_frames(skin: Skin) -> np.ndarray:
+    """(n, R, C) bool: every frame of a sheet that is small enough, else random ones of all densities."""
+    cells = skin.rows * skin.columns
+    if cells <= _ALL_FRAMES:
+        numbers = np.arange(1 << cells)
+        return (numbers[:, None] >> np.arange(cells) & 1).astype(bool).reshape(-1, skin.rows, skin.columns)
+    rng = np.random.default_rng(5)
+    density = rng.choice([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 0.95, 1.0], (3000, 1, 1))
+    return rng.random((3000, skin.rows, skin.columns)) < density
+
+
+def _frames(skin: Skin, name: str, frames: np.ndarray) -> Stimulus:
+    return Stimulus(name, Timeline.frames(skin, frames), (len(frames) + 2) * facts(skin).scan_clocks)
+
+
+def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
+    """Other cells every 0.3 s, and stuck columns with some of them."""
+    rng = np.random.default_rng(13)
+    clocks = skin.clock_hz // 1_000_000
+    shape = (skin.rows, skin.columns)
+    pieces = [
+        (start * clocks, rng.random(shape) < 0.1, rng.random(skin.columns) < 0.5 if start % 2 else None)
+        for start in range(0, microseconds, 300_001)
+    ]
+    return Stimulus(name, Timeline(pieces), microseconds * clocks)

@@ -1,0 +1,62 @@
+"""Which mutants behave differently from the gateware as it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim import bench_native, golden, native
+from contactfpga_sim.board import Board
+from contactfpga_sim.compare import compare
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.scan import driven
+from contactfpga_sim.mutants.stimuli import Stimulus
+
+OBSERVED = (*golden.BOUNDARIES, "driven")
+"""Where a mutant can be told from the gateware as it should be."""
+
+_FIRST_LOOK = 512
+"""Cycles before the first comparison; each further one comes after twice as many."""
+
+Events = Mapping[str, np.ndarray]
+
+
+def survivors(skin: Skin, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus]) -> list[int]:
+    """The mutants that no stimulus tells from the gateware as it should be."""
+    left = list(numbers)
+    with Board(skin, OBSERVED, model) as board:
+        for stimulus in stimuli:
+            events = expected(board, stimulus)
+            left = [number for number in left if killed_at(board, number, stimulus, events) is None]
+    return left
+
+
+def expected(board: Board, stimulus: Stimulus) -> Events:
+    """What the board without a mutant does, after it was compared with the golden model in every clock.
+
+    Raises :class:`contactfpga_sim.compare.Mismatch` where they differ.
+    """
+    board.restart()
+    bench_native.play(board, stimulus.timeline, stimulus.cycles)
+    events = {name: board.take(name) for name in OBSERVED}
+    trace = bench_native.trace(events, stimulus.cycles)
+    compare(golden.predict(board.skin, stimulus.timeline, stimulus.cycles), trace)
+    rows = [(int(event["cycle"]), int(event["data"])) for event in events["driven"]]
+    if rows != driven(facts(board.skin), stimulus.cycles):
+        raise AssertionError("rows are not driven as docs/timing.md says")
+    return events
+
+
+def killed_at(board: Board, number: int, stimulus: Stimulus, events: Events) -> str | None:
+    """The first boundary at which mutant ``number`` does something else than ``events``; None where it never does."""
+    board.restart(number)
+    while (start := board.cycle) < stimulus.cycles:
+        until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
+        bench_native.play(board, stimulus.timeline, until)
+        for name in OBSERVED:
+            first, last = np.searchsorted(events[name]["cycle"], (start, until))
+            if not np.array_equal(board.take(name), events[name][first:last]):
+                return name
+    return None
