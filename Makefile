@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams constraints figures campaign lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes formal campaign mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -59,14 +59,29 @@ bitstream: $(VENV)/.stamp-boards ## build a bitstream: make bitstream BOARD=iceb
 bitstreams: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## build one for every board and check size and timing
 	$(PY) -m pytest -m campaign $(ARGS) tests/test_bitstream.py
 
+RECORDINGS ?= $(wildcard ../shared/data/*.npz)
+bitstream-replay: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## simulate what the bitstreams hold: [BOARD=..., SKIN=...] ARGS="--frames 100000"
+	$(PY) -m contactfpga_sim.bitstream_replay $(BOARD) $(if $(SKIN),--skin $(SKIN)) \
+	    $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(ARGS)
+
 constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
 	$(PY) -m contactfpga_hdl.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
 	$(PY) -m contactfpga_sim.figures README.md docs/use.md
 
+sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (a quarter of an hour)
+	$(PY) -m contactfpga_sim.size_tables docs/boards.md
+
+formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
+	$(PY) -m contactfpga_sim.proofs $(ARGS)
+
 campaign: $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
+
+# Its libraries are of no use to anything else, so they stay out of the user's cache.
+mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (a quarter of an hour)
+	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.mutants.campaign --page docs/mutants.md $(ARGS)
 
 lint: $(VENV)/.stamp-lint ## check style and types
 	$(PY) -m ruff check

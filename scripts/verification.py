@@ -1,8 +1,8 @@
 """Writes docs/verification.md from the results of `make test`, or checks that it still holds.
 
 tests/claims.toml lists what is claimed and the tests that show it. A claim whose tests are missing, skipped or failed
-is an error; only those marked `recordings` may be skipped, where the recordings are absent. A test says how many cases
-it ran with `record_property("cases", n)`; one that says nothing counts as one.
+is an error; only those marked `recordings` or `icarus` may be skipped, where these are absent. A test says how many
+cases it ran with `record_property("cases", n)`; one that says nothing counts as one.
 """
 
 import argparse
@@ -18,8 +18,8 @@ PAGE = ROOT / "docs" / "verification.md"
 HEAD = """# Verification
 
 Written by `make verification` from the results of `make test`; CI fails when a line's tests are missing or skipped, or
-when this page is out of date. Only the recordings may be absent. *Cases* counts frames, patterns or inputs where a test
-runs many of them.
+when this page is out of date. Only the recordings and Icarus Verilog may be absent. *Cases* counts frames, patterns or
+inputs where a test runs many of them. Where *command* is not `make test`, it runs more than the share counted here.
 
 """
 
@@ -68,22 +68,25 @@ def matching(test: str, results: dict[str, Outcome]) -> list[Outcome]:
 
 
 def judge(claims: dict, results: dict[str, Outcome]) -> tuple[str, list[str], set[str]]:
-    """The page, what is wrong, and the lines that may differ because the recordings are absent."""
+    """The page, what is wrong, and the lines that may differ because something is absent."""
     page, wrong, loose = HEAD, [], set()
     for section in claims["section"]:
-        page += f"## {section['title']}\n\n| claim | tests | cases | result |\n|---|---|---|---|\n"
+        page += f"## {section['title']}\n\n| claim | tests | command | cases | result |\n|---|---|---|---|---|\n"
         for claim in section["claim"]:
             outcomes = [outcome for test in claim["tests"] for outcome in matching(test, results)]
             words = sorted({outcome.word() for outcome in outcomes})
             cases = sum(outcome.cases for outcome in outcomes)
             tests = "<br>".join(f"`{test}`" for test in claim["tests"])
-            page += f"| {claim['claim']} | {tests} | {cases:,} | {', '.join(words)} |\n"
-            if claim.get("recordings"):
+            command = claim.get("command", "make test")
+            page += f"| {claim['claim']} | {tests} | `{command}` | {cases:,} | {', '.join(words)} |\n"
+            if claim.get("recordings") or claim.get("icarus"):
                 loose.add(claim["claim"])
                 words = [word for word in words if "skipped" not in word]
             wrong += [f"{claim['claim']}: {word} ({', '.join(claim['tests'])})" for word in words if word != "passed"]
         page += "\n"
-    return page.rstrip() + "\n", wrong, loose
+    page += "## Waived\n\n| claim | because |\n|---|---|\n"
+    page += "".join(f"| {waived['claim']} | {waived['because']} |\n" for waived in claims["waived"])
+    return page, wrong, loose
 
 
 def main() -> int:
