@@ -22,8 +22,8 @@ MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 GRID = 16
 """A switch's face is looked at in this many by this many points where a share of it has to be covered."""
 
-BLOCK = 1 << 20
-"""Stresses that are added up at once."""
+BLOCK = 1 << 15
+"""Stresses that are added up at once: few enough to stay in the cache."""
 
 
 @dataclasses.dataclass(frozen=True)
