@@ -2,8 +2,9 @@
 
 Parts that overlap or touch are one contact. A row of constant y cuts each part, which is convex, in one interval; the
 union of the intervals is exact, and it is integrated over y by Gauss-Legendre between all heights at which a part
-begins, ends or has a corner, or at which two outlines cross. The result is off by 1e-9 of the area at most, unless two
-outlines cross twice within 1/64 of such a stretch; the sliver between them is then counted to about its own size.
+begins, ends or has a corner, or at which two outlines cross. The result is off by 1e-7 of the area at most, unless two
+outlines cross twice between two of the :data:`SAMPLES` heights of a stretch at which they are compared; the sliver
+between them is then counted to about its own size.
 """
 
 from __future__ import annotations
@@ -163,9 +164,10 @@ def _outlines(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
 
 def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> list[float]:
     """Heights between which outlines keep their order; each part is cut all the way from start to end, or nowhere."""
-    y = np.linspace(start, end, SAMPLES)[1:-1]
-    middle = np.array([(start + end) / 2])
-    active = [part for part in parts if np.isfinite(part.span(middle)[0][0])]
+    middle, half = (start + end) / 2, (end - start) / 2
+    active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
+    # Close together at both ends, where round outlines run fast, and just off them, where some begin in one point.
+    y = middle - half * np.cos(np.linspace(1e-6, math.pi - 1e-6, SAMPLES))
     curves = _outlines(active, box, y)
     first, second = np.triu_indices(len(curves), 1)
     ahead = curves[first] < curves[second]
@@ -176,10 +178,10 @@ def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> lis
     low, high = y[place], y[place + 1]
     column = np.arange(len(pair))
     for _ in range(36):
-        half = (low + high) / 2
-        now = _outlines(active, box, half)
+        tried = (low + high) / 2
+        now = _outlines(active, box, tried)
         same = (now[one, column] < now[other, column]) == was
-        low, high = np.where(same, half, low), np.where(same, high, half)
+        low, high = np.where(same, tried, low), np.where(same, high, tried)
     return sorted({float(height) for height in (low + high) / 2})
 
 

@@ -187,7 +187,7 @@ class Rectangle(_Placed):
         return tuple(float(corner) for corner in np.sort(corners)[1:3])
 
     def pressure(self, fineness_m: float) -> tuple[Floats, Floats, Floats]:
-        u, u_weights = _gauss(4 + math.ceil(4 * self.half_x_m / fineness_m))
-        v, v_weights = _gauss(4 + math.ceil(4 * self.half_y_m / fineness_m))
+        u, u_weights = _gauss(6 + math.ceil(7 * self.half_x_m / fineness_m))
+        v, v_weights = _gauss(6 + math.ceil(7 * self.half_y_m / fineness_m))
         x, y = self._sheet(np.repeat(u, len(v)), np.tile(v, len(u)))
         return x, y, np.outer(u_weights, v_weights).ravel() / 4

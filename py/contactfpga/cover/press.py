@@ -107,7 +107,7 @@ class Cover:
 
 
 def _under(parts: Sequence[Part], x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    found = np.zeros(x.shape, bool)
+    found = np.zeros(np.broadcast_shapes(x.shape, y.shape), bool)
     for part in parts:
         found |= part.contains(x, y)
     return found
