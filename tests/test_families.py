@@ -1,6 +1,7 @@
 """Families of scenes: the same ones for the same seed, on the sheet, and what their names say."""
 
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -19,6 +20,12 @@ def test_the_same_seed_gives_the_same_scenes(family):
     assert scenes == placements(family, 6, 11, FINE)
     assert scenes[4:] == placements(family, 2, 11, FINE, first=4)
     assert len({repr(scene) for scene in (*scenes, *placements(family, 6, 12, FINE))}) == 12
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_scenes_can_be_sent_to_another_process(family):
+    scenes = placements(family, 2, 11, FINE)
+    assert pickle.loads(pickle.dumps(scenes)) == scenes
 
 
 def test_families_do_not_share_their_places():
