@@ -63,8 +63,8 @@ def run(
 ) -> Trace:
     """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
 
-    ``known_words``: patterns of what is known at power-up, :func:`initialised` if left out. Raises :class:`Unknown` when a row,
-    the transmit or the contact pin is not known, and :class:`OutOfTime`.
+    ``known_words``: patterns of what is known at power-up, :func:`initialised` if left out. Raises :class:`Unknown`
+    when a row, the transmit or the contact pin is not known, and :class:`OutOfTime`.
     """
     from contactfpga_hdl.top import Top
 

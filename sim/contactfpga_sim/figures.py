@@ -127,7 +127,8 @@ def reference_row(name: str, skin: Skin) -> str:
 def labeller_table() -> str:
     """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
     lines = [
-        "| labeller | cells | connectivity | built-in tactile scenes, worst | shapes that break labellers, worst | bound |",
+        "| labeller | cells | connectivity | built-in tactile scenes, worst "
+        "| shapes that break labellers, worst | bound |",
         "|---|---|---|---|---|---|",
     ]
     for labeller in ("run", "serial"):

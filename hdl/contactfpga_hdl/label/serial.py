@@ -134,7 +134,7 @@ class SerialLabeller(wiring.Component):
         derived = self.derived
         # With 8-connectivity a place is two columns'. It is read before a run of the new row can begin in either.
         odd = self._column[0] if derived.skin.connectivity == 8 else 1
-        writes = []
+        ports = []
         for name, bit in (("earlier", self._earlier), ("later", self._later)):
             m.submodules[name] = bits = memory.Memory(shape=1, depth=derived.open_zones, init=[])
             read = bits.read_port()
@@ -143,8 +143,8 @@ class SerialLabeller(wiring.Component):
                 read.addr.eq(place_of(derived, self._next_column)),
                 bit.eq(read.data),
             ]
-            writes.append(bits.write_port())
-        self._write_earlier, self._write_later = writes
+            ports.append((read, bits.write_port()))
+        (self._read_earlier, self._write_earlier), (self._read_later, self._write_later) = ports
 
     def _write_brackets(self, m):
         """A run has later ones until its zone is known to have none; it has earlier ones if its group has."""
@@ -192,10 +192,13 @@ class SerialLabeller(wiring.Component):
             }
         )
         m.submodules.groups = groups = memory.Memory(shape=layout, depth=2 << bits, init=[])
-        read, self._write = groups.read_port(), groups.write_port()
-        self._found = read.data
-        wanted = self._begins & ~self._second & (~self._earlier | self._whole)
-        m.d.comb += read.addr.eq(Cat(Mux(self._earlier, self._top, self._place), ~wanted))
+        self._read, self._write = groups.read_port(), groups.write_port()
+        self._found = self._read.data
+        self._wanted = Signal()
+        m.d.comb += [
+            self._wanted.eq(self._begins & ~self._second & (~self._earlier | self._whole)),
+            self._read.addr.eq(Cat(Mux(self._earlier, self._top, self._place), ~self._wanted)),
+        ]
 
     def _know_runs(self, m):
         with m.If(self._enable):
