@@ -1,5 +1,9 @@
 """Labellers: rows in, zone records out, behind one interface."""
 
 from contactfpga_hdl.label.run import RunLabeller
+from contactfpga_hdl.label.serial import SerialLabeller
 
-__all__ = ["RunLabeller"]
+LABELLERS = {"run": RunLabeller, "serial": SerialLabeller}
+"""By the name that `labeller` has in a Skin."""
+
+__all__ = ["LABELLERS", "RunLabeller", "SerialLabeller"]
