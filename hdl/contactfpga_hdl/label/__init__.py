@@ -1,5 +1,7 @@
 """Labellers: rows in, zone records out, behind one interface."""
 
+from contactfpga_hdl.label.projection import ProjectionLabeller
 from contactfpga_hdl.label.run import RunLabeller
+from contactfpga_hdl.label.single import SingleLabeller
 
-__all__ = ["RunLabeller"]
+__all__ = ["ProjectionLabeller", "RunLabeller", "SingleLabeller"]
