@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -120,7 +119,7 @@ class VirtualBoard:
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes.
     """
 
-    def __init__(self, skin: Skin | None = None, scene: str | Path | np.ndarray | scenes.Scene | None = None):
+    def __init__(self, skin: Skin | None = None, scene: scenes.Source = None):
         self.skin = skin or Skin()
         self._scene = scenes.scene(self.skin, scene)
         self._board = Board(self.skin)

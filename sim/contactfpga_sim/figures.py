@@ -133,7 +133,7 @@ def labeller_table() -> str:
     for size in (16, 32, 64):
         for connectivity in (8, 4):
             skin = Skin(rows=size, columns=size, connectivity=connectivity, settle_us=10.0)
-            touches = np.stack([_cut_at_last_row(make(skin)(0.0)) for make in TACTILE])
+            touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
             shapes = np.stack([cells for _, cells in variants(size, size)])
             with LabelBench(skin) as bench:
                 clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]

@@ -14,12 +14,10 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.board import VirtualBoard
-from contactfpga_sim.scenes import Scene
+from contactfpga_sim.scenes import Source
 
 CHUNK_S = 0.5e-3
 """Simulated time between two looks at the port."""
@@ -45,7 +43,7 @@ class PtyBoard:
     def __init__(
         self,
         skin: Skin | None = None,
-        scene: str | Path | np.ndarray | Scene | None = None,
+        scene: Source = None,
         link: str | Path | None = None,
     ):
         self._board = VirtualBoard(skin, scene)

@@ -1,130 +1,165 @@
-"""What touches the sheet: scenes as functions of time, by name, from a recording or from a callback.
+"""What touches the sheet: contacts over time with their truth, recordings, and scenes by name.
 
-The patches are geometric: a cell is pressed when its centre lies under the contact.
+A :class:`Scene` knows no sheet: the same contacts press sheets of any pitch and size, through any cover.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from contactfpga.cover import Cover, Load
 from contactfpga.skin import Skin
+from contactfpga_sim import contacts
+from contactfpga_sim.contacts import Contact, Swing
+from contactfpga_sim.recordings import Recording
 from contactfpga_sim.shapes import SHAPES
+from contactfpga_sim.truth import Box, Truth, truth_of
 
-Scene = Callable[[float], np.ndarray]
+CellsAt = Callable[[float], np.ndarray]
 """Time in s to the (rows, columns) bool cells that are pressed then."""
 
 FINGER_MM = 12.0
 """Radius of a fingertip's contact."""
 
-RECORDING_HZ = 100.0
-"""Rate at which a recording is played that does not come with one."""
+FOOT_MM = 260.0
+"""Length of a foot, where the sheet is long enough for it."""
 
 
-def ellipse(skin: Skin, x_mm: float, y_mm: float, width_mm: float, height_mm: float) -> np.ndarray:
-    """(rows, columns) bool: cells under an ellipse with these half axes; at least the cell nearest to its centre."""
-    x = np.arange(skin.columns) * skin.pitch_x_mm - x_mm
-    y = np.arange(skin.rows) * skin.pitch_y_mm - y_mm
-    cells = (x / width_mm) ** 2 + (y[:, None] / height_mm) ** 2 <= 1
-    cells[np.abs(y).argmin(), np.abs(x).argmin()] = True
-    return cells
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """Contacts over time. On a cylinder places are those on the sheet laid flat, and the cover counts as flat."""
+
+    contacts: tuple[Contact, ...]
+
+    def loads(self, seconds: float) -> list[Load]:
+        """What lies on the cover at that time."""
+        found = (contact.load(seconds) for contact in self.contacts)
+        return [load for load in found if load is not None]
+
+    def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
+        """Number of contacts, areas in mm2 and centroids in mm at that time, from the continuous shapes: parts that
+        overlap or touch are one contact. With a Skin, of what lies on its sheet, which ends half a pitch beyond the
+        outermost switches."""
+        parts = [part for load in self.loads(seconds) for part in load.parts]
+        return truth_of(parts, Box() if skin is None else sheet(skin))
+
+    def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
+        """(rows, columns) bool: the switches that are closed at that time; no cover given: those that lie under a
+        contact. ``skin.mask`` plays no part, it is the gateware's."""
+        x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
+        y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
+        return (cover or Cover()).closed(self.loads(seconds), x, y[:, None])
+
+    def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
+        """:meth:`pressed` on this sheet as a function of time."""
+        if all(contact.still for contact in self.contacts):
+            cells = self.pressed(0.0, skin, cover)
+            return lambda seconds: cells
+        return lambda seconds: self.pressed(seconds, skin, cover)
+
+
+def sheet(skin: Skin) -> Box:
+    """The sheet laid flat, in m: half a pitch more than the outermost switches on every side."""
+    x, y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
+    return Box(-x / 2, (skin.columns - 0.5) * x, -y / 2, (skin.rows - 0.5) * y)
+
+
+def _extent(skin: Skin) -> tuple[float, float]:
+    """Width and height between the outermost switches, in mm."""
+    return (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
 
 
 def fingertip(skin: Skin) -> Scene:
     """One fingertip at rest, a third into the sheet."""
-    x_mm, y_mm = (extent / 3 for extent in _extent(skin))
-    return _still(ellipse(skin, x_mm, y_mm, FINGER_MM, FINGER_MM))
+    width, height = _extent(skin)
+    return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=width / 3, y_mm=height / 3),))
 
 
 def two_fingers(skin: Skin) -> Scene:
     """Two fingertips side by side, with at least one free column between them."""
     width, height = _extent(skin)
-    apart = 2 * FINGER_MM + 1.01 * skin.pitch_x_mm
-    left, right = (width - apart) / 2, (width + apart) / 2
-    cells = ellipse(skin, left, height / 2, FINGER_MM, FINGER_MM)
-    return _still(cells | ellipse(skin, right, height / 2, FINGER_MM, FINGER_MM))
+    return Scene(contacts.pair(1.01 * skin.pitch_x_mm, FINGER_MM, width / 2, height / 2))
 
 
 def palm(skin: Skin) -> Scene:
-    """A hand laid flat: two balls of the hand, the pads below the fingers, and the hollow between them."""
+    """A hand laid flat in the middle, around a hollow."""
     width, height = _extent(skin)
-    x, y = width / 2, height / 2
-    cells = ellipse(skin, x - 24, y + 22, 18, 28) | ellipse(skin, x + 24, y + 24, 16, 26)
-    return _still(cells | ellipse(skin, x, y - 24, 42, 14))
+    return Scene((Contact(shape=contacts.palm(), x_mm=width / 2, y_mm=height / 2 - 8, force_n=40.0),))
+
+
+def sole(skin: Skin) -> Scene:
+    """A bare foot in the middle, as long as the sheet allows."""
+    width, height = _extent(skin)
+    shape = contacts.sole(min(FOOT_MM, height + 0.9 * skin.pitch_y_mm))
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, force_n=350.0),))
 
 
 def edge(skin: Skin) -> Scene:
-    """A straight edge across the sheet, 20 degrees off the rows."""
+    """A straight edge across the sheet, 20 degrees off the rows and wide enough to press a switch in each column."""
     width, height = _extent(skin)
-    x = np.arange(skin.columns) * skin.pitch_x_mm - width / 2
-    y = np.arange(skin.rows)[:, None] * skin.pitch_y_mm - height / 2
-    tilt = math.radians(20)
-    distance = x * math.sin(tilt) - y * math.cos(tilt)
-    return _still(np.abs(distance) <= 0.55 * skin.pitch_y_mm)
+    shape = contacts.edge(2 * (width + height) + 100, 1.1 * skin.pitch_y_mm)
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=20.0, force_n=40.0),))
 
 
 def moving(skin: Skin) -> Scene:
     """A fingertip that circles around the middle of the sheet twice a second."""
     width, height = _extent(skin)
-
-    def scene(seconds: float) -> np.ndarray:
-        angle = 4 * math.pi * seconds
-        x_mm, y_mm = width * (0.5 + 0.3 * math.cos(angle)), height * (0.5 + 0.3 * math.sin(angle))
-        return ellipse(skin, x_mm, y_mm, FINGER_MM, FINGER_MM)
-
-    return scene
+    x = Swing(width / 2, 0.3 * width, 2.0)
+    y = Swing(height / 2, 0.3 * height, 2.0, -math.pi / 2)
+    return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
 
 
 def nothing(skin: Skin) -> Scene:
     """An untouched sheet."""
-    return _still(np.zeros((skin.rows, skin.columns), bool))
+    return Scene(())
 
 
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
-    scene.__name__: scene for scene in (fingertip, two_fingers, palm, edge, moving, nothing)
+    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, nothing)
 }
 """Every contact scene by its name."""
 
 NAMES = (*CONTACTS, *SHAPES)
 """All that :func:`scene` knows by name: contacts, and the shapes that break labellers."""
 
+Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
+"""What :func:`scene` takes."""
 
-def scene(skin: Skin, source: str | Path | np.ndarray | Scene | None = None) -> Scene:
-    """A scene for a sheet.
 
-    ``source``: one of :data:`NAMES` (none given: fingertip); a .npy file or an array, (rows, columns) or
-    (frames, rows, columns), bool or numbers of which all but 0 are pressed, frames played in a loop at
-    :data:`RECORDING_HZ`; or a function of time. Raises ValueError for anything else.
+def scene(skin: Skin, source: Source = None) -> CellsAt:
+    """The cells that a scene presses on a sheet, as a function of time.
+
+    ``source``: one of :data:`NAMES` (none given: fingertip); a Scene; a Recording, or a .npy or .npz file of one, or
+    an array (rows, columns) or (frames, rows, columns), played in a loop (:mod:`contactfpga_sim.recordings`); or a
+    function of time. Raises ValueError for anything else.
     """
     if source is None:
         source = "fingertip"
+    if isinstance(source, Scene):
+        return source.on(skin)
+    if isinstance(source, Recording):
+        return source.on(skin)
+    if isinstance(source, np.ndarray):
+        return Recording.of(source, "the array").on(skin)
     if callable(source):
         return _checked(skin, source)
-    if isinstance(source, np.ndarray):
-        return _recording(skin, source, "the array")
     name = str(source)
     if name in CONTACTS:
-        return CONTACTS[name](skin)
+        return CONTACTS[name](skin).on(skin)
     if name in SHAPES:
-        return _still(SHAPES[name](skin.rows, skin.columns))
-    if not name.endswith(".npy"):
-        raise ValueError(f"scene {name!r} is not known; take a .npy file or one of {', '.join(NAMES)}")
-    return _recording(skin, np.load(name, allow_pickle=False), name)
+        cells = SHAPES[name](skin.rows, skin.columns)
+        return lambda seconds: cells
+    if not name.endswith((".npy", ".npz")):
+        raise ValueError(f"scene {name!r} is not known; take a .npy or .npz file or one of {', '.join(NAMES)}")
+    return Recording.load(name).on(skin)
 
 
-def _recording(skin: Skin, frames: np.ndarray, what: str) -> Scene:
-    if frames.ndim == 2:
-        frames = frames[None]
-    if frames.ndim != 3 or not len(frames) or frames.shape[1:] != (skin.rows, skin.columns):
-        raise ValueError(f"{what} has shape {frames.shape}; the sheet takes (frames, {skin.rows}, {skin.columns})")
-    pressed = frames != 0
-    return lambda seconds: pressed[int(seconds * RECORDING_HZ) % len(pressed)]
-
-
-def _checked(skin: Skin, callback: Scene) -> Scene:
+def _checked(skin: Skin, callback: CellsAt) -> CellsAt:
     def scene(seconds: float) -> np.ndarray:
         cells = np.asarray(callback(seconds), bool)
         if cells.shape != (skin.rows, skin.columns):
@@ -132,12 +167,3 @@ def _checked(skin: Skin, callback: Scene) -> Scene:
         return cells
 
     return scene
-
-
-def _still(cells: np.ndarray) -> Scene:
-    return lambda seconds: cells
-
-
-def _extent(skin: Skin) -> tuple[float, float]:
-    """Width and height between the outermost cell centres, in mm."""
-    return (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm

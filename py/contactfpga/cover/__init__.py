@@ -1,0 +1,14 @@
+"""The soft cover between what touches and the switches: which of them close. SI units throughout, stress positive in
+compression.
+
+The paper is Battaglia et al., "Combining Haptic Sensing with Safe Interaction"; its equations are cited by number, as
+corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), is cited by name.
+"""
+
+from contactfpga.cover.answer import CoverError, NoSolution
+from contactfpga.cover.hertz import Ball
+from contactfpga.cover.patch import Ellipse, Part, Rectangle
+from contactfpga.cover.press import MODELS, Cover, Load
+from contactfpga.cover.switch import Switch
+
+__all__ = ["MODELS", "Ball", "Cover", "CoverError", "Ellipse", "Load", "NoSolution", "Part", "Rectangle", "Switch"]

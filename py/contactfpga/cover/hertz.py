@@ -1,0 +1,77 @@
+"""A ball pressed on the cover: its patch, its pressure, and the stress below it in a half-space."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from contactfpga.cover.answer import CoverError, positive
+from contactfpga.cover.switch import Switch
+
+
+@dataclasses.dataclass(frozen=True)
+class Ball:
+    """Hertz contact of a ball (or of crossed equal cylinders) with the cover (Johnson 4.2)."""
+
+    radius_m: float
+    """Effective radius R* in m: 1/R* is the sum of both bodies' curvatures."""
+    modulus_pa: float
+    """Effective modulus E* in Pa: 1/E* is the sum of (1 - nu^2)/E of both bodies."""
+
+    def __post_init__(self) -> None:
+        positive("radius_m", self.radius_m, "m")
+        positive("modulus_pa", self.modulus_pa, "Pa")
+
+    def patch_m(self, force_n: float) -> float:
+        """Radius of the patch in m: a = (3 F R* / (4 E*))^(1/3)."""
+        return math.cbrt(0.75 * positive("force_n", force_n, "N") * self.radius_m / self.modulus_pa)
+
+    def indentation_m(self, force_n: float) -> float:
+        """How far the ball sinks in, in m: delta = a^2 / R*."""
+        return self.patch_m(force_n) ** 2 / self.radius_m
+
+    def peak_pa(self, force_n: float) -> float:
+        """Pressure in Pa in the middle of the patch: p0 = 3 F / (2 pi a^2)."""
+        return 1.5 * force_n / (math.pi * self.patch_m(force_n) ** 2)
+
+    def closing_n(self, switch: Switch, depth_m: float) -> float:
+        """The force in N that closes a switch right below, ``depth_m`` deep in a half-space.
+
+        On the axis sigma = 3 F / (2 pi (a^2 + z^2)), which rises with F without end.
+        """
+        positive("depth_m", depth_m, "m")
+        low = 2 * math.pi / 3 * switch.closing_pa * depth_m**2  # that of a point force: the stress below it is highest
+        high = 2 * low
+        while on_axis_pa(high, self.patch_m(high), depth_m) < switch.closing_pa:
+            low, high = high, 2 * high
+        while high - low > 1e-13 * high:
+            middle = (low + high) / 2
+            under = on_axis_pa(middle, self.patch_m(middle), depth_m) < switch.closing_pa
+            low, high = (middle, high) if under else (low, middle)
+        return high
+
+
+def on_axis_pa(force_n: float, patch_m: float, depth_m: float) -> float:
+    """Normal stress in Pa right below the middle of a Hertz patch (Johnson (3.45b)): 3 F / (2 pi (a^2 + z^2))."""
+    return 1.5 * force_n / (math.pi * (patch_m**2 + depth_m**2))
+
+
+def stress_pa(force_n: float, patch_m: float, offset_m: np.ndarray | float, depth_m: float) -> np.ndarray:
+    """Normal stress in Pa in a half-space under the pressure p0 sqrt(1 - r^2/a^2) on a disc of radius ``patch_m``.
+
+    Huber's closed form: p0 (z/sqrt u)^3 a^2 u / (u^2 + a^2 z^2), 2 u = w + sqrt(w^2 + 4 a^2 z^2),
+    w = r^2 + z^2 - a^2; ``offset_m``: distances r in m from the axis, ``depth_m``: z in m. Independent of the
+    Poisson ratio.
+    """
+    positive("patch_m", patch_m, "m")
+    positive("depth_m", depth_m, "m")
+    if not force_n >= 0:
+        raise CoverError(f"force_n is {force_n!r}; it must be 0 N or above")
+    peak = 1.5 * force_n / (math.pi * patch_m**2)
+    excess = np.asarray(offset_m, float) ** 2 + depth_m**2 - patch_m**2
+    root = np.sqrt(excess**2 + (2 * patch_m * depth_m) ** 2)
+    # The sum cancels inside the patch; the product of both roots is known.
+    u = np.where(excess > 0, (root + excess) / 2, 2 * (patch_m * depth_m) ** 2 / (root + np.abs(excess)))
+    return np.asarray(peak * (depth_m / np.sqrt(u)) ** 3 * patch_m**2 * u / (u**2 + (patch_m * depth_m) ** 2))

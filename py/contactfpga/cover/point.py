@@ -1,0 +1,78 @@
+"""A point force on the cover: the paper's model of sensitivity, (9) and (10), over any medium."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contactfpga.cover import medium
+from contactfpga.cover.answer import NoSolution, not_negative, positive
+from contactfpga.cover.switch import Switch
+
+LEAST: float = 2 * math.pi / 3 * 2.5**2.5 / 1.5**1.5
+"""Least force over the thickness, over stress times offset squared: 11.266052."""
+
+
+def stress_pa(
+    force_n: float, offset_m: np.ndarray | float, thickness_m: float, within: str = "halfspace"
+) -> np.ndarray:
+    """Normal stress in Pa at the switches, at horizontal distances ``offset_m`` in m from a point force in N.
+
+    sigma = F/h^2 g(rho/h) (:mod:`contactfpga.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
+    z^2)^(5/2)). ``within``: one of :data:`contactfpga.cover.medium.MEDIA`.
+    """
+    positive("thickness_m", thickness_m, "m")
+    offset = np.asarray(offset_m, float)
+    return force_n / thickness_m**2 * medium.spread(within, offset / thickness_m)
+
+
+def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:
+    """The point force in N that closes a switch at the horizontal distance ``offset_m``: (9) solved for F; with
+    ``offset_m`` = pitch / sqrt(2) it is (10).
+
+    In a layer no force does beyond :func:`contactfpga.cover.medium.first_zero`: the cover is pulled off the switch
+    there, and where it presses again farther out, it is by less than 0.3 % of the stress on the axis.
+    """
+    not_negative("offset_m", offset_m, "m")
+    positive("thickness_m", thickness_m, "m")
+    ratio, limit = offset_m / thickness_m, medium.first_zero(within)
+    if limit is not None and ratio >= limit:
+        return NoSolution(
+            f"a switch {1e3 * offset_m:g} mm from the force is {ratio:.4g} thicknesses of the cover away; from "
+            f"{limit:.4g} on a point force on a {within} layer does not press it"
+        )
+    return switch.closing_pa * thickness_m**2 / float(medium.exact_spread(within, ratio))
+
+
+def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:
+    """How far in m from a point force of ``force`` N a switch still closes: the inverse of :func:`force_n`.
+
+    Over a half-space rho = sqrt((3 z^3 F / (2 pi sigma))^0.4 - z^2).
+    """
+    positive("force", force, "N")
+    below = force_n(switch, 0.0, thickness_m, within)
+    assert not isinstance(below, NoSolution)
+    if force < below:
+        return NoSolution(f"{force:g} N do not even close the switch right below; that takes {below:.4g} N")
+    limit = medium.first_zero(within)
+    if limit is None:
+        cubed = 1.5 / math.pi * thickness_m**3 * force / switch.closing_pa
+        return math.sqrt(max(0.0, cubed**0.4 - thickness_m**2))
+    wanted = switch.closing_pa * thickness_m**2 / force
+    low, high = 0.0, limit
+    while high - low > 1e-13:
+        middle = (low + high) / 2
+        low, high = (middle, high) if medium.exact_spread(within, middle) >= wanted else (low, middle)
+    return low * thickness_m
+
+
+def best_thickness_m(offset_m: float) -> float:
+    """The thickness in m at which the least point force closes a switch this far away, over a half-space: from
+    d/dz of (9), z = sqrt(1.5) rho."""
+    return math.sqrt(1.5) * positive("offset_m", offset_m, "m")
+
+
+def least_force_n(switch: Switch, offset_m: float) -> float:
+    """The force in N at :func:`best_thickness_m`: 11.266052 sigma rho^2."""
+    return LEAST * switch.closing_pa * float(positive("offset_m", offset_m, "m")) ** 2

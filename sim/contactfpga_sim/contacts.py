@@ -1,0 +1,154 @@
+"""What touches a sheet, as physical things: shape, place, force and motion. Lengths in mm on the sheet laid flat.
+
+x runs along the columns, y along the rows, cell (row 0, column 0) lies at 0 mm; angles turn from x towards y.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from contactfpga.cover import Ball, Ellipse, Load, Part, Rectangle
+
+Value = float | Callable[[float], float]
+"""A number, or a function of the time in s."""
+
+Shape = tuple[Part, ...]
+"""Convex parts around the origin, as the cover takes them: in m. Parts may overlap or lie apart."""
+
+M = 1e-3
+"""Metres in a mm: a Skin counts in mm, the cover's physics in m."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """A value that runs straight from point to point, and stays at the first and last one outside of them."""
+
+    seconds: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.seconds) != len(self.values) or not self.seconds:
+            raise ValueError(f"a track has {len(self.seconds)} times and {len(self.values)} values; it needs as many")
+        if any(later <= earlier for earlier, later in zip(self.seconds, self.seconds[1:])):
+            raise ValueError(f"the times of a track are {self.seconds}; each must be later than the one before")
+
+    def __call__(self, seconds: float) -> float:
+        return float(np.interp(seconds, self.seconds, self.values))
+
+
+@dataclasses.dataclass(frozen=True)
+class Swing:
+    """A value that swings around ``middle``: middle + reach cos(2 pi hertz t + phase_rad)."""
+
+    middle: float
+    reach: float
+    hertz: float
+    phase_rad: float = 0.0
+
+    def __call__(self, seconds: float) -> float:
+        return self.middle + self.reach * math.cos(2 * math.pi * self.hertz * seconds + self.phase_rad)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Contact:
+    """One thing that touches the sheet while its force is above 0."""
+
+    shape: Shape | Callable[[float], Shape]
+    """Its parts, or a function of the time in s that gives them."""
+    x_mm: Value
+    """Where the shape's origin lies along the columns."""
+    y_mm: Value
+    """Where it lies along the rows."""
+    angle_deg: Value = 0.0
+    """How far the shape is turned."""
+    force_n: Value = 10.0
+    """Normal force in N; none at 0 and below."""
+
+    @property
+    def still(self) -> bool:
+        """Nothing about it changes with time."""
+        return not any(callable(getattr(self, field.name)) for field in dataclasses.fields(self))
+
+    def load(self, seconds: float) -> Load | None:
+        """What it puts on the cover at that time; None while it does not touch."""
+        force = _at(self.force_n, seconds)
+        if not force > 0:
+            return None
+        parts = self.shape(seconds) if callable(self.shape) else self.shape
+        x, y = _at(self.x_mm, seconds) * M, _at(self.y_mm, seconds) * M
+        angle = math.radians(_at(self.angle_deg, seconds))
+        return Load(tuple(part.placed(x, y, angle) for part in parts), force)
+
+
+def _at(value: Value, seconds: float) -> float:
+    return value(seconds) if callable(value) else value
+
+
+def disc(radius_mm: float) -> Shape:
+    """A round patch."""
+    return ellipse(radius_mm, radius_mm)
+
+
+def ellipse(half_x_mm: float, half_y_mm: float) -> Shape:
+    """An elliptic patch, by its half axes."""
+    return (Ellipse(half_x_mm * M, half_y_mm * M),)
+
+
+def edge(length_mm: float, width_mm: float) -> Shape:
+    """A flat bar on its narrow side."""
+    return (Rectangle(length_mm * M / 2, width_mm * M / 2),)
+
+
+def palm(scale: float = 1.0) -> Shape:
+    """A hand laid flat, 84 mm wide and 92 mm long, fingers towards -y: two balls, the pads below the fingers and the
+    heel, one contact around a hollow."""
+    return _scaled(scale, (-24, 16, 18, 34), (26, 16, 16, 34), (0, -24, 42, 14), (0, 42, 30, 12))
+
+
+def sole(length_mm: float = 260.0) -> Shape:
+    """A bare right foot, toes towards -y: heel, outer edge and ball, which are one contact, and the big toe, 8 mm
+    apart from it where the foot is 260 mm long."""
+    scale = length_mm / 260
+    outer = Rectangle(16 * M * scale, 50 * M * scale, 22 * M * scale, 25 * M * scale)
+    return (*_scaled(scale, (4, 98, 30, 32), (-2, -50, 46, 36), (-26, -112, 15, 18)), outer)
+
+
+def _scaled(scale: float, *ellipses: tuple[float, float, float, float]) -> Shape:
+    return tuple(
+        Ellipse(half_x * M * scale, half_y * M * scale, x * M * scale, y * M * scale)
+        for x, y, half_x, half_y in ellipses
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Pressed:
+    """The shape of a ball's patch while its force changes: a disc of Hertz's radius."""
+
+    ball: Ball
+    force_n: Value
+
+    def __call__(self, seconds: float) -> Shape:
+        radius = self.ball.patch_m(_at(self.force_n, seconds))
+        return (Ellipse(radius, radius),)
+
+
+def pressed_ball(ball: Ball, force_n: Value, x_mm: Value, y_mm: Value) -> Contact:
+    """A ball whose patch grows with the force on it."""
+    return Contact(shape=Pressed(ball, force_n), force_n=force_n, x_mm=x_mm, y_mm=y_mm)
+
+
+def pair(
+    gap_mm: float, radius_mm: float, x_mm: float, y_mm: float, angle_deg: float = 0.0, force_n: Value = 10.0
+) -> tuple[Contact, Contact]:
+    """Two fingers of this radius around a place, ``gap_mm`` free between their rims; they meet at 0 and below."""
+    apart = gap_mm / 2 + radius_mm
+    if not apart > 0:
+        raise ValueError(f"gap_mm is {gap_mm}; two discs of {radius_mm} mm need more than {-2 * radius_mm:g} mm")
+    dx, dy = apart * math.cos(math.radians(angle_deg)), apart * math.sin(math.radians(angle_deg))
+    places = ((x_mm - dx, y_mm - dy), (x_mm + dx, y_mm + dy))
+    first, second = (Contact(shape=disc(radius_mm), x_mm=x, y_mm=y, force_n=force_n) for x, y in places)
+    return first, second
