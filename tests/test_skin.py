@@ -62,8 +62,20 @@ REFUSED = [
     ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
-        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us)",
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with labeller = "
+        "'run'",
     ),
+    (
+        {"settle_us": 1.0, "labeller": "serial"},
+        "settle_us + release_us is 24 clocks; 16 columns and 64 zones a frame need 27 clocks (2.25 us) with labeller = "
+        "'serial'",
+    ),
+    (
+        {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
+        "settle_us + release_us is 48 clocks; 24 columns and 1 zones a frame need 51 clocks (4.25 us) with labeller = "
+        "'serial'",
+    ),
+    ({"labeller": "fast"}, "labeller is 'fast'; it must be one of 'run', 'serial'"),
     (
         {"debounce": "fast"},
         "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk'",
@@ -322,6 +334,7 @@ OTHER = {
     "debounce": "sym_defer_pk",
     "debounce_press_us": 4000.0,
     "debounce_release_us": 4000.0,
+    "labeller": "serial",
     "report": "cells",
     "send": "on_change",
     "keep_alive_ms": 50.0,

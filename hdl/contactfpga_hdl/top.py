@@ -8,7 +8,7 @@ from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.audit import Audit, Bitmap
 from contactfpga_hdl.debounce import Debounce
-from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
 from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan import Scanner
@@ -85,7 +85,7 @@ class Top(wiring.Component):
         return debounce.rows
 
     def _zones(self, m, rows, scan, link):
-        m.submodules.label = label = RunLabeller(self.skin)
+        m.submodules.label = label = LABELLERS[self.skin.labeller](self.skin)
         m.submodules.audit = audit = Audit(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)

@@ -89,11 +89,11 @@ class Derived:
 
     @property
     def min_row_clocks(self) -> int:
-        """A row must last until debounce and labeller are done with the one before it, and a frame until the one
-        before it is packed: the scanner's tag is kept for no longer."""
+        """A row must last until debounce and labeller are done with the one before it, end mark and all, and a frame
+        until the one before it is packed: the scanner's tag is kept for no longer."""
         debouncing = 0 if self.skin.debounce == "none" else self.skin.columns + 3
-        packed = 1 + debouncing + self.max_steps + 3 + 2 + self.max_stored_bytes + 4
-        return max(self.skin.columns + 6, 10, math.ceil(packed / self.skin.rows))
+        packed = 1 + debouncing + self.label_clocks + 2 + self.max_stored_bytes + 4
+        return max(self.skin.columns + 6, 10, self.label_clocks + 1, math.ceil(packed / self.skin.rows))
 
     @property
     def keep_alive_frames(self) -> int:
@@ -202,9 +202,11 @@ class Derived:
         return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
 
     @property
-    def max_steps(self) -> int:
-        """The most clocks, but one, that the labeller takes for a row."""
-        return self.open_zones if self.skin.report == "moments" else 0
+    def label_clocks(self) -> int:
+        """The most clocks from a frame's last row to its end mark."""
+        if self.skin.report == "cells":
+            return 3
+        return self.open_zones + (3 if self.skin.labeller == "run" else self.skin.columns + 2)
 
     @functools.cached_property
     def backlog(self) -> int:

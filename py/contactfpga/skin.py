@@ -28,6 +28,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "row_drive": ("direct", "74hc595"),
     "column_read": ("direct", "74hc165"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
+    "labeller": ("run", "serial"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
 }
@@ -90,6 +91,9 @@ class Skin:
     debounce_release_us: float = 5000.0
     """How long a release must last to count, in us."""
 
+    labeller: str = "run"
+    """How zones are found, exactly in both: ``run``, fastest, its work follows the runs of pressed cells; ``serial``,
+    smallest, a cell a clock."""
     report: str = "moments"
     """``moments``: area, sum x and sum y of each zone; ``cells``: the pressed cells as a bitmap."""
     send: str = "always"
@@ -273,7 +277,7 @@ class Skin:
             raise SkinError(
                 f"settle_us + release_us is {derived.row_clocks} clocks; {self.columns} columns and "
                 f"{self.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
-                f"({derived.min_row_clocks / megahertz:g} us)"
+                f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{self.labeller}'"
             )
         if self.send == "on_change" and derived.keep_alive_frames < 1:
             raise SkinError(

@@ -18,6 +18,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "diodes": ("col2row", "row2col"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
+    "labeller": ("run", "serial"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),
@@ -81,7 +82,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     """The Skin for an assignment of :data:`CHOICES`."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
-    values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "report", "send")}
+    values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
     values |= {"rows": rows, "columns": columns, "clock_hz": megahertz * 1_000_000, "baud": baud}
     if choice["surface"] == "cylinder":
         values |= {"surface": "cylinder", "radius_mm": 2.0 * columns + 5.5, "pitch_y_mm": 7.25}

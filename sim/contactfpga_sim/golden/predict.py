@@ -52,7 +52,7 @@ class Labeller:
         facts = self._facts
         late = facts.columns + 3 if facts.debounced else 0
         words = [int(np.sum(1 << np.nonzero(row)[0].astype(object))) for row in cells]
-        work = label.labelling(cells, facts.skin.connectivity)
+        work = label.labelling(cells, facts.skin.connectivity, facts.skin.labeller)
         handed = []
         for row, offered in enumerate(one.offered):
             last = row == facts.rows - 1
@@ -60,10 +60,10 @@ class Labeller:
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
             if facts.moments:
-                self._free = cycle + work.steps[row] + 1
+                self._free = cycle + work.busy[row]
         if facts.moments:
-            records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
-            end = handed[-1] + work.steps[-1] + 3
+            records = [(handed[zone.row] + zone.clock, self._record(zone)) for zone in work.departures]
+            end = handed[-1] + work.end
         else:
             records = list(zip(handed, words, strict=True))
             end = handed[-1] + 3
