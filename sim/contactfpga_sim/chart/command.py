@@ -64,4 +64,3 @@ def _with_progress(tasks: list[Task], executor: Executor, with_size: bool) -> li
             progress.update(bar, advance=1, total=of, description=name)
 
         return study(tasks, executor, with_size, step)
-

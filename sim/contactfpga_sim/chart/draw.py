@@ -58,7 +58,8 @@ def _panel(panel, points: Sequence[Point], metric: str) -> None:
         if index in best:
             text = point.task.method + (f"\n{point.luts:,} LUT4" if point.luts else "")
             panel.annotate(text, (x, y), textcoords="offset points", xytext=(6, 5), fontsize=6.5)
-    panel.step(*np.array([places[index] for index in best]).reshape(-1, 2).T, where="post", color="black", linewidth=0.7)
+    corners = np.array([places[index] for index in best]).reshape(-1, 2)
+    panel.step(*corners.T, where="post", color="black", linewidth=0.7)
     panel.axhline(FLOOR[metric], color="grey", linewidth=0.5, linestyle=":")
 
 

@@ -1,4 +1,4 @@
-"""The methods and settings that the chart compares: the reference Skin with one thing changed, on sheets of one extent."""
+"""The methods and settings that the chart compares, all on sheets of one extent."""
 
 from __future__ import annotations
 

@@ -24,4 +24,3 @@ def measure(skin: Skin) -> sizes.Size:
         return dataclasses.asdict(sizes.measure(lambda: Top(skin), DEVICE, seeds=1))
 
     return sizes.Size(**kept.kept("size", key, new))
-

@@ -1,4 +1,4 @@
-"""From touch to the last byte of the frame that holds all of it: by the golden model, and by the gateware on a sample."""
+"""From touch to the last byte of the frame that holds all of it: by the golden model, a sample by the gateware, too."""
 
 from __future__ import annotations
 

@@ -136,7 +136,9 @@ def _key(task: Task, kind: str, number: int) -> str:
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:
     """Numbers of the (time, error) points that no other one beats in one and equals in the other, by rising time."""
-    order = sorted((time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all())
+    order = sorted(
+        (time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all()
+    )
     best, found = math.inf, []
     for _, error, index in order:
         if error < best:

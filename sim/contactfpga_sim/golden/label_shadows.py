@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.label import Departure, Labelling
+from contactfpga_sim.golden.work import Departure, Labelling
 
 
 def projection(cells: np.ndarray) -> Labelling:
     """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band."""
     rows, columns = cells.shape
     pressed = cells.any(axis=1)
-    steps = [columns if pressed[y] or (y and pressed[y - 1]) else 0 for y in range(rows)]
+    walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
     departures = []
     for first, past in _runs(pressed):
         closing = min(past, rows - 1)
         for left, right in _runs(cells[first:past].any(axis=0)):
             box = np.zeros_like(cells)
             box[first:past, left:right] = cells[first:past, left:right]
-            departures.append(Departure(closing, right, *_moments(box)))
-    return Labelling(tuple(steps), tuple(departures))
+            departures.append(Departure(closing, right + 2, *_moments(box)))
+    return _work(walks, columns, departures)
 
 
 def single(cells: np.ndarray) -> Labelling:
@@ -27,8 +27,14 @@ def single(cells: np.ndarray) -> Labelling:
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
     walks = [*cells[:-1].any(axis=1), any_pressed]
-    departures = (Departure(rows - 1, columns, *_moments(cells)),) if any_pressed else ()
-    return Labelling(tuple(columns + 1 if walk else 0 for walk in walks), departures)
+    departures = [Departure(rows - 1, columns + 2, *_moments(cells))] if any_pressed else []
+    return _work(walks, columns + 1, departures)
+
+
+def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
+    """A row that is walked takes so many clocks more; the end mark comes three clocks behind the last row's walk."""
+    steps = [clocks if walk else 0 for walk in walks]
+    return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
 
 
 def _runs(line: np.ndarray) -> list[tuple[int, int]]:
