@@ -81,9 +81,10 @@ def fingertip(skin: Skin) -> Scene:
 
 
 def two_fingers(skin: Skin) -> Scene:
-    """Two fingertips side by side, with at least one free column between them."""
+    """Two fingertips side by side, with at least one free column between them; on a single column, one free row."""
     width, height = _extent(skin)
-    return Scene(contacts.pair(1.01 * skin.pitch_x_mm, FINGER_MM, width / 2, height / 2))
+    gap, angle = (1.01 * skin.pitch_y_mm, 90.0) if skin.columns == 1 else (1.01 * skin.pitch_x_mm, 0.0)
+    return Scene(contacts.pair(gap, FINGER_MM, width / 2, height / 2, angle))
 
 
 def palm(skin: Skin) -> Scene:
@@ -93,10 +94,11 @@ def palm(skin: Skin) -> Scene:
 
 
 def sole(skin: Skin) -> Scene:
-    """A bare foot in the middle, as long as the sheet allows."""
+    """A bare foot in the middle, along the sheet's longer side and as long as that allows."""
     width, height = _extent(skin)
-    shape = contacts.sole(min(FOOT_MM, height + 0.9 * skin.pitch_y_mm))
-    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, force_n=350.0),))
+    along, angle = (height + 0.9 * skin.pitch_y_mm, 0.0) if height >= width else (width + 0.9 * skin.pitch_x_mm, 90.0)
+    shape = contacts.sole(min(FOOT_MM, along))
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=angle, force_n=350.0),))
 
 
 def edge(skin: Skin) -> Scene:

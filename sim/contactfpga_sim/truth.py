@@ -166,6 +166,8 @@ def _crossings(parts: Sequence[Part], box: Box, start: float, end: float) -> lis
     """Heights between which outlines keep their order; each part is cut all the way from start to end, or nowhere."""
     middle, half = (start + end) / 2, (end - start) / 2
     active = [part for part in parts if np.isfinite(part.span(np.array(middle))[0])]
+    if not active:  # between two parts that hardly touch
+        return []
     # Close together at both ends, where round outlines run fast, and just off them, where some begin in one point.
     y = middle - half * np.cos(np.linspace(1e-6, math.pi - 1e-6, SAMPLES))
     curves = _outlines(active, box, y)

@@ -29,6 +29,18 @@ class Part(Protocol):
         """Its middle along the rows in m."""
 
     @property
+    def angle_rad(self) -> float:
+        """How far its own x axis is turned."""
+
+    @property
+    def half_x_m(self) -> float:
+        """Half its extent along its own x axis, in m."""
+
+    @property
+    def half_y_m(self) -> float:
+        """Half its extent along its own y axis, in m."""
+
+    @property
     def area_m2(self) -> float:
         """Its area in m2."""
 
