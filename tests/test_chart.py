@@ -14,8 +14,9 @@ from scipy.stats import binomtest
 from contactfpga import cli, protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
+from contactfpga_sim import kept
 from contactfpga_sim.board import Board
-from contactfpga_sim.chart import errors, kept, speed, study
+from contactfpga_sim.chart import errors, speed, study
 from contactfpga_sim.chart.errors import Blob
 from contactfpga_sim.chart.methods import EXTENT_MM, METHODS
 from contactfpga_sim.chart.study import Task
@@ -164,11 +165,11 @@ def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, caps
     assert "chart.png" in capsys.readouterr().out
     assert (first / "chart.png").stat().st_size > 10_000
     assert (first / "chart.svg").read_text().count("<svg") == 1
-    lines = list(csv.DictReader((first / "chart.csv").open()))
+    lines = list(csv.DictReader((first / "chart.csv").read_text().splitlines()))
     assert [line["method"] for line in lines] == list(names)
     again = shlex.split(lines[1]["command"])[1:]
     assert cli.main([*again, *options, str(second)]) == 0
-    assert list(csv.DictReader((second / "chart.csv").open())) == lines[1:]
+    assert list(csv.DictReader((second / "chart.csv").read_text().splitlines())) == lines[1:]
 
 
 @pytest.mark.parametrize(

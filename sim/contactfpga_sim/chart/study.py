@@ -11,7 +11,10 @@ from concurrent.futures import Executor, as_completed
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.chart import errors, kept, size, speed
+from contactfpga_hdl import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim import kept, size
+from contactfpga_sim.chart import errors, speed
 from contactfpga_sim.chart.errors import METRICS, Interval
 from contactfpga_sim.chart.speed import Speed
 from contactfpga_sim.families import placements
@@ -19,6 +22,9 @@ from contactfpga_sim.scenes import Scene
 
 PIECE = 125
 """Placements that are worked out together."""
+
+DEVICE = sizes.UP5K
+"""For which LUT4 and clock are given."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,8 +77,8 @@ def study(
     number = len(jobs) + len(tasks) + len(skins)
     pieces = {executor.submit(accuracy, task, first): (task, first) for task, first in jobs}
     times = {executor.submit(timing, task): task for task in tasks}
-    sizes = {executor.submit(size.measure, skin): skin for skin in skins}
-    for future in as_completed([*pieces, *times, *sizes]):
+    places = {executor.submit(_size, skin): skin for skin in skins}
+    for future in as_completed([*pieces, *times, *places]):
         future.result()
         step("placements" if future in pieces else "times" if future in times else "place and route", number)
     found: dict[Task, dict[str, dict[str, list[float]]]] = {}
@@ -81,7 +87,7 @@ def study(
             for metric, values in metrics.items():
                 found.setdefault(task, {}).setdefault(kind, {}).setdefault(metric, []).extend(values)
     speeds = {task: future.result() for future, task in times.items()}
-    measured = {skin: future.result() for future, skin in sizes.items()}
+    measured = {skin: future.result() for future, skin in places.items()}
     return [
         Point(
             task,
@@ -127,6 +133,10 @@ def timing(task: Task) -> dict[str, float]:
         return dataclasses.asdict(speed.measure(task.skin, frames, task.checked))
 
     return kept.kept("timing", _key(task, "timing", task.timed), new)
+
+
+def _size(skin: Skin) -> sizes.Size:
+    return size.measure(lambda: Top(skin), DEVICE, seeds=1)
 
 
 def _key(task: Task, kind: str, number: int) -> str:
