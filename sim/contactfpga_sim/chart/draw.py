@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,24 +44,35 @@ def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "ba
 
 def _panel(panel, points: Sequence[Point], metric: str) -> None:
     panel.set(xscale="log", yscale="log", xlabel="touch to last byte, us (median; line to the worst)")
-    panel.grid(alpha=0.25, which="both")
+    panel.grid(alpha=0.2, which="both")
     places = [(point.speed.median_us, max(point.total[metric].mean, FLOOR[metric])) for point in points]
     best = front(places)
-    for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
-        found, skin = point.total[metric], point.task.skin
-        panel.plot([x, point.speed.worst_us], [y, y], color=_colour(point), alpha=0.3, linewidth=1)
-        panel.plot([x, x], [max(found.low, FLOOR[metric]), max(found.high, FLOOR[metric])], color=_colour(point))
-        panel.plot(point.speed.bound_us, y, marker="|", color=_colour(point), alpha=0.6)
-        panel.plot(
-            x, y, MARKERS[skin.pitch_x_mm], color=_colour(point), markersize=7, markeredgewidth=1.5,
-            markeredgecolor="black" if index in best else "white",
-        )  # fmt: skip
-        if index in best:
-            text = point.task.method + (f"\n{point.luts:,} LUT4" if point.luts else "")
-            panel.annotate(text, (x, y), textcoords="offset points", xytext=(6, 5), fontsize=6.5)
     corners = np.array([places[index] for index in best]).reshape(-1, 2)
     panel.step(*corners.T, where="post", color="black", linewidth=0.7)
     panel.axhline(FLOOR[metric], color="grey", linewidth=0.5, linestyle=":")
+    for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
+        found, colour = point.total[metric], _colour(point)
+        low, high = (max(end, FLOOR[metric]) for end in (found.low, found.high))
+        panel.plot([x, point.speed.worst_us], [y, y], color=colour, alpha=0.25, linewidth=1)
+        panel.plot([x, x], [low, high], color=colour, alpha=0.35, linewidth=1)
+        panel.plot(point.speed.bound_us, y, marker="|", color=colour, alpha=0.6)
+        marker, edge = MARKERS[point.task.skin.pitch_x_mm], "black" if index in best else "white"
+        panel.plot(x, y, marker, color=colour, markersize=8, markeredgecolor=edge, zorder=3 + (index in best))
+    for index in best:
+        x, y = places[index]
+        alike = [point for point, place in zip(points, places, strict=True) if _alike(place, (x, y))]
+        text = "\n".join(map(_label, alike))
+        panel.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4), fontsize=6)
+    panel.margins(0.12, 0.2)
+
+
+def _alike(place: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Too close to be told apart in the picture."""
+    return abs(math.log(place[0] / other[0])) < 0.02 and abs(math.log(place[1] / other[1])) < 0.05
+
+
+def _label(point: Point) -> str:
+    return point.task.method + (f" ({point.luts:,} LUT4)" if point.luts else "")
 
 
 def _colour(point: Point) -> str:
