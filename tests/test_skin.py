@@ -62,8 +62,8 @@ REFUSED = [
     ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
-        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with labeller = "
-        "'run'",
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with "
+        "labeller = 'run'",
     ),
     (
         {"settle_us": 1.0, "labeller": "serial"},

@@ -23,7 +23,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga_hdl import report, synthesis
 from contactfpga_hdl.build import BuildFailed, tool
-from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label import RunLabeller, SerialLabeller
 from contactfpga_hdl.top import Top
 
 
@@ -52,7 +52,12 @@ ECP5 = Device(
 )
 DEVICES = (UP5K, ECP5)
 SIZES = (8, 16, 32, 64)
-DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {"whole": Top, "labeller": RunLabeller}
+DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
+    "whole, `run`": Top,
+    "whole, `serial`": lambda skin: Top(skin.replace(labeller="serial")),
+    "labeller `run`": RunLabeller,
+    "labeller `serial`": SerialLabeller,
+}
 SEEDS = 3
 LIMIT_S = 200
 """For some seeds the router goes on for ever: they are passed over. Runs that end take up to a minute of the

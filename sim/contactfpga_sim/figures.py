@@ -127,19 +127,27 @@ def reference_row(name: str, skin: Skin) -> str:
 def labeller_table() -> str:
     """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
     lines = [
-        "| cells | connectivity | built-in tactile scenes, worst | shapes that break labellers, worst | bound |",
-        "|---|---|---|---|---|",
+        "| labeller | cells | connectivity | built-in tactile scenes, worst "
+        "| shapes that break labellers, worst | bound |",
+        "|---|---|---|---|---|---|",
     ]
-    for size in (16, 32, 64):
-        for connectivity in (8, 4):
-            skin = Skin(rows=size, columns=size, connectivity=connectivity, settle_us=10.0)
-            touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
-            shapes = np.stack([cells for _, cells in variants(size, size)])
-            with LabelBench(skin) as bench:
-                clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
-            bound = math.ceil(size / 2) + 4 if connectivity == 8 else size + 4
-            lines.append(f"| {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |")
+    for labeller in ("run", "serial"):
+        for size in (16, 32, 64):
+            for connectivity in (8, 4):
+                lines.append(labeller_row(labeller, size, connectivity))
     return "\n".join(lines)
+
+
+def labeller_row(labeller: str, size: int, connectivity: int) -> str:
+    """One row of :func:`labeller_table`."""
+    skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
+    touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
+    shapes = np.stack([cells for _, cells in variants(size, size)])
+    with LabelBench(skin) as bench:
+        clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
+    more = math.ceil(size / 2) if connectivity == 8 else size
+    bound = more + 4 if labeller == "run" else size + more + 1
+    return f"| `{labeller}` | {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |"
 
 
 def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
