@@ -19,6 +19,8 @@ SKINS = {
     "4-connected": SMALL.replace(connectivity=4, zone_capacity=4),
     "serial": SMALL.replace(labeller="serial"),
     "serial, 4-connected": SMALL.replace(labeller="serial", connectivity=4, rows=9, columns=7, zone_capacity=4),
+    "projection": SMALL.replace(labeller="projection"),
+    "single": SMALL.replace(labeller="single"),
     "symmetric": SMALL.replace(debounce="sym_defer_pk", debounce_press_us=60.0, debounce_release_us=120.0),
     "eager": SMALL.replace(
         debounce="asym_eager_defer_pk",

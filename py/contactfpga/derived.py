@@ -206,7 +206,13 @@ class Derived:
         """The most clocks from a frame's last row to its end mark."""
         if self.skin.report == "cells":
             return 3
-        return self.open_zones + (3 if self.skin.labeller == "run" else self.skin.columns + 2)
+        columns = self.skin.columns
+        return {
+            "run": self.open_zones + 3,
+            "serial": columns + self.open_zones + 2,
+            "projection": columns + 3,
+            "single": columns + 4,
+        }[self.skin.labeller]
 
     @functools.cached_property
     def backlog(self) -> int:

@@ -28,7 +28,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "row_drive": ("direct", "74hc595"),
     "column_read": ("direct", "74hc165"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
-    "labeller": ("run", "serial"),
+    "labeller": ("run", "serial", "projection", "single"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
 }
@@ -92,8 +92,9 @@ class Skin:
     """How long a release must last to count, in us."""
 
     labeller: str = "run"
-    """How zones are found, exactly in both: ``run``, fastest, its work follows the runs of pressed cells; ``serial``,
-    smallest, a cell a clock."""
+    """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
+    a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
+    cells are one zone."""
     report: str = "moments"
     """``moments``: area, sum x and sum y of each zone; ``cells``: the pressed cells as a bitmap."""
     send: str = "always"

@@ -18,7 +18,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "diodes": ("col2row", "row2col"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
-    "labeller": ("run", "serial"),
+    "labeller": ("run", "serial", "projection", "single"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),

@@ -1,38 +1,16 @@
 """When a labeller lets its zones out: where zones end is geometry, how many clocks that takes is the labeller's rule in
-docs/timing.md. The rule of ``run``, clusters and steps, is here, that of ``serial`` in :mod:`label_serial`."""
+docs/timing.md. The rule of ``run``, clusters and steps, is here, that of ``serial`` in :mod:`label_serial`; those that
+are not exact have their own idea of a zone in :mod:`label_shadows`."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
 
-from contactfpga_sim.golden import label_serial
+from contactfpga_sim.golden import label_serial, label_shadows
+from contactfpga_sim.golden.work import Departure, Labelling
 from contactfpga_sim.golden.zones import flood, moments
-
-
-@dataclasses.dataclass(frozen=True)
-class Departure:
-    """A zone that leaves: so many clocks behind the one in which row ``row`` was handed over."""
-
-    row: int
-    clock: int
-    area: int
-    sum_x: int
-    sum_y: int
-
-
-@dataclasses.dataclass(frozen=True)
-class Labelling:
-    """A labeller's work on one frame."""
-
-    busy: tuple[int, ...]
-    """Clocks from each row to the next that can be handed over."""
-    end: int
-    """Clocks from the last row to the end mark."""
-    departures: tuple[Departure, ...]
-    """Zones in the order they leave."""
 
 
 def labelling(cells: np.ndarray, connectivity: int, labeller: str = "run") -> Labelling:
@@ -44,6 +22,8 @@ def labelling(cells: np.ndarray, connectivity: int, labeller: str = "run") -> La
 @functools.lru_cache(maxsize=4096)
 def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: str) -> Labelling:
     cells = np.frombuffer(packed, bool).reshape(shape)
+    if labeller in BY_SHADOW:
+        return BY_SHADOW[labeller](cells)
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
     strips = [RULES[labeller](above[y : y + 2], connectivity) for y in range(shape[0])]
     labels, count = flood(cells, connectivity)
@@ -88,4 +68,7 @@ def runs(row: np.ndarray) -> int:
 
 
 RULES = {"run": run_clocks, "serial": label_serial.cluster_clocks}
-"""By the name that ``labeller`` has in a Skin."""
+"""Of the exact ones, by the name that ``labeller`` has in a Skin."""
+
+BY_SHADOW = {"projection": label_shadows.projection, "single": label_shadows.single}
+"""Of the others; connectivity makes no difference to them."""
