@@ -122,7 +122,8 @@ class Graph:
         literals = [0, *inputs, *latches]
         for left, right in circuit.gates:
             literals.append(self.both(literals[left >> 1] ^ left & 1, literals[right >> 1] ^ right & 1))
-        return tuple([literals[old >> 1] ^ old & 1 for old in some] for some in (circuit.nexts, circuit.driven))
+        nexts, driven = ([literals[old >> 1] ^ old & 1 for old in some] for some in (circuit.nexts, circuit.driven))
+        return nexts, driven
 
     def cone(self, roots: Iterable[int]) -> list[int]:
         """Numbers of the nodes that the roots depend on, each behind its operands."""

@@ -11,37 +11,42 @@ ever happens, so what is never reached is never reached with them whole either.
 
 from __future__ import annotations
 
-import dataclasses
+import math
 import re
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Sequence
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 
+from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim import board, native
 from contactfpga_sim.mutants import aig
 from contactfpga_sim.mutants.netlist import PREPARE, Mutant, switches
 from contactfpga_sim.mutants.solve import reached
 
-QUICK_S, LONG_S = 4, 60
-"""How long each question may take."""
+QUICK_S, LONG_S = 4, 45
+"""How long may be asked with the same registers cut."""
 
 _GATES = (
     "memory_map; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; "
     "aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
 _STORE = "link.store["  # the frames' memory, by far the most registers
-_BOUNDARIES = ("row", "record", "byte")
+_CLOCKS = ("scan._clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
+# Outputs that say what is handed over, and the one that says when.
+_HANDED = {
+    "row_cells": "row_transfer",
+    "row_last": "row_transfer",
+    "record_data": "record_transfer",
+    "record_end": "record_transfer",
+    "byte_data": "byte_transfer",
+}
 
 
-@dataclasses.dataclass(frozen=True)
-class Verdict:
-    """``outcome`` is ``equivalent``, ``differs`` or ``open``."""
-
-    outcome: str
-    clocks: int = 0
-    """Where it differs: the clocks from power-up after which an output does, for some inputs that the solver found."""
+class ProofFailed(ContactFPGAError):
+    """Something is wrong with the proof itself; the message says what."""
 
 
 class Prover:
@@ -66,36 +71,43 @@ class Prover:
     def __exit__(self, kind: type | None, error: BaseException | None, traceback: TracebackType | None) -> None:
         self._folder.cleanup()
 
-    def examine(self, mutant: Mutant, limit_s: int) -> Verdict:
-        """Whether the mutant is equivalent; each of a few questions may take ``limit_s`` seconds."""
+    def equivalent(self, mutant: Mutant, limit_s: int) -> bool:
+        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds for each choice of what is cut."""
         number = self._mutants.index(mutant) + 1
-        # From the fewest registers to all of them.
-        for cut in (self._outside(mutant), self._named(_STORE), frozenset[int]()):
-            verdict = self._compare(number, cut, limit_s)
-            if verdict.outcome == "equivalent" or (verdict.outcome == "differs" and not cut):
-                return verdict
-        return Verdict("open")
+        return any(self._never_differs(number, cut, limit_s) for cut in self._cuts(mutant))
 
-    def _compare(self, number: int, cut: Collection[int], limit_s: int) -> Verdict:
-        """With the registers in ``cut`` holding anything. Where that is none, ``differs`` tells of a real path."""
+    def _cuts(self, mutant: Mutant) -> Iterator[frozenset[int]]:
+        """Sets of registers that may hold anything, the largest first."""
+        every, store = frozenset(range(len(self._latches))), self._named(_STORE)
+        part = re.findall(r"-cell (?:\$flatten)?\\?(\w+)\.", mutant.change)[0]
+        inside = self._named(f"{part}.", "?") - store
+        yield every - inside
+        yield every - inside - (self._named("scan.") - self._named(*_CLOCKS))
+        yield store
+
+    def _never_differs(self, number: int, cut: frozenset[int], limit_s: int) -> bool:
         twins: dict[int, int] = {}
-        while True:
+        end = time.monotonic() + limit_s
+        while (left := end - time.monotonic()) > 0:
             latches = list(self._latches)
             for index, twin in twins.items():
                 latches[index] = twin
             nexts, driven = self._placed(number, latches)
-            bad = self._graph.any([*self._differing(nexts, twins).values(), *self._seen(driven)])
+            differing = self._differing(nexts, twins)
+            bad = self._graph.any([*differing.values(), *self._seen(driven)])
             takes = {old >> 1: new for i, (old, new) in enumerate(zip(self._latches, self._nexts)) if i not in cut}
             takes |= {twin >> 1: nexts[index] for index, twin in twins.items()}
-            answer = reached(self._graph, takes, bad, limit_s, Path(self._folder.name))
+            answer = reached(self._graph, takes, bad, math.ceil(left), Path(self._folder.name))
             if answer.outcome != "reached":
-                return Verdict({"never": "equivalent", "open": "open"}[answer.outcome])
-            values = self._last(takes, answer.path, [bad, *nexts, *self._nexts, *driven])
-            assert _value(values, bad), "the solver's path does not lead there"
-            found = {index for index, differ in self._differing(nexts, twins).items() if _value(values, differ)}
-            if not found or found & set(cut):
-                return Verdict("differs", len(answer.path))
+                return answer.outcome == "never"
+            values = self._last(takes, answer.path, [bad, *differing.values()])
+            if not _value(values, bad):
+                raise ProofFailed("the solver's path does not lead where gateware and mutant differ")
+            found = {index for index, differ in differing.items() if _value(values, differ)}
+            if not found or found & cut:
+                return False
             twins |= {index: self._graph.variable() for index in sorted(found)}
+        return False
 
     def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
         """Mutant ``number`` over these latches: what they take next, and the outputs."""
@@ -113,11 +125,10 @@ class Prover:
     def _seen(self, driven: Sequence[int]) -> Iterable[int]:
         """Where outputs differ that someone looks at: what is handed over, only while it is."""
         names = self._circuit.outputs
-        handed = {name: self._driven[names.index(f"{name}_transfer[0]")] for name in _BOUNDARIES}
         for name, one, other in zip(names, self._driven, driven):
-            boundary, _, field = name.partition("_")
-            idle = boundary in handed and not field.startswith("transfer")
-            yield self._graph.both(self._graph.differ(one, other), handed[boundary] if idle else 1)
+            when = _HANDED.get(name.partition("[")[0])
+            looked_at = self._driven[names.index(f"{when}[0]")] if when else 1
+            yield self._graph.both(self._graph.differ(one, other), looked_at)
 
     def _last(self, takes: dict[int, int], path: list[dict[int, int]], roots: list[int]) -> dict[int, int]:
         """The values of what ``roots`` depend on in the last clock of a path."""
@@ -127,27 +138,24 @@ class Prover:
             state = {node: _value(values, literal) for node, literal in takes.items()}
         return self._graph.values({**state, **path[-1]}, roots)
 
-    def _outside(self, mutant: Mutant) -> frozenset[int]:
-        """The registers that are in none of the stages that share the mutant's part of the design, and the store."""
-        part = re.findall(r"-cell (?:\$flatten)?\\?(\w+)\.", mutant.change)[0]
-        return self._named(_STORE) | (frozenset(range(len(self._latches))) - self._named(f"{part}.") - self._named("?"))
-
-    def _named(self, prefix: str) -> frozenset[int]:
+    def _named(self, *prefixes: str) -> frozenset[int]:
         names = enumerate(self._circuit.latches)
-        return frozenset(index for index, some in names if any(name.startswith(prefix) for name in some))
+        return frozenset(index for index, some in names if any(name.startswith(prefixes) for name in some))
 
 
 def _value(values: dict[int, int], literal: int) -> int:
     return values[literal >> 1] ^ literal & 1
 
 
-def examine(
-    skin: Skin, mutants: Sequence[Mutant], limit_s: int, done: Callable[[Mutant, Verdict], None] = lambda *_: None
-) -> dict[Mutant, Verdict]:
-    """A verdict for each mutant; ``done`` is called with each."""
-    verdicts: dict[Mutant, Verdict] = {}
+def equivalent(
+    skin: Skin, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
+) -> list[bool]:
+    """For each mutant whether it is proved equivalent; ``done()`` is called after each."""
+    verdicts = []
+    if not mutants:
+        return []
     with Prover(skin, mutants) as prover:
         for mutant in mutants:
-            verdicts[mutant] = prover.examine(mutant, limit_s)
-            done(mutant, verdicts[mutant])
+            verdicts.append(prover.equivalent(mutant, limit_s))
+            done()
     return verdicts

@@ -44,6 +44,8 @@ def reached(graph: aig.Graph, nexts: Mapping[int, int], bad: int, limit_s: int, 
     """Whether ``bad`` can come to hold, from power-up, with any inputs. Arguments as those of :func:`aig.write`."""
     if bad == 0:
         return Answer("never")
+    if bad == 1:
+        return Answer("reached", [{}])
     inputs = aig.write(graph, nexts, bad, folder / "asked.aig")
     (folder / "gate.il").write_text(_SOME_GATE)
     said, merged = folder / "said.txt", folder / "merged.aig"
@@ -57,11 +59,12 @@ def reached(graph: aig.Graph, nexts: Mapping[int, int], bad: int, limit_s: int, 
         return Answer("open")
     if _output(merged) == b"0":
         return Answer("never")
+    # "snl_SAT 21 unknown 0 29", all latches at power-up, all inputs clock by clock; 29 is the last clock.
     result, _, values = said.read_text().splitlines()[:3]
-    word = result.split()[0]
+    word, *_, last = result.split()
     if word == "snl_SAT":
-        clocks = range(0, len(values), len(inputs)) if inputs else [0]
-        return Answer("reached", [dict(zip(inputs, map(int, values[at : at + len(inputs)]))) for at in clocks])
+        bits, count = [int(bit) for bit in values], len(inputs)
+        return Answer("reached", [dict(zip(inputs, bits[clock * count :])) for clock in range(int(last) + 1)])
     return Answer({"snl_UNSAT": "never", "snl_UNK": "open"}[word])
 
 
