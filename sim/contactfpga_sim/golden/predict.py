@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import debounce, label, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, label, scan, serial
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.frame import Items, Packer, hello, join
 from contactfpga_sim.golden.link import Link
@@ -20,10 +21,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
     known = facts(skin)
     received = serial.received(timeline.requests, known.bit_clocks)
-    scanned = scan.scans(known, timeline, received, cycles // known.scan_clocks + 1)
-    counted = debounce.debounced(
-        np.array([one.cells for one in scanned]), skin.debounce, known.press_scans, known.release_scans
-    )
+    scanned, counted, contact = (_adaptive if known.adaptive else _raster)(known, timeline, received, cycles)
     trace = Trace(cycles)
     link = Link(hello(known), known.bit_clocks)
     for cycle in (0, *(cycle + 1 for cycle in received)):
@@ -35,8 +33,28 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     link.advance(cycles)
     trace.bytes = link.bytes
     trace.line = serial.line(link.bytes, known.bit_clocks)
-    trace.contact = scan.contact(known, scanned)
+    trace.contact = contact
     return trace.until(cycles)
+
+
+Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
+"""Frames, their cells as they count once debounced, and changes of the contact pin."""
+
+
+def _raster(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
+    scanned = scan.scans(facts, timeline, received, cycles // facts.scan_clocks + 1)
+    counted = debounce.debounced(
+        np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
+    )
+    return scanned, counted, scan.contact(facts, scanned)
+
+
+def _adaptive(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
+    scanner = adaptive.Scanner(facts, timeline, received)
+    scanned = [scanner.frame()]
+    while scanner.slots[-1].end < cycles:
+        scanned.append(scanner.frame())
+    return scanned, [one.cells for one in scanned], scanner.contact
 
 
 class Labeller:
@@ -61,6 +79,8 @@ class Labeller:
             self._trace.rows.append((cycle, words[row], last))
             if facts.moments:
                 self._free = cycle + work.steps[row] + 1
+            else:
+                self._free = cycle + 1
         if facts.moments:
             records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
             end = handed[-1] + work.steps[-1] + 3
