@@ -20,6 +20,9 @@ class AdaptiveScanner(wiring.Component):
     driven without a pause, the columns looked at in each clock, and ``contact`` rises three clocks behind a touch; it
     falls two clocks behind the last strobe of a frame in which no row had a pressed switch. ``tag`` belongs to the
     frame whose last strobe was; it is complete three clocks after that and holds until the next frame's.
+
+    With debounce ``alone`` says of the row on offer that it was driven alone, and ``sampled`` in which slot, counted
+    from power-up on; ``busy``, a bit a row, keeps rows on the list.
     """
 
     def __init__(self, skin: Skin):
@@ -32,6 +35,9 @@ class AdaptiveScanner(wiring.Component):
                 "tag": Out(tag_layout(self.derived)),
                 "request": In(1),
                 "contact": Out(1),
+                "alone": Out(1),
+                "sampled": Out(self.derived.slot_bits),
+                "busy": In(skin.rows),
             }
         )
 
@@ -100,18 +106,25 @@ class AdaptiveScanner(wiring.Component):
         goes = rows.valid & rows.ready
         m.d.comb += [
             rows.valid.eq((seek.known & place).any()),
-            rows.payload.cells.eq(Mux((alone & place).any(), cells, 0)),
+            self.alone.eq((alone & place).any()),
+            rows.payload.cells.eq(Mux(self.alone, cells, 0)),
             rows.payload.last.eq(place[-1]),
             seek.clear.eq(goes & place[-1]),
         ]
         with m.If(goes):
             m.d.sync += [place.eq(place.rotate_left(1)), alone.eq(alone & ~place)]
+        slot = Signal.like(self.sampled)
+        with m.If(seek.strobe):
+            m.d.sync += slot.eq(slot + 1)
         with m.If(seek.strobe & seek.alone):
-            m.d.sync += [alone.eq(seek.pattern), cells.eq(self._pressed)]
+            m.d.sync += [alone.eq(seek.pattern), cells.eq(self._pressed), self.sampled.eq(slot)]
 
     def _keep_listed(self, m):
-        """A row that was pressed at its sample before stays on the list."""
+        """A row stays on the list if it was pressed, or a switch in it counted so, behind its sample before."""
         seek = self._seek
+        if self.skin.debounce != "none":
+            m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
+            return
         before = Signal(self.skin.rows)
         m.d.comb += seek.busy.eq((before & seek.pattern).any())
         with m.If(seek.strobe & seek.alone):

@@ -14,6 +14,7 @@ from contactfpga_hdl.link import Link
 from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
+from contactfpga_hdl.timed_debounce import TimedDebounce
 
 SCANNERS = {"raster": Scanner, "adaptive": AdaptiveScanner}
 
@@ -83,8 +84,11 @@ class Top(wiring.Component):
     def _debounced(self, m, scan):
         if self.skin.debounce == "none":
             return scan.rows
-        m.submodules.debounce = debounce = Debounce(self.skin)
+        adaptive = self.skin.scan == "adaptive"
+        m.submodules.debounce = debounce = TimedDebounce(self.skin) if adaptive else Debounce(self.skin)
         wiring.connect(m, scan.rows, debounce.raw)
+        if adaptive:
+            m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
     def _zones(self, m, rows, scan, link):

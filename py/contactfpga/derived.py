@@ -164,7 +164,22 @@ class Derived:
         """Scan periods that last at least debounce_release_us."""
         return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
+    @property
+    def press_slots(self) -> int:
+        """The least row times that are more than one scan period short of ``press_scans``; see docs/timing.md."""
+        return max(0, (self.press_scans - 1) * self.skin.rows + 1)
+
+    @property
+    def release_slots(self) -> int:
+        """The same of ``release_scans``."""
+        return max(0, (self.release_scans - 1) * self.skin.rows + 1)
+
     # ---- widths in bits and sizes in bytes
+
+    @functools.cached_property
+    def slot_bits(self) -> int:
+        """Of a count of row times in which a debounce time, and two frames more, can be told."""
+        return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
 
     @functools.cached_property
     def cells(self) -> int:

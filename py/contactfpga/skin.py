@@ -250,8 +250,6 @@ class Skin:
         for name in ("row_drive", "column_read"):
             if getattr(self, name) != "direct":
                 raise SkinError(f"{name} is {getattr(self, name)!r}; scan = 'adaptive' needs {name} = 'direct'")
-        if self.debounce != "none":
-            raise SkinError(f"debounce is {self.debounce!r}; scan = 'adaptive' needs debounce = 'none'")
 
     def _check_link(self) -> None:
         if self.clock_hz % 1_000_000 or not 1_000_000 <= self.clock_hz <= 400_000_000:

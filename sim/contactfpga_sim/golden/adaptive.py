@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from contactfpga_sim.golden import seek
+from contactfpga_sim.golden import debounce, seek
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.scan import Scan
 from contactfpga_sim.golden.trace import Timeline
@@ -39,16 +39,18 @@ class Scanner:
         self._changes = [piece[0] for piece in timeline.pieces]
         self._requests = sorted(received)
         self._listed: frozenset[int] = frozenset()
-        self._pressed_before: frozenset[int] = frozenset()
+        self._busy: frozenset[int] = frozenset()
+        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
         self._present = ~facts.mask.all(axis=0)
         self._clean = ~facts.mask.any(axis=0)
 
-    def frame(self) -> Scan:
-        """The next frame."""
+    def frame(self) -> tuple[Scan, np.ndarray]:
+        """The next frame, and its cells as they count once debounced."""
         facts = self._facts
         cells = np.zeros((facts.rows, facts.columns), bool)
         offered = [0] * facts.rows
-        pressed = set()
+        hits = set()
+        alone_in: dict[int, int] = {}
         stuck = np.zeros(facts.columns, bool)
         first = len(self.slots)
         choices = seek.frame(facts.rows, self._listed)
@@ -63,7 +65,8 @@ class Scanner:
             if alone:
                 (row,) = rows
                 cells[row] = columns & ~facts.mask[row]
-                pressed |= {row} if hit else set()
+                hits |= {row} if hit else set()
+                alone_in[row] = len(self.slots)
                 self._rise(strobe + 1, cells[row].any())
             else:
                 self._watch(rows, strobe)
@@ -77,17 +80,20 @@ class Scanner:
             except StopIteration:
                 break
         self._end(strobe + 2, cells.any())
-        self._listed = self._pressed_before | pressed
-        self._pressed_before = frozenset(pressed)
+        self._listed = self._busy | hits
+        counted, busy = self._debounce.take(cells, alone_in)
+        self._busy = busy if facts.debounced else frozenset(hits)
         begun = self.slots[first].begin + facts.settle + 1
-        return Scan(
+        scan = Scan(
             cells=cells,
             offered=offered,
             stuck=int(np.sum(stuck & self._present)),
             time_us=begun // facts.clocks_per_us,
             requested=self._asked_before(begun),
             slots=len(self.slots) - first,
+            alone=frozenset(alone_in),
         )
+        return scan, counted
 
     def _drive(self, begin: int, rows: frozenset[int], hit: bool) -> None:
         facts = self._facts

@@ -51,10 +51,10 @@ def _raster(facts: Facts, timeline: Timeline, received: list[int], cycles: int) 
 
 def _adaptive(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
     scanner = adaptive.Scanner(facts, timeline, received)
-    scanned = [scanner.frame()]
+    frames = [scanner.frame()]
     while scanner.slots[-1].end < cycles:
-        scanned.append(scanner.frame())
-    return scanned, [one.cells for one in scanned], scanner.contact
+        frames.append(scanner.frame())
+    return [one for one, _ in frames], [counted for _, counted in frames], scanner.contact
 
 
 class Labeller:
@@ -64,23 +64,23 @@ class Labeller:
         self._facts = facts
         self._trace = trace
         self._free = 0
+        self._handed = -1
 
     def take(self, one: scan.Scan, cells: np.ndarray) -> Items:
         """Work one frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
         facts = self._facts
-        late = facts.columns + 3 if facts.debounced else 0
+        late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
         words = [int(np.sum(1 << np.nonzero(row)[0].astype(object))) for row in cells]
         work = label.labelling(cells, facts.skin.connectivity)
         handed = []
         for row, offered in enumerate(one.offered):
             last = row == facts.rows - 1
-            cycle = max(offered + late, self._free)
+            cycle = max(max(offered, self._handed + 1) + late * (row in one.alone), self._free)
+            self._handed = cycle
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
             if facts.moments:
                 self._free = cycle + work.steps[row] + 1
-            else:
-                self._free = cycle + 1
         if facts.moments:
             records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
             end = handed[-1] + work.steps[-1] + 3

@@ -27,6 +27,8 @@ class Scan:
     """A byte came in since the scan before began."""
     slots: int
     """Row times it took."""
+    alone: frozenset[int]
+    """Rows that were driven alone."""
 
 
 def strobe(facts: Facts, slot: int) -> int:
@@ -61,6 +63,7 @@ def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int)
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
                 requested=any(early <= cycle < late for cycle in requests),
                 slots=facts.rows,
+                alone=frozenset(range(facts.rows)),
             )
         )
     return result
