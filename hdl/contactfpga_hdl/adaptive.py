@@ -1,6 +1,6 @@
 """Drives rows together where nothing is touched, one by one where something is."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -17,8 +17,8 @@ class AdaptiveScanner(wiring.Component):
 
     Rows are offered in ascending order, each as soon as it and those before it are known: one that was driven alone
     three clocks after its sample, those that a probe found empty a clock each behind that. Untouched, all rows are
-    driven without a pause, the columns looked at in each clock, and ``contact`` rises three clocks behind a touch; it
-    falls two clocks behind the last strobe of a frame in which no row had a pressed switch. ``tag`` belongs to the
+    driven without a pause and the columns looked at in each clock: ``contact`` rises three clocks behind a touch, and
+    the next slots find it. ``contact`` falls two clocks behind the last strobe of a frame in which no row had a pressed switch. ``tag`` belongs to the
     frame whose last strobe was; it is complete three clocks after that and holds until the next frame's.
 
     With debounce ``alone`` says of the row on offer that it was driven alone, and ``sampled`` in which slot, counted
@@ -72,30 +72,36 @@ class AdaptiveScanner(wiring.Component):
                 m.d.comb += self._pressed.eq(self._columns & present(self.skin, row))
 
     def _time_slots(self, m):
-        """As in a raster scan, but that idle rows stay driven; when they hit, the release begins behind the strobe."""
-        derived, reader, driver, seek = self.derived, self._reader, self._driver, self._seek
+        """As in a raster scan, but that idle rows stay driven. A column that reads pressed then ends the wait at once:
+        that is the slot's strobe, and the release begins behind it."""
+        derived, driver, seek = self.derived, self._driver, self._seek
         slot, settled = derived.row_clocks, derived.settle_clocks
         clock = Signal(range(slot))
         ends = clock == slot - 1
-        done_is_row = Signal(init=1)  # the two samples of a slot come in turn
-        off, was_off = Signal(), Signal()  # no row is driven, and none was in the last clock of the slot before
+        off = Signal()  # no row is driven
+        row_due, released_due = Signal(2), Signal(2)  # samples on their way through the synchroniser
+        self._watches = Signal()  # idle rows were driven for the settle time and still are
         wakes = seek.strobe & seek.idle & seek.hit
-        self._released = Signal()
+        self._released = released_due[-1]
         m.d.comb += [
-            reader.begin.eq((clock == settled - 1) | ends),
-            seek.strobe.eq(reader.done & done_is_row),
-            self._released.eq(reader.done & ~done_is_row & was_off),
+            seek.strobe.eq(row_due[-1] | self._watches & seek.idle & seek.hit),
             driver.pattern.eq(seek.pattern),
-            driver.drive.eq(ends),
+            driver.drive.eq(ends & ~wakes),
             driver.release.eq((clock == settled - 1) & ~seek.idle | wakes),
         ]
-        m.d.sync += [done_is_row.eq(done_is_row ^ reader.done), clock.eq(clock + 1)]
+        m.d.sync += [
+            row_due.eq(Cat(clock == settled - 1, row_due)),
+            released_due.eq(Cat(ends & off, released_due)),
+            clock.eq(Mux(ends, 0, clock + 1)),
+        ]
         with m.If(driver.release):
             m.d.sync += off.eq(1)
+        with m.Elif(driver.drive):
+            m.d.sync += off.eq(0)
+        with m.If(seek.strobe):
+            m.d.sync += self._watches.eq(seek.idle & ~seek.hit)
         with m.If(wakes):
-            m.d.sync += clock.eq(settled)
-        with m.Elif(ends):
-            m.d.sync += [clock.eq(0), off.eq(0), was_off.eq(off)]
+            m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
     def _offer_rows(self, m):
         """Rows that are known, in order; at most one that was driven alone waits."""
@@ -134,11 +140,8 @@ class AdaptiveScanner(wiring.Component):
         """In a probe a column counts if none of its switches is masked."""
         seek = self._seek
         clean = sum(1 << column for column in range(self.skin.columns) if all(column != c for _, c in self.skin.mask))
-        watches = Signal()  # idle rows were driven for the settle time and still are
         row, seen = Signal(), Signal()
-        looks = seek.strobe & ~seek.alone | watches
-        with m.If(seek.strobe):
-            m.d.sync += watches.eq(seek.idle & ~seek.hit)
+        looks = seek.strobe & ~seek.alone | self._watches
         m.d.comb += row.eq(seek.strobe & seek.alone & self._pressed.any())
         m.d.sync += seen.eq((seen | row) & ~seek.ends)
         with m.If(row | looks & (self._columns & clean).any()):

@@ -20,6 +20,8 @@ class Slot:
 
     begin: int
     rows: frozenset[int]
+    strobe: int
+    """When its columns have come through the synchronisers."""
     released: int
     """The first cycle without a driven row; the end of the slot if they stay driven."""
     end: int
@@ -58,7 +60,7 @@ class Scanner:
         while choice:
             rows, alone = choice
             begin = self.slots[-1].end if self.slots else 0
-            strobe = begin + facts.settle + 1
+            strobe = self._strobe(begin, rows)
             stuck |= self._released_before()
             columns = self._columns(strobe - 2, rows)
             hit = bool((columns & self._present).any())
@@ -74,7 +76,7 @@ class Scanner:
             if alone or not hit:
                 for row in rows:
                     offered[row] = strobe + 1
-            self._drive(begin, rows, hit)
+            self._drive(min(begin, strobe), strobe, rows, hit)
             try:
                 choice = choices.send(hit)
             except StopIteration:
@@ -83,7 +85,7 @@ class Scanner:
         self._listed = self._busy | hits
         counted, busy = self._debounce.take(cells, alone_in)
         self._busy = busy if facts.debounced else frozenset(hits)
-        begun = self.slots[first].begin + facts.settle + 1
+        begun = self.slots[first].strobe
         scan = Scan(
             cells=cells,
             offered=offered,
@@ -95,16 +97,23 @@ class Scanner:
         )
         return scan, counted
 
-    def _drive(self, begin: int, rows: frozenset[int], hit: bool) -> None:
+    def _strobe(self, begin: int, rows: frozenset[int]) -> int:
+        """When the slot's columns count: behind its settle time; of idle rows that stay driven, when one is seen."""
+        regular = begin + self._facts.settle + 1
+        if not self._watched():
+            return regular
+        awake = self._first_seen(self.slots[-1].strobe + 1, regular - 2, rows, self._present)
+        return regular if awake is None else awake + 2
+
+    def _drive(self, begin: int, strobe: int, rows: frozenset[int], hit: bool) -> None:
         facts = self._facts
+        end = begin + facts.row_clocks
         if not self._idle(rows):
-            released = begin + facts.settle
+            self.slots.append(Slot(begin, rows, strobe, begin + facts.settle, end))
         elif hit:
-            released = begin + facts.settle + 2
+            self.slots.append(Slot(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
         else:
-            released = begin + facts.row_clocks
-        end = max(released + facts.release, begin + facts.row_clocks) if hit or not self._idle(rows) else released
-        self.slots.append(Slot(begin, rows, released, end))
+            self.slots.append(Slot(begin, rows, strobe, end, end))
 
     def _idle(self, rows: frozenset[int]) -> bool:
         return len(rows) == self._facts.rows
@@ -130,15 +139,19 @@ class Scanner:
         return bool(self.slots) and self.slots[-1].released == self.slots[-1].end
 
     def _watch(self, rows: frozenset[int], strobe: int) -> None:
-        """Idle rows stayed driven since the strobe before: each cycle counts."""
-        if not self._watched():
-            return
-        begin, end = self.slots[-1].begin + self._facts.settle + 1, strobe - 2
+        """Idle rows stayed driven since the strobe before: each cycle counts for the pin."""
+        if self._watched():
+            seen = self._first_seen(self.slots[-1].strobe, strobe - 2, rows, self._clean)
+            if seen is not None:
+                self._rise(seen + 3, True)
+
+    def _first_seen(self, begin: int, end: int, rows: frozenset[int], counts: np.ndarray) -> int | None:
+        """The first cycle from ``begin`` to ``end`` in which a column that counts reads pressed."""
         inside = self._changes[bisect.bisect_right(self._changes, begin) : bisect.bisect_right(self._changes, end)]
         for cycle in (begin, *inside):
-            if (self._columns(cycle, rows) & self._clean).any():
-                self._rise(cycle + 3, True)
-                return
+            if cycle <= end and (self._columns(cycle, rows) & counts).any():
+                return cycle
+        return None
 
     def _rise(self, cycle: int, pressed: bool) -> None:
         if pressed and (not self.contact or not self.contact[-1][1]):

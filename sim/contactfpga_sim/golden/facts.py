@@ -101,6 +101,11 @@ class Facts:
         return 4 + max(2, self.halvings) if self.adaptive else 0
 
     @functools.cached_property
+    def frame_slots(self) -> int:
+        """The most row times that a frame takes."""
+        return self.rows + (2 * self.halvings + 2 if self.adaptive else 0)
+
+    @functools.cached_property
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
@@ -141,7 +146,7 @@ class Facts:
         """Row times after which an unchanged frame is sent: so many that one more frame could take too long."""
         if self.adaptive:
             row_us = Fraction(self.row_clocks, self.clocks_per_us)
-            return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - (self.rows + 2 * self.halvings + 2) + 1
+            return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
         return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
 
     @functools.cached_property
