@@ -18,8 +18,9 @@ class AdaptiveScanner(wiring.Component):
     Rows are offered in ascending order, each as soon as it and those before it are known: one that was driven alone
     three clocks after its sample, those that a probe found empty a clock each behind that. Untouched, all rows are
     driven without a pause and the columns looked at in each clock: ``contact`` rises three clocks behind a touch, and
-    the next slots find it. ``contact`` falls two clocks behind the last strobe of a frame in which no row had a pressed switch. ``tag`` belongs to the
-    frame whose last strobe was; it is complete three clocks after that and holds until the next frame's.
+    the next slots find it. ``contact`` falls two clocks behind the last strobe of a frame in which no row had a pressed
+    switch. ``tag`` belongs to the frame whose last strobe was; it is complete three clocks after that and holds until
+    the next frame's.
 
     With debounce ``alone`` says of the row on offer that it was driven alone, and ``sampled`` in which slot, counted
     from power-up on; ``busy``, a bit a row, keeps rows on the list.
@@ -175,4 +176,9 @@ class AdaptiveScanner(wiring.Component):
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
         with m.If(seek.ends):
-            m.d.sync += [self.tag.time.eq(begun), self.tag.requested.eq(requested), self.tag.slots.eq(slots), slots.eq(0)]
+            m.d.sync += [
+                self.tag.time.eq(begun),
+                self.tag.requested.eq(requested),
+                self.tag.slots.eq(slots),
+                slots.eq(0),
+            ]

@@ -127,9 +127,7 @@ class Seek(wiring.Component):
     def _search(self, m):
         """Halve the suspects by a bit of their number. Rows that differ in the lowest alone are driven alone."""
         rows, levels = self.skin.rows, self.derived.row_levels
-        lower = Array(
-            Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels)
-        )
+        lower = Array(Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels))
         low, high = self._suspects & lower[self._level], self._suspects & ~lower[self._level]
         ends = self._level == 0
         with m.If(ends | low.any() & high.any() & (self._spare == 0)):

@@ -19,8 +19,8 @@ class Tally(wiring.Component):
     """Moments of each row, a group of columns a clock.
 
     The groups' shares come from two clocks behind ``taken`` on, one in each clock without ``hold``; before and after,
-    they are zero. A row has at most :data:`GROUPS`. No other but empty ones may be taken until ``busy`` falls, behind the
-    last one.
+    they are zero. A row has at most :data:`GROUPS`, an empty one none. Only empty ones may be taken until ``busy``
+    falls, behind the last group.
     """
 
     def __init__(self, skin: Skin):

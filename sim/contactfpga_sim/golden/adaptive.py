@@ -43,8 +43,8 @@ class Scanner:
         self._listed: frozenset[int] = frozenset()
         self._busy: frozenset[int] = frozenset()
         self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
-        self._present = ~facts.mask.all(axis=0)
-        self._clean = ~facts.mask.any(axis=0)
+        self._present: np.ndarray = ~np.all(facts.mask, axis=0)
+        self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
 
     def frame(self) -> tuple[Scan, np.ndarray]:
         """The next frame, and its cells as they count once debounced."""
@@ -69,10 +69,10 @@ class Scanner:
                 cells[row] = columns & ~facts.mask[row]
                 hits |= {row} if hit else set()
                 alone_in[row] = len(self.slots)
-                self._rise(strobe + 1, cells[row].any())
+                self._rise(strobe + 1, bool(cells[row].any()))
             else:
                 self._watch(rows, strobe)
-                self._rise(strobe + 1, (columns & self._clean).any())
+                self._rise(strobe + 1, bool((columns & self._clean).any()))
             if alone or not hit:
                 for row in rows:
                     offered[row] = strobe + 1
@@ -81,7 +81,7 @@ class Scanner:
                 choice = choices.send(hit)
             except StopIteration:
                 break
-        self._end(strobe + 2, cells.any())
+        self._end(strobe + 2, bool(cells.any()))
         self._listed = self._busy | hits
         counted, busy = self._debounce.take(cells, alone_in)
         self._busy = busy if facts.debounced else frozenset(hits)

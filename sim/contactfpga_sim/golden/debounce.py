@@ -57,8 +57,8 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 class Timed:
     """The same where samples are not a scan apart; times are counted in slots, a row time each.
 
-    ``press`` and ``release`` in scan periods of ``rows`` slots. A time is over at the first sample that is more than one
-    scan period less behind its beginning: with samples a scan period apart that is when it is over.
+    ``press`` and ``release`` in scan periods of ``rows`` slots. A time is over at the first sample that comes later
+    than one scan period less behind its beginning: with samples a scan period apart, when it is over.
     """
 
     def __init__(self, method: str, press: int, release: int, rows: int):
