@@ -4,11 +4,12 @@ import argparse
 import sys
 import time
 
-from contactfpga_sim.proofs import label, link, pack, records, scan, serial, streams
+from contactfpga_sim.proofs import label, link, pack, records, scan, seek, serial, streams
 from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
+    *seek.CASES,
     *label.CASES,
     *records.CASES,
     *streams.CASES,
