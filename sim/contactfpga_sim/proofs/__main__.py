@@ -4,12 +4,13 @@ import argparse
 import sys
 import time
 
-from contactfpga_sim.proofs import label, link, pack, records, scan, seek, serial, streams
+from contactfpga_sim.proofs import adaptive, label, link, pack, records, scan, seek, serial, streams
 from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
     *seek.CASES,
+    *adaptive.CASES,
     *label.CASES,
     *records.CASES,
     *streams.CASES,
