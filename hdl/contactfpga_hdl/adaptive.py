@@ -80,7 +80,8 @@ class AdaptiveScanner(wiring.Component):
         clock = Signal(range(slot))
         ends = clock == slot - 1
         off = Signal()  # no row is driven
-        row_due, released_due = Signal(2), Signal(2)  # samples on their way through the synchroniser
+        row_due = Signal(2)  # a sample on its way through the synchroniser
+        released_due = Signal(2)
         self._watches = Signal()  # idle rows were driven for the settle time and still are
         wakes = seek.strobe & seek.idle & seek.hit
         self._released = released_due[-1]

@@ -74,12 +74,13 @@ class Debounce(wiring.Component):
         column = Signal(range(columns))
         row = self._row
         raw = Signal(columns)
-        self._last = last = Signal()
+        last = Signal()
         busy = Signal()
         # Three clocks a column, overlapped: read its word, work out the next one, write it.
-        self._decide = decide = Signal()
+        decide = Signal()
         store = Signal()
-        self._finish = finish = Signal()
+        finish = Signal()
+        self._last, self._decide, self._finish = last, decide, finish
         address, store_address = Signal.like(write.addr), Signal.like(write.addr)
         m.d.comb += [
             read.addr.eq(Cat(column[:column_bits], row[:row_bits])),

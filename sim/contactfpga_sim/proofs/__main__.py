@@ -4,11 +4,13 @@ import argparse
 import sys
 import time
 
-from contactfpga_sim.proofs import label, label_serial, link, pack, records, scan, serial, streams
+from contactfpga_sim.proofs import adaptive, label, label_serial, link, pack, records, scan, seek, serial, streams
 from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
+    *seek.CASES,
+    *adaptive.CASES,
     *label.CASES,
     *records.CASES,
     *label_serial.CASES,

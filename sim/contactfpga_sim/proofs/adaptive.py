@@ -1,0 +1,96 @@
+"""The adaptive scanner: rows that are driven together never meet others that are driven."""
+
+from amaranth.hdl import Mux, Signal
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.adaptive import AdaptiveScanner
+from contactfpga_hdl.popcount import popcount
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.seek import PICK, SEARCH, START, WAIT
+
+ROWS = 2
+ALL = (1 << ROWS) - 1
+
+
+def released_between(proof: Proof) -> None:
+    """Free: the columns in each clock, and when rows are taken.
+
+    Claimed: the rows that are driven are all or one, and change to none first; none are driven for the release time at
+    least, others for the settle time.
+    """
+    dut = AdaptiveScanner(Skin(scan="adaptive", rows=ROWS, columns=1, settle_us=1, zone_capacity=1))
+    inside = proof.put(dut)
+    settled, released = dut.derived.settle_clocks, dut.derived.release_clocks
+    proof.m.d.comb += [dut.pins.columns.eq(proof.free(1, "columns")), dut.rows.ready.eq(proof.free(1, "ready"))]
+    driven = Signal(ROWS)
+    proof.m.d.comb += driven.eq(~dut.pins.rows)
+    before = proof.before(driven, init=ALL)
+    changes = driven != before
+    longest = max(settled, released)
+    since = Signal(range(longest + 1), init=longest)  # clocks for which the rows before, or none, were driven
+    proof.m.d.sync += since.eq(Mux(changes, 1, Mux(since == longest, longest, since + 1)))
+    with proof.m.If(changes):
+        proof.claim((driven == 0) | (before == 0))
+        proof.claim(since >= Mux(before == 0, released, settled))
+    clock, off = inside["clock"], inside["off"]
+    proof.lemma((clock < dut.derived.row_clocks) & (since <= longest))
+    proof.lemma(off == (driven == 0))
+    proof.lemma(~changes | (clock == 0) & (before == 0) | off & (clock == settled) & (before != 0))
+    with proof.m.If(off):
+        proof.lemma(clock >= settled)
+        proof.lemma(Mux(clock == settled, changes & (since >= settled), since == clock - settled))
+    with proof.m.Else():
+        proof.lemma(Mux(clock == 0, changes & (since >= released) | (since >= settled), 1))
+        proof.lemma((clock == 0) | (clock > settled) | (since >= clock))
+        proof.lemma((clock < settled) | (driven == ALL) & (since >= settled))
+    _seek_lemmas(proof, inside)
+    _slot_lemmas(proof, inside, settled, off, driven, since)
+
+
+def _seek_lemmas(proof: Proof, inside: Inside) -> None:
+    state, pattern, alone = inside["seek.choice_state"], inside["seek.pattern"], inside["seek.alone"]
+    proof.lemma(inside["seek._listed"] == popcount(inside["seek._list"]))
+    proof.lemma((inside["seek._level"] == 0) & ((state == SEARCH) | ~inside["seek._searching"]))
+    with proof.m.If(state == WAIT):
+        proof.lemma((pattern != 0) & (~alone | (pattern != ALL)))
+    with proof.m.If(inside["seek.idle"]):
+        proof.lemma((state == WAIT) & (pattern == ALL) & ~alone)
+        proof.lemma((inside["seek._list"] == 0) & (inside["seek._todo"] == 0) & (inside["seek._hits"] == 0))
+    with proof.m.If(state == SEARCH):
+        proof.lemma((inside["seek._suspects"] != 0) & ~inside["seek._suspected"])
+
+
+def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since) -> None:
+    """When in a slot rows are chosen: behind its strobe, or where idle rows hit, from the release on."""
+    clock, state = inside["clock"], inside["seek.choice_state"]
+    pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["_watches"]
+    todo, due = inside["seek._todo"], inside["row_due"]
+    waits = state == WAIT
+    proof.lemma(waits | (clock >= settled) & (clock <= settled + 4))
+    proof.lemma((state != START) | (clock == settled + 3))
+    proof.lemma((state != SEARCH) | off & ((clock == settled) | (clock == settled + 2)))
+    proof.lemma((state != PICK) | (clock > settled))
+    chosen = (todo != 0) & ~inside["seek._suspected"]
+    proof.lemma((state != PICK) | (clock == settled + 2) | chosen & off)
+    proof.lemma(due == Mux(waits, Mux(clock == settled, 1, Mux(clock == settled + 1, 2, 0)), 0))
+    with proof.m.If(~off & (clock < settled)):
+        proof.lemma(driven == pattern)
+    with proof.m.If(~off & (clock >= settled)):
+        asleep = (inside["seek._list"] == 0) & (todo == 0) & ~inside["seek._suspected"]
+        at_rest = waits & idle & (pattern == ALL)
+        proof.lemma(Mux(clock == settled + 2, (state == PICK) & asleep, 1))
+        proof.lemma(Mux(clock == settled + 3, (state == START) & asleep, 1))
+        proof.lemma((clock == settled + 2) | (clock == settled + 3) | at_rest)
+    with proof.m.If(watches):
+        proof.lemma(~off & (driven == ALL) & (since >= settled))
+        proof.lemma(idle | (clock == settled + 2) | (clock == settled + 3))
+
+
+_BUGS = (
+    Bug("driven on", AdaptiveScanner, "_time_slots", "ends & ~wakes", "ends"),
+    Bug("no release", AdaptiveScanner, "_time_slots", "~seek.idle | wakes", "~seek.idle"),
+    Bug("a short release", AdaptiveScanner, "_time_slots", "clock.eq(settled)", "clock.eq(settled + 1)"),
+)
+CASES = (Case("a release between rows", "2 rows", released_between, 4, _BUGS, 60),)
