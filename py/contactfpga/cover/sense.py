@@ -80,6 +80,8 @@ class Sheet:
 
     def force_n(self, model: Model, offset_m: float) -> float | NoSolution:
         """The least force in N that closes a switch ``offset_m`` from the contact's middle, (9) solved for F."""
+        if model.contact not in CONTACTS:
+            raise CoverError(f"contact is {model.contact!r}; it must be one of {', '.join(CONTACTS)}")
         if model.contact == "point":
             return point.force_n(self.switch, offset_m, self.thickness_m, model.within)
         ball = self._ball(model)
