@@ -147,7 +147,7 @@ def test_zones_records(board, tmp_path, run):
 
 
 def test_zones_of_the_simulated_board(run):
-    status, out, _ = run("zones", "--once", "--json", "sim://?scene=palm")
+    status, out, _ = run("zones", "--once", "--json", "sim://?scene=two_fingers")
     assert status == 0
     assert len(json.loads(out)["zones"]) == 2
 

@@ -18,7 +18,7 @@ LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
 def pty_board():
     from contactfpga_sim.pty_board import PtyBoard
 
-    with PtyBoard(SKIN, "palm") as board:
+    with PtyBoard(SKIN, "two_fingers") as board:
         yield board
     assert board.failure is None
 
@@ -27,14 +27,14 @@ def pty_board():
 
 
 def test_simulated_board_answers_read_zones():
-    zones = contactfpga.read_zones("sim://?scene=palm")
+    zones = contactfpga.read_zones("sim://?scene=two_fingers")
     assert zones.flags == {"requested"}
     assert len(zones) == 2
     assert sum(zone.area_cells for zone in zones) == zones.pressed
 
 
 def test_a_second_read_is_of_a_later_frame():
-    first, second = (contactfpga.read_zones("sim://?scene=palm") for _ in range(2))
+    first, second = (contactfpga.read_zones("sim://?scene=two_fingers") for _ in range(2))
     assert second.time_us > first.time_us
     assert second.flags == {"requested"}
 

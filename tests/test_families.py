@@ -1,6 +1,7 @@
 """Families of scenes: the same ones for the same seed, on the sheet, and what their names say."""
 
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -21,9 +22,16 @@ def test_the_same_seed_gives_the_same_scenes(family):
     assert len({repr(scene) for scene in (*scenes, *placements(family, 6, 12, FINE))}) == 12
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_scenes_can_be_sent_to_another_process(family):
+    scenes = placements(family, 2, 11, FINE)
+    assert pickle.loads(pickle.dumps(scenes)) == scenes
+
+
 def test_families_do_not_share_their_places():
-    first = [placements(family, 1, 0, FINE)[0].truth(0.0).contacts[0][1:] for family in FAMILIES]
-    assert len(set(first)) == len(FAMILIES)
+    # Both draw a size and then an angle, one of a full turn and one of half a turn.
+    hand, bar = (placements(family, 1, 0, FINE)[0].contacts[0] for family in ("palm", "edge"))
+    assert hand.angle_deg / 360 != pytest.approx(bar.angle_deg / 180)
 
 
 COUNTS = {

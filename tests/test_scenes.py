@@ -177,6 +177,14 @@ def test_place_and_angle_follow_the_time():
     assert np.ptp(np.nonzero(cells)[1]) == 8
 
 
+def test_angles_turn_from_x_towards_y():
+    cells = one(contacts.edge(40, 4), 30, 30, angle_deg=30.0).pressed(0.0, sheet_of(1.0, size=64))
+    for along in (-18, -9, 0, 9, 18):
+        row, column = (30 + along * ratio for ratio in (math.sin(math.pi / 6), math.cos(math.pi / 6)))
+        assert cells[round(row), round(column)]
+    assert not cells[30 + 9, 30 - 15]
+
+
 def test_a_track_that_cannot_be_is_refused():
     with pytest.raises(ValueError, match="a track has 2 times and 1 values"):
         Track((0, 1), (0,))

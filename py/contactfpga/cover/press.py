@@ -123,6 +123,7 @@ def _superposed(
     block = max(1, BLOCK // len(shares))
     for start in range(0, len(stress), block):
         here = slice(start, start + block)
-        distance = np.hypot(np.subtract.outer(places_x[here], at_x), np.subtract.outer(places_y[here], at_y))
-        stress[here] = medium.spread(within, distance / thickness_m) @ shares
+        distance = np.subtract.outer(places_x[here], at_x) ** 2
+        distance += np.subtract.outer(places_y[here], at_y) ** 2
+        stress[here] = medium.spread(within, np.sqrt(distance) / thickness_m) @ shares
     return (force_n / thickness_m**2 * stress).reshape(x.shape)
