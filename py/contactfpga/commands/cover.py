@@ -22,8 +22,11 @@ MM, KPA = 1e3, 1e-3
 
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
-    topics = {"impact": _impact, "sense": _sense, "design": _design, "figures": _figures}
-    return topics[args.topic](args)
+    if args.topic in ("design", "figures"):
+        from contactfpga.commands import cover_design  # which uses what is below
+
+        return cover_design.main(args)
+    return _impact(args) if args.topic == "impact" else _sense(args)
 
 
 # ---- impact
@@ -60,8 +63,8 @@ def _impact(args: argparse.Namespace) -> int:
         "notes": [*answer.notes, *_hertz_notes(args.thickness, ball, answer.force_n)],
     }
     if args.json:
-        return _say(known)
-    _table(
+        return say(known)
+    table(
         ("compression", f"{MM * answer.compression_m:.4g} mm"),
         ("compression time", f"{MM * answer.time_s:.5g} ms"),
         ("peak force", f"{answer.force_n:.4g} N"),
@@ -72,7 +75,7 @@ def _impact(args: argparse.Namespace) -> int:
         ("inertia", f"{arm.inertia_kgm2:.6g} kg m2"),
         ("method", answer.method),
     )
-    return _notes(known["notes"])
+    return notes(known["notes"])
 
 
 def _struck(args: argparse.Namespace, arm: Arm) -> Impact | NoSolution:
@@ -152,14 +155,14 @@ def _sense(args: argparse.Namespace) -> int:
     }
     unsolved = any(isinstance(one.value, NoSolution) for one in judged)
     if args.json:
-        return _say(found) or (UNSOLVED if unsolved else 0)
+        return say(found) or (UNSOLVED if unsolved else 0)
     lines.append(("model", str(last.model)))
     if last.error is not None and last.model != sheet.reference:
         lines.append(("off from the reference by", f"{100 * last.error:+.1f} % ({sheet.reference})"))
     if last.dropped:
         lines.append(("left out", ", ".join(last.dropped)))
-    _table(*lines)
-    return _notes(found["notes"]) or (UNSOLVED if unsolved else 0)
+    table(*lines)
+    return notes(found["notes"]) or (UNSOLVED if unsolved else 0)
 
 
 def _answer(
@@ -187,8 +190,8 @@ def _best_thickness(args: argparse.Namespace, switch: Switch) -> int:
     force = Sheet(switch, thickness).force_n(Model(within, "point"), offset)
     known = {"thickness_m": thickness, "force_n": force, "offset_m": offset, "model": within, "contact": "point"}
     if args.json:
-        return _say(known)
-    _table(
+        return say(known)
+    table(
         (f"best thickness, {MM * offset:.4g} mm from a switch", f"{MM * thickness:.5g} mm"),
         ("force that closes it", f"{force:.5g} N"),
         ("model", f"{within}, point"),
@@ -205,21 +208,11 @@ def _touching(args: argparse.Namespace) -> Ball | None:
     return Ball(args.effective_radius, elastic.effective_modulus_pa(args.modulus, args.poisson))
 
 
-# ---- design and figures
-
-
-def _design(args: argparse.Namespace) -> int:
-    raise NotImplementedError
-
-
-def _figures(args: argparse.Namespace) -> int:
-    raise NotImplementedError
-
-
 # ---- what all say
 
 
-def _say(known: dict[str, Any]) -> int:
+def say(known: dict[str, Any]) -> int:
+    """Print an answer as one JSON object."""
     print(json.dumps(known, default=_plain, allow_nan=False))
     return 0
 
@@ -234,19 +227,21 @@ def _plain(value: object) -> object:
 
 def _unsolved(answer: NoSolution, as_json: bool) -> int:
     if as_json:
-        _say({"no_solution": answer.reason})
+        say({"no_solution": answer.reason})
     else:
         print(answer)
     return UNSOLVED
 
 
-def _table(*lines: tuple[str, str]) -> None:
+def table(*lines: tuple[str, str]) -> None:
+    """Print titles and values as two columns."""
     wide = max(len(title) for title, _ in lines)
     for title, value in lines:
         print(f"{title:{wide}}  {value}")
 
 
-def _notes(notes: list[str]) -> int:
-    for note in notes:
+def notes(found: list[str]) -> int:
+    """Print where a model is rough."""
+    for note in found:
         print(f"note: {note}")
     return 0

@@ -74,6 +74,7 @@ class Arm:
         J = m/12 (3 R^2 + L^2) + m l^2, a thin tube 6 R^2; without ``length_m`` L is the lever, as printed.
         """
         positive("mass_kg", mass_kg, "kg")
+        positive("lever_m", lever_m, "m")
         not_negative("radius_m", radius_m, "m")
         not_negative("com_m", com_m, "m")
         length = positive("length_m", lever_m if length_m is None else length_m, "m")
