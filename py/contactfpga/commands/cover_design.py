@@ -144,11 +144,11 @@ def _number(sensed: Sense | None) -> float | None:
 
 
 def _figures(args: argparse.Namespace) -> int:
-    from contactfpga.cover import drawing, line  # matplotlib, which only drawing needs
+    from contactfpga.cover import drawing, line, paper  # matplotlib, which only drawing needs
 
     folder = Path(args.output)
     folder.mkdir(parents=True, exist_ok=True)
-    task = Task.load(args.design) if args.design else drawing.PAPER
+    task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
     data = line.read(args.data) if args.data else None
     files = drawing.draw(folder, args.format, task, data)
     known: dict[str, Any] = {"files": [str(file) for file in files]}

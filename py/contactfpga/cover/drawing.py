@@ -14,33 +14,13 @@ from matplotlib.figure import Figure
 
 from contactfpga.cover import elastic, impact, line, medium, motion, point
 from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.foams import find
 from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Arm
+from contactfpga.cover.paper import FIRST_DESIGN, WORST_M
 from contactfpga.cover.solve import Floats
 from contactfpga.cover.switch import Switch
 from contactfpga.cover.task import Task
 
-PAPER = Task(
-    arm=Arm.link(0.6, 0.038, 0.15, 0.2),
-    mass_kg=0.6,
-    speed_m_s=0.4,
-    radius_m=0.019,
-    poisson=0.5,
-    time_s=0.008,
-    latency_s=0.006,
-    switch=Switch(),
-    pitch_m=0.01,
-    force_n=15.0,
-    thickness_m=0.01,
-    foams=(find("paper"),),
-)
-"""The first design of the paper's Section IV."""
-
 COLOURS = {"halfspace": "#2b6f9e", "bonded": "#d1495b", "frictionless": "#8a6fb0"}
-WORST_M = 5e-3 * math.sqrt(2)
-"""The farthest place from a switch on the paper's sheet, in m."""
-
 SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "contactfpga",
     "svg.fonttype": "none",
@@ -51,7 +31,7 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-def draw(folder: Path, suffix: str, task: Task = PAPER, data: tuple[Floats, Floats] | None = None) -> list[Path]:
+def draw(folder: Path, suffix: str, task: Task = FIRST_DESIGN, data: tuple[Floats, Floats] | None = None) -> list[Path]:
     """Every picture into ``folder`` as ``png`` or ``svg``; Fig. 9 only with ``data``: forces (N), deformations (m)."""
     with matplotlib.rc_context(SETTINGS):
         figures = {"cover-force": force(task.switch), "cover-impact": course(task), "cover-map": design_map(task)}
@@ -151,3 +131,64 @@ def _closing(switch: Switch, offset_m: Floats, thickness_m: Floats, within: str)
     limit = medium.first_zero(within)
     pressed = spread > 0 if limit is None else ratio < limit
     return np.where(pressed, switch.closing_pa * thickness_m**2 / np.where(pressed, spread, 1.0), np.nan)
+
+
+def study(path: Path) -> Path:
+    """Error against time of the rules for the compression time, and of the models of sensitivity."""
+    with matplotlib.rc_context(SETTINGS):
+        figure = Figure(figsize=(8.5, 3.8))
+        left, right = figure.subplots(1, 2)
+        _rules(left)
+        _models(right)
+        for place in (left, right):
+            place.set_xscale("log")
+            place.set_yscale("log")
+            place.set_xlabel("time, µs")
+        figure.tight_layout()
+        return save(figure, path)
+
+
+def _rules(place: Any) -> None:
+    from contactfpga.cover import study as measured
+
+    found = []
+    for rules, colour in ((measured.RULES, COLOURS["halfspace"]), (measured.FAILING, COLOURS["bonded"])):
+        for name, rule in rules.items():
+            error = abs(measured.relative_errors(rule)[0])
+            if math.isfinite(error):
+                takes = 1e6 * measured.seconds(lambda rule=rule: rule(measured.BLOWS[0]))  # type: ignore[misc]
+                found.append((max(error, 1e-15), takes, name.replace("*", ""), colour))
+    below = math.inf
+    for error, takes, name, colour in sorted(found, reverse=True):
+        below = min(error, below / 5)  # labels of rules that are alike go below each other
+        place.plot(takes, error, "o", ms=4, color=colour)
+        place.annotate(
+            name,
+            (takes, error),
+            xytext=(max(2.2 * takes, 60), below),
+            fontsize=6,
+            color=colour,
+            va="center",
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": colour},
+        )
+    place.set_xlim(0.3, 2e5)
+    place.set_ylim(1e-18, 1)
+    place.set_ylabel("error of the compression time")
+
+
+def _models(place: Any) -> None:
+    from contactfpga.cover import study as measured
+
+    for number, model in enumerate(measured.LADDER):
+        for ball, mark in zip(measured.BALLS.values(), ("o", "x")):
+            sheet = measured.Sheet(measured.SWITCH, measured.THICKNESS_M, ball)
+            takes = 1e6 * measured.seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore
+            errors = [max(abs(one), 1e-4) for one in measured.sense_errors(model, ball) if math.isfinite(one)]
+            place.plot([takes] * len(errors), errors, mark, ms=4, color=COLOURS[model.within])
+            if mark == "o":
+                height = 20 if number % 2 else 9
+                place.annotate(str(model), (takes, height), fontsize=6, ha="center", color=COLOURS[model.within])
+    place.axhline(0.05, color="#999", lw=0.8, ls=":")
+    place.set_xlim(1, 5e3)
+    place.set_ylim(5e-5, 40)
+    place.set_ylabel("error of the closing force, ρ/h from 0 to 1.414")

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError, positive
+from contactfpga.cover.answer import CoverError, not_negative, positive
 from contactfpga.cover.impact import Arm, slowness, speed2
 from contactfpga.cover.solve import Floats, gauss
 
@@ -79,10 +79,14 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
         slowing = pull(state[0])
         return speed / slowing, 1 / slowing
 
-    speed = float(positive("speed_m_s", speed_m_s, "m/s"))
-    length = float((1.25 * arm.mass_kg * speed**2 / stiffness) ** 0.4)
+    speed = not_negative("speed_m_s", speed_m_s, "m/s")
+    push = max(0.0, arm.push_n(0.0))
+    length = float((1.25 * arm.mass_kg * speed**2 / stiffness) ** 0.4 + (push / stiffness) ** (2 / 3))
+    if length == 0:
+        raise CoverError("speed_m_s is 0; it must be above 0 m/s where neither torque nor gravity presses")
+    pace = max(speed, math.sqrt(push * length / arm.mass_kg))
     found = [Step(0.0, 0.0, speed)]
-    for time, state in _walk(over_time, 0.0, (0.0, speed), length / speed / 50, rtol, (length, speed)):
+    for time, state in _walk(over_time, 0.0, (0.0, speed), length / pace / 50, rtol, (length, pace)):
         if state[1] <= 0:
             break
         found.append(Step(time, *state))
