@@ -3,12 +3,15 @@
 import dataclasses
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import integrate
 
+import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.cover import CoverError, elastic, line, sense
 from contactfpga.cover.design import FREE, design
@@ -307,6 +310,28 @@ def test_points_without_a_line():
 
 
 # ---- commands
+
+
+def test_impact_and_design_need_numpy_alone():
+    code = (
+        "import sys; from contactfpga import cli; "
+        f"cli.main(['cover', 'design', {str(FIRST)!r}]); cli.main(['cover', 'sense', '--pitch', '0.01']); "
+        "print(*sorted(set(sys.modules) & {'scipy', 'matplotlib', 'rich', 'amaranth', 'contactfpga_sim', 'mpmath'}))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert run.stdout.splitlines()[-1] == ""
+
+
+def test_figures_without_matplotlib_name_what_to_install(run, monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(sys.modules, "contactfpga.cover.drawing", raising=False)
+    monkeypatch.delattr(contactfpga.cover, "drawing", raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    status, _, errors = run("figures")
+    assert status == 1
+    assert "pip install 'contactfpga[sim]'" in errors
+
 
 ARM = [*("--mass", 0.6, "--radius", 0.038, "--com", 0.15, "--lever", 0.2, "--speed", 0.4)]
 ARM += ["--poisson", 0.5, "--effective-radius", 0.019]
