@@ -212,6 +212,18 @@ def test_motion_against_scipys_dop853(row):
     assert (depth, seconds) == (pytest.approx(closer.compression_m, rel=1e-9), pytest.approx(closer.time_s, rel=1e-9))
 
 
+def test_motion_under_a_brake_far_stronger_than_the_foam_and_from_rest():
+    braked = Arm(0.03, 2.2, -25.0)
+    found = impact.strike(braked, 0.09, 4.0)
+    walked = impact.strike(braked, 0.09, 4.0, method="ode")
+    assert walked.compression_m == pytest.approx(found.compression_m, rel=1e-8)
+    assert walked.time_s == pytest.approx(found.time_s, rel=1e-8)
+    pressed = impact.strike(arm(torque_nm=2.0), 0.0, FIRST, method="ode")
+    assert pressed.time_s == pytest.approx(impact.strike(arm(torque_nm=2.0), 0.0, FIRST).time_s, rel=1e-8)
+    with pytest.raises(CoverError, match="speed_m_s is 0; it must be above 0 m/s where neither torque nor gravity"):
+        motion.steps(arm(), 0.0, FIRST)
+
+
 def test_course_lies_on_the_motion():
     moved = arm(torque_nm=0.5, gravity=True, angle_rad=0.3)
     found = impact.strike(moved, SPEED, 1e5)

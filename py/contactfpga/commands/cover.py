@@ -26,7 +26,10 @@ def main(args: argparse.Namespace) -> int:
         from contactfpga.commands import cover_design  # which uses what is below
 
         return cover_design.main(args)
-    return _impact(args) if args.topic == "impact" else _sense(args)
+    try:
+        return _impact(args) if args.topic == "impact" else _sense(args)
+    except OverflowError:
+        raise CoverError("a number is too large to compute with; all are in SI units") from None
 
 
 # ---- impact

@@ -89,6 +89,8 @@ def _force(ball: Ball, patch_m: float) -> float:
 
 
 def _shape(within: str, wide: float, away: float) -> float:
+    if away > wide + medium.FARTHEST:
+        return 0.0
     t, weighted = _weighted(within)
     x = t * wide
     # The fraction loses digits where x is small; its series does not.

@@ -80,11 +80,14 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
         return speed / slowing, 1 / slowing
 
     speed = not_negative("speed_m_s", speed_m_s, "m/s")
-    push = max(0.0, arm.push_n(0.0))
-    length = float((1.25 * arm.mass_kg * speed**2 / stiffness) ** 0.4 + (push / stiffness) ** (2 / 3))
-    if length == 0:
+    push = arm.push_n(0.0)
+    if speed == 0 and push <= 0:
         raise CoverError("speed_m_s is 0; it must be above 0 m/s where neither torque nor gravity presses")
-    pace = max(speed, math.sqrt(push * length / arm.mass_kg))
+    # How far and how fast it goes, roughly: what errors are compared with, and the first step taken from.
+    length = float((1.25 * arm.mass_kg * speed**2 / stiffness) ** 0.4 + (max(push, 0.0) / stiffness) ** (2 / 3))
+    if push < 0:
+        length = min(length, -arm.mass_kg * speed**2 / (2 * push))
+    pace = max(speed, math.sqrt(max(push, 0.0) * length / arm.mass_kg))
     found = [Step(0.0, 0.0, speed)]
     for time, state in _walk(over_time, 0.0, (0.0, speed), length / pace / 50, rtol, (length, pace)):
         if state[1] <= 0:
@@ -98,7 +101,9 @@ def steps(arm: Arm, speed_m_s: float, stiffness: float, rtol: float = RTOL) -> l
         last = Step(last.time_s + short, *state)
         found.append(last)
     at = last.indentation_m, last.time_s
-    for slower, (depth, seconds) in _walk(over_speed, last.speed_m_s, at, -last.speed_m_s, rtol, at, 0.0):
+    left = -last.speed_m_s / pull(last.indentation_m)
+    scale = last.indentation_m + left * last.speed_m_s, last.time_s + left
+    for slower, (depth, seconds) in _walk(over_speed, last.speed_m_s, at, -last.speed_m_s, rtol, scale, 0.0):
         found.append(Step(seconds, depth, slower))
     return found
 
