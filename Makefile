@@ -71,7 +71,7 @@ figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (
 	$(PY) -m contactfpga_sim.figures README.md docs/use.md
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (a quarter of an hour)
-	$(PY) -m contactfpga_sim.size_tables docs/boards.md
+	$(PY) -m contactfpga_sim.size_tables README.md docs/boards.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

@@ -9,7 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
 from contactfpga_hdl.audit import Audit, Bitmap
-from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
 
 SHEETS = {
@@ -35,7 +35,7 @@ class Chain(wiring.Component):
     def __init__(self, skin):
         self.link = Link(skin)
         self.audit = Audit(skin) if skin.report == "moments" else Bitmap(skin)
-        self.front = RunLabeller(skin) if skin.report == "moments" else self.audit
+        self.front = LABELLERS[skin.labeller](skin) if skin.report == "moments" else self.audit
         super().__init__(
             {"rows": In(self.front.rows.signature.flip()), "ends": Out(1), "stalled": Out(1), "packed": Out(1)}
         )
@@ -89,9 +89,10 @@ def patterns(rng, rows, columns, capacity):
     return [*frames, [dots] * rows, noise, checkers, checkers]
 
 
+@pytest.mark.parametrize("labeller", LABELLERS)
 @pytest.mark.parametrize("name", SHEETS)
-def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name):
-    skin, clocks = shortest(SHEETS[name])
+def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name, labeller):
+    skin, clocks = shortest({**SHEETS[name], "labeller": labeller})
     frames = patterns(rng, skin.rows, skin.columns, skin.zone_capacity)
     frames *= 1 + 100 // (skin.rows * skin.columns)  # time for what is late to add up
     dut = Chain(skin)

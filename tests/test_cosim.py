@@ -17,6 +17,7 @@ from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.record import OutOfTime
 
 COVERING = pairwise(CHOICES)
+NAMED = ("connectivity", "labeller", "debounce", "report", "send")
 COCOTB = {
     "reference": Skin(),
     "debounced-cells": Skin(
@@ -35,6 +36,7 @@ COCOTB = {
         column_read="74hc165",
         column_chains=2,
     ),
+    "serial": Skin(labeller="serial", settle_us=2.5),
 }
 SIMULATORS = [
     "verilator",
@@ -47,7 +49,7 @@ SIMULATORS = [
 
 def name_of(choice: dict) -> str:
     rows, columns = choice["sheet"]
-    return f"{rows}x{columns}-{choice['connectivity']}-{choice['debounce']}-{choice['report']}-{choice['send']}"
+    return f"{rows}x{columns}-{'-'.join(str(choice[name]) for name in NAMED)}"
 
 
 def cycles_for(skin: Skin) -> int:

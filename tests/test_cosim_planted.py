@@ -14,10 +14,10 @@ from contactfpga_sim.golden import Timeline, predict
 SKIN = Skin(rows=4, columns=6)
 CYCLES = 4 * 72 * 8
 
-# boundary: the stage whose output it is, and the name of that output
+# boundary: the stage whose output it is, by its name in the top or the Skin's labeller, and the name of that output
 STAGES = {
     "rows": ("Scanner", "rows"),
-    "records": ("RunLabeller", "records"),
+    "records": ("labeller", "records"),
     "bytes": ("Link", "bytes"),
     "line": ("Transmitter", "pin"),
 }
@@ -78,16 +78,18 @@ def one_bit_wrong(m, inside, outside):
 
 
 @pytest.mark.parametrize("fault", [a_clock_late, one_bit_wrong])
-@pytest.mark.parametrize("boundary", STAGES)
-def test_a_fault_in_the_gateware_is_named(monkeypatch, record_property, boundary, fault):
+@pytest.mark.parametrize(("boundary", "labeller"), [*((boundary, "run") for boundary in STAGES), ("records", "serial")])
+def test_a_fault_in_the_gateware_is_named(monkeypatch, record_property, boundary, labeller, fault):
+    skin = SKIN.replace(labeller=labeller)
     rng = np.random.default_rng(3)
-    timeline = Timeline.frames(SKIN, rng.random((8, 4, 6)) < 0.4)
-    expected = predict(SKIN, timeline, CYCLES)
-    assert compare(expected, bench_amaranth.run(SKIN, timeline, CYCLES)) > 100
+    timeline = Timeline.frames(skin, rng.random((8, 4, 6)) < 0.4)
+    expected = predict(skin, timeline, CYCLES)
+    assert compare(expected, bench_amaranth.run(skin, timeline, CYCLES)) > 100
     stage, port = STAGES[boundary]
-    monkeypatch.setattr(top, stage, faulty(getattr(top, stage), port, fault))
+    table, name = (top.LABELLERS, labeller) if stage == "labeller" else (vars(top), stage)
+    monkeypatch.setitem(table, name, faulty(table[name], port, fault))
     with pytest.raises(Mismatch) as found:
-        compare(expected, bench_amaranth.run(SKIN, timeline, CYCLES))
+        compare(expected, bench_amaranth.run(skin, timeline, CYCLES))
     assert found.value.boundary == boundary
     assert str(found.value.cycle) in str(found.value)
     if fault is one_bit_wrong:

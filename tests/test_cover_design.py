@@ -157,6 +157,14 @@ def test_latency_of_the_sheet():
     assert latency_s(debounced) - latency_s(Skin()) == pytest.approx(11 * 96e-6)
 
 
+def test_latency_counts_an_adaptive_scan_at_its_longest_and_a_labeller_that_takes_its_time():
+    long = Skin(settle_us=50.0)
+    slots = [latency_s(long.replace(scan=scan)) / 51e-6 for scan in ("raster", "adaptive")]
+    assert slots[1] - slots[0] == pytest.approx(2 * (2 * 4 + 2))
+    serial = latency_s(long.replace(labeller="serial")) - latency_s(long)
+    assert serial == pytest.approx((16 + 8 + 2) / 12e6)
+
+
 def test_a_faster_reaction_needs_a_thinner_cover():
     task = Task.load(FIRST)
     found = design(task)

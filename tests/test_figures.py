@@ -25,6 +25,11 @@ def test_the_reference_skin_keeps_the_promised_latency():
     assert latency["contact"].worst <= 96 + 4 / 12
 
 
+def test_the_gains_of_the_adaptive_scan_are_up_to_date():
+    text = (ROOT / "docs/use.md").read_text()
+    assert figures.update(text, {"gain": figures.TABLES["gain"]}) == text
+
+
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("page", PAGES)

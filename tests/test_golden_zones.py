@@ -116,20 +116,22 @@ def test_every_4x4_frame_agrees_with_scipy(connectivity):
 
 
 @pytest.mark.parametrize("connectivity", CONNECTIVITIES)
+@pytest.mark.parametrize("labeller", ["run", "serial"])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_many_frames_at_once_agree_with_flood_fill_and_step_rule(shape, connectivity):
+def test_many_frames_at_once_agree_with_flood_fill_and_the_labellers_rule(shape, connectivity, labeller):
     rng = np.random.default_rng([*shape, connectivity, 1])
     frames = random_frames(rng, shape, 6 if shape == (64, 64) else 40)
-    found = golden.all_departures(frames, connectivity)
-    steps = golden.row_steps(frames, connectivity)
-    clocks = golden.last_record_clocks(frames, connectivity)
+    found = golden.all_departures(frames, connectivity, labeller)
+    busy, end = golden.row_clocks(frames, connectivity, labeller)
+    clocks = golden.last_record_clocks(frames, connectivity, labeller)
     for index, cells in enumerate(frames):
-        one = labelling(cells, connectivity)
+        one = labelling(cells, connectivity, labeller)
         own = slice(found.offsets[index], found.offsets[index + 1])
-        table = np.column_stack([found.row[own], found.step[own], found.moments[own]]).tolist()
-        assert table == [[zone.row, zone.step, zone.area, zone.sum_x, zone.sum_y] for zone in one.departures]
-        assert steps[index].tolist() == list(one.steps)
-        final = [zone.step + 2 for zone in one.departures if zone.row == shape[0] - 1]
+        table = np.column_stack([found.row[own], found.clock[own], found.moments[own]]).tolist()
+        assert table == [[zone.row, zone.clock, zone.area, zone.sum_x, zone.sum_y] for zone in one.departures]
+        assert busy[index].tolist() == list(one.busy)
+        assert end[index, -1] == one.end
+        final = [zone.clock for zone in one.departures if zone.row == shape[0] - 1]
         assert clocks[index] == max(final, default=0)
 
 
@@ -185,8 +187,31 @@ def test_known_shapes(art, connectivity, zones):
 )
 def test_step_rule_by_hand(art, connectivity, steps, departures):
     work = labelling(drawn(art), connectivity)
-    assert work.steps == steps
-    assert [(zone.row, zone.step) for zone in work.departures] == departures
+    assert work.busy == tuple(count + 1 for count in steps)
+    assert work.end == steps[-1] + 3
+    assert [(zone.row, zone.clock - 2) for zone in work.departures] == departures
+
+
+@pytest.mark.parametrize(
+    ("art", "connectivity", "busy", "departures"),
+    [
+        # a clock a column and two more; the run above costs one, and the zone leaves behind its column
+        ("#.. ... ...", 8, (5, 6, 5), [(1, 3)]),
+        ("... ... #.#", 8, (5, 5, 5), [(2, 2), (2, 4)]),
+        ("#.# ###", 8, (5, 7), [(1, 6)]),
+        # corners join with 8; with 4 a cluster right behind another costs a clock, but only one with its run above
+        ("#. .#", 8, (4, 5), [(1, 4)]),
+        ("#. .#", 4, (4, 6), [(1, 3), (1, 5)]),
+        (".# #.", 4, (4, 5), [(1, 2), (1, 4)]),
+        # a zone in two clusters of the last strip leaves behind the one on the right
+        ("##### #...# #....", 8, (7, 8, 9), [(2, 8)]),
+    ],
+)
+def test_column_rule_by_hand(art, connectivity, busy, departures):
+    work = labelling(drawn(art), connectivity, "serial")
+    assert work.busy == busy
+    assert work.end == busy[-1]
+    assert [(zone.row, zone.clock) for zone in work.departures] == departures
 
 
 @pytest.mark.parametrize(("connectivity", "worst"), [(8, max(4 + 2, 6)), (4, max(2 * 4 + 2, 8))])

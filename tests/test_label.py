@@ -1,4 +1,4 @@
-"""The run labeller: zones against a flood fill, cycles against the step rule of docs/timing.md."""
+"""The labellers: zones against a flood fill, cycles against their rules in docs/timing.md."""
 
 import functools
 import itertools
@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from contactfpga import Skin
 from contactfpga.derived import Derived
-from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.label.steps import place_of
+
+pytestmark = pytest.mark.parametrize("labeller", LABELLERS)
 
 SHAPES = {
     "nested U": "#.#.#.# #.#.#.# #.#.#.# #.###.# #.....# #######",
@@ -49,8 +51,10 @@ def cells_of(picture):
     return tuple(sum(1 << x for x, mark in enumerate(line) if mark == "#") for line in picture.split())
 
 
-def skin_of(rows, columns, connectivity):
-    return Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=100, zone_capacity=1)
+def skin_of(rows, columns, connectivity, labeller):
+    return Skin(
+        rows=rows, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=100, zone_capacity=1
+    )
 
 
 def pieces(cells, connectivity):
@@ -75,10 +79,38 @@ def runs(cells):
     return sum((y, x - 1) not in cells for y, x in cells)
 
 
-def frame_rule(cells, connectivity, start):
-    """By the step rule: cycles at which the rows are handed over, {cycle: zone}, and the end mark's cycle.
+def run_rule(clusters, columns, connectivity):
+    """By the step rule: the clock in which each cluster is done, clocks for the row, and until the end mark."""
+    steps, done = 0, []
+    for cluster in clusters:
+        before = {cell for cell in cluster if cell[0] == 0}
+        steps += max(runs(before), runs(cluster - before))
+        done.append(steps + 2)
+    return done, steps + 1, steps + 3
 
-    The labeller can take the first row in cycle ``start`` and each next one as soon as it is able to.
+
+def serial_rule(clusters, columns, connectivity):
+    """By the column rule, the same."""
+    cells = set().union(*clusters)
+    clocks, done_by_column = 0, []
+    for x in range(columns):
+        clocks += 1
+        begins_before = (0, x) in cells and (0, x - 1) not in cells
+        diagonal = {(1, x), (0, x - 1)} <= cells and not {(0, x), (1, x - 1)} & cells
+        if begins_before or (connectivity == 4 and diagonal):
+            clocks += 1
+        done_by_column.append(clocks)
+    return [done_by_column[max(x for _, x in cluster)] + 1 for cluster in clusters], clocks + 2, clocks + 2
+
+
+RULES = {"run": run_rule, "serial": serial_rule}
+
+
+def frame_rule(cells, columns, connectivity, labeller, start):
+    """By the labeller's rule: cycles at which the rows are handed over, {cycle: zone}, and the end mark's cycle.
+
+    The labeller can take the first row in cycle ``start`` and each next one as soon as it is able to; last comes the
+    cycle in which it can take another frame.
     """
     zones = list(pieces(cells, connectivity))
     handed, leaving, cycle = [], {}, start
@@ -86,22 +118,20 @@ def frame_rule(cells, connectivity, start):
         handed.append(cycle)
         pair = (cells[y - 1] if y else 0, word)
         clusters = sorted(pieces(pair, connectivity), key=lambda piece: min(x for _, x in piece))
-        steps = 0
-        last_step = {}  # of the rightmost cluster that holds a cell of the zone
-        for cluster in clusters:
-            before = {cell for cell in cluster if cell[0] == 0}
-            steps += max(runs(before), runs(cluster - before))
+        done, busy, end = RULES[labeller](clusters, columns, connectivity)
+        last_clock = {}  # of the rightmost cluster that holds a cell of the zone
+        for cluster, clock in zip(clusters, done):
             for index, zone in enumerate(zones):
                 if any((y - 1 + below, x) in zone for below, x in cluster):
-                    last_step[index] = steps
-        for index, step in last_step.items():
+                    last_clock[index] = clock
+        for index, clock in last_clock.items():
             bottom = max(row for row, _ in zones[index])
             if bottom == y - 1 or y == len(cells) - 1:
-                assert cycle + step + 2 not in leaving
-                leaving[cycle + step + 2] = zones[index]
+                assert cycle + clock not in leaving
+                leaving[cycle + clock] = zones[index]
         last = cycle
-        cycle += steps + 1
-    return handed, leaving, last + steps + 3
+        cycle += busy
+    return handed, leaving, last + end, cycle
 
 
 def moments(zone):
@@ -109,15 +139,15 @@ def moments(zone):
 
 
 @functools.cache
-def bench_of(bench, rows, columns, connectivity):
-    dut = RunLabeller(skin_of(rows, columns, connectivity))
+def bench_of(bench, rows, columns, connectivity, labeller):
+    dut = LABELLERS[labeller](skin_of(rows, columns, connectivity, labeller))
     return dut, bench(dut)
 
 
-def label(bench, frames, columns, connectivity, rng=None, gap=0.0, stall=0.0):
+def label(bench, frames, columns, connectivity, labeller, rng=None, gap=0.0, stall=0.0):
     """Hands frames over back to back: cycles of the rows and (cycle, moments, or None for an end mark)."""
     rows = len(frames[0])
-    dut, sim = bench_of(bench, rows, columns, connectivity)
+    dut, sim = bench_of(bench, rows, columns, connectivity, labeller)
     words = [word | (y == rows - 1) << columns for frame in frames for y, word in enumerate(frame)]
     source = sim.source(dut.rows, words, rng, gap=gap)
     sink = sim.sink(dut.records, rng, stall=stall)
@@ -126,7 +156,7 @@ def label(bench, frames, columns, connectivity, rng=None, gap=0.0, stall=0.0):
     def finished():
         return sum(payload >> ends for _, payload in sink.transfers) == len(frames)
 
-    sim.run(40 * len(words) * (columns + 2) + 100, until=finished)
+    sim.run(80 * len(words) * (columns + 2) + 100, until=finished)
     records = [
         (cycle, None if payload >> ends else fields(payload, rows, columns)) for cycle, payload in sink.transfers
     ]
@@ -145,15 +175,14 @@ def fields(payload, rows, columns):
     return tuple(values)
 
 
-def assert_exact(bench, frames, columns, connectivity):
+def assert_exact(bench, frames, columns, connectivity, labeller):
     """Every row, record and end mark in the very cycle of the rule."""
-    handed, records = label(bench, frames, columns, connectivity)
+    handed, records = label(bench, frames, columns, connectivity, labeller)
     wanted_rows, wanted, start = [], [], 0
     for frame in frames:
-        rows, leaving, end = frame_rule(frame, connectivity, start)
+        rows, leaving, end, start = frame_rule(frame, columns, connectivity, labeller, start)
         wanted_rows += rows
         wanted += [(cycle, moments(zone)) for cycle, zone in sorted(leaving.items())] + [(end, None)]
-        start = end - 2  # the last row takes one clock more than its steps, for the end mark
     assert handed == wanted_rows
     assert records == wanted
 
@@ -184,10 +213,10 @@ def turned(cells, columns):
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("name", SHAPES)
-def test_shapes_that_break_labellers_come_out_in_their_cycles(bench, name, connectivity):
+def test_shapes_that_break_labellers_come_out_in_their_cycles(bench, name, connectivity, labeller):
     cells = cells_of(SHAPES[name])
     for frame, columns in dict.fromkeys(turned(cells, len(SHAPES[name].split()[0]))):
-        assert_exact(bench, [frame, frame], columns, connectivity)
+        assert_exact(bench, [frame, frame], columns, connectivity, labeller)
 
 
 def frames_of(rows, columns):
@@ -200,11 +229,11 @@ def frames_of(rows, columns):
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("rows", "columns"), [(6, 9), (4, 16), (9, 5), (1, 12), (12, 1), (5, 2)])
-def test_random_frames_come_out_in_their_cycles(bench, rows, columns, connectivity):
+def test_random_frames_come_out_in_their_cycles(bench, rows, columns, connectivity, labeller):
     @settings(max_examples=40, deadline=None, derandomize=True, database=None)
     @given(frames_of(rows, columns))
     def check(frames):
-        assert_exact(bench, frames, columns, connectivity)
+        assert_exact(bench, frames, columns, connectivity, labeller)
 
     check()
 
@@ -218,24 +247,24 @@ def maze(rng, rows, columns):
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("rows", "columns", "count"), [(9, 9, 60), (12, 17, 60), (20, 32, 12)])
-def test_mazes_come_out_in_their_cycles(bench, rng, rows, columns, count, connectivity):
-    assert_exact(bench, [maze(rng, rows, columns) for _ in range(count)], columns, connectivity)
+def test_mazes_come_out_in_their_cycles(bench, rng, rows, columns, count, connectivity, labeller):
+    assert_exact(bench, [maze(rng, rows, columns) for _ in range(count)], columns, connectivity, labeller)
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("rows", "columns"), [(6, 9), (8, 16), (1, 7), (7, 1)])
 @pytest.mark.parametrize(("gap", "stall"), [(0.5, 0.0), (0.0, 0.5), (0.4, 0.8), (0.8, 0.4)])
-def test_stalls_on_either_port_change_no_zone(bench, rng, rows, columns, connectivity, gap, stall):
+def test_stalls_on_either_port_change_no_zone(bench, rng, rows, columns, connectivity, gap, stall, labeller):
     frames = [tuple(rng.randrange(1 << columns) for _ in range(rows)) for _ in range(6)]
     frames += [maze(rng, rows, columns) for _ in range(6)]
-    _, records = label(bench, frames, columns, connectivity, rng, gap, stall)
+    _, records = label(bench, frames, columns, connectivity, labeller, rng, gap, stall)
     wanted = [sorted(moments(zone) for zone in pieces(frame, connectivity)) for frame in frames]
     assert zones_by_frame(records) == wanted
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("columns", [1, 2, 3, 8, 16, 33, 64])
-def test_the_last_record_comes_within_the_bound(bench, rng, columns, connectivity):
+def test_the_last_record_comes_within_the_bound(bench, rng, columns, connectivity, labeller):
     dots = sum(1 << x for x in range(0, columns, 2))
     whole = (1 << columns) - 1
     pairs = [
@@ -251,8 +280,11 @@ def test_the_last_record_comes_within_the_bound(bench, rng, columns, connectivit
     runs_in = [(word & ~(word << 1)).bit_count() for word in range(1 << min(columns, 8))]
     few = [rng.choices([word for word, count in enumerate(runs_in) if count <= 2], k=2) for _ in range(12)]
     pairs += [tuple(word << rng.randrange(columns - min(columns, 8) + 1) for word in pair) for pair in few]
-    handed, records = label(bench, [(dots, *pair) for pair in pairs], columns, connectivity)
-    bound = max(columns + 2, 6) if connectivity == 8 else max(2 * columns + 2, 8)
+    handed, records = label(bench, [(dots, *pair) for pair in pairs], columns, connectivity, labeller)
+    if labeller == "run":
+        bound = max(columns + 2, 6) if connectivity == 8 else max(2 * columns + 2, 8)
+    else:
+        bound = 2 * columns + 5
     marks = [index for index, (_, zone) in enumerate(records) if zone is None]
     for index, pair in enumerate(pairs):
         first = marks[index - 1] + 1 if index else 0
@@ -260,22 +292,22 @@ def test_the_last_record_comes_within_the_bound(bench, rng, columns, connectivit
         clocks = max([cycle for cycle, _ in records[first : marks[index]]], default=last) - last
         assert clocks <= bound
         if sum((word & ~(word << 1)).bit_count() for word in pair) <= 4:
-            assert clocks <= 8
+            assert clocks <= (8 if labeller == "run" else columns + 6)
 
 
-def test_an_empty_row_costs_one_clock(bench):
-    handed, _ = label(bench, [(0,) * 20] * 2, 16, 8)
-    assert handed == [*range(20), *range(20, 40)]
+def test_what_an_empty_row_costs(bench, labeller):
+    handed, _ = label(bench, [(0,) * 20] * 2, 16, 8, labeller)
+    assert handed == [(1 if labeller == "run" else 18) * row for row in range(40)]
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-def test_open_zones_never_share_a_place_in_the_table(connectivity):
+def test_open_zones_never_share_a_place_in_the_table(connectivity, labeller):
     """For all pairs of rows of 8 columns, which hold those of fewer.
 
     Only zones with runs in the row before or in the new row are open. Those of one cluster become one zone, and
     their places are read before its place is written; so what counts are runs of one row, and of two clusters.
     """
-    derived = Derived(skin_of(2, 8, connectivity))
+    derived = Derived(skin_of(2, 8, connectivity, labeller))
     places = [place_of(derived, x) for x in range(8)]
     assert max(places) < derived.open_zones
     starts_of = [[x for x in range(8) if (word & ~(word << 1)) >> x & 1] for word in range(256)]

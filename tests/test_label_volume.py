@@ -8,8 +8,10 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga_sim import shapes
-from contactfpga_sim.golden import all_departures, row_steps
+from contactfpga_sim.golden import all_departures, row_clocks
 from contactfpga_sim.label_bench import LabelBench, Labelled
+
+pytestmark = pytest.mark.parametrize("labeller", ["run", "serial"])
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
@@ -29,13 +31,13 @@ RANDOM = {  # (rows, columns): frames; more than 100,000 in all, for each connec
 
 @pytest.fixture(scope="module")
 def benches() -> Iterator[dict]:
-    built: dict[tuple[int, int, int], LabelBench] = {}
+    built: dict[Skin, LabelBench] = {}
 
-    def bench(rows: int, columns: int, connectivity: int) -> LabelBench:
-        size = (rows, columns, connectivity)
-        if size not in built:
-            built[size] = LabelBench(Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=20.0))
-        return built[size]
+    def bench(rows: int, columns: int, connectivity: int, labeller: str) -> LabelBench:
+        skin = Skin(rows=rows, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=20.0)
+        if skin not in built:
+            built[skin] = LabelBench(skin)
+        return built[skin]
 
     yield bench
     for one in built.values():
@@ -63,25 +65,27 @@ def random_frames(rows: int, columns: int, count: int, seed: int) -> np.ndarray:
 
 def check_exact(bench: LabelBench, frames: np.ndarray) -> Labelled:
     """Frames back to back: every record, its place in the order and its clock; the issue's bounds on the last one."""
-    connectivity = bench.skin.connectivity
+    rule = bench.skin.connectivity, bench.skin.labeller
     got = bench.run(frames)
-    expected = all_departures(frames, connectivity)
+    expected = all_departures(frames, *rule)
     assert np.array_equal(got.frame, expected.frame)
     assert np.array_equal(got.moments, expected.moments)
-    steps = row_steps(frames, connectivity)
-    busy = steps + 1
+    busy, end = row_clocks(frames, *rule)
     handed = got.first_row[0] + (np.cumsum(busy) - busy.ravel()).reshape(busy.shape)
     assert np.array_equal(got.first_row, handed[:, 0])
     assert np.array_equal(got.last_row, handed[:, -1])
-    assert np.array_equal(got.cycle, handed[expected.frame, expected.row] + expected.step + 2)
-    assert np.array_equal(got.end, handed[:, -1] + steps[:, -1] + 3)
-    check_bounds(frames, connectivity, got.last_record_clocks)
+    assert np.array_equal(got.cycle, handed[expected.frame, expected.row] + expected.clock)
+    assert np.array_equal(got.end, handed[:, -1] + end[:, -1])
+    check_bounds(bench.skin, frames, got.last_record_clocks)
     return got
 
 
-def check_bounds(frames: np.ndarray, connectivity: int, clocks: np.ndarray) -> None:
+def check_bounds(skin: Skin, frames: np.ndarray, clocks: np.ndarray) -> None:
     columns = frames.shape[2]
-    worst = max(columns + 2, 6) if connectivity == 8 else max(2 * columns + 2, 8)
+    if skin.labeller == "serial":
+        assert clocks.max() <= columns + (-(-columns // 2) if skin.connectivity == 8 else columns) + 1
+        return
+    worst = max(columns + 2, 6) if skin.connectivity == 8 else max(2 * columns + 2, 8)
     assert clocks.max() <= worst
     ends = frames[:, -2:]
     runs = (ends & ~np.pad(ends, ((0, 0), (0, 0), (1, 0)))[:, :, :-1]).sum(axis=(1, 2))
@@ -90,7 +94,7 @@ def check_bounds(frames: np.ndarray, connectivity: int, clocks: np.ndarray) -> N
 
 def check_stalled(bench: LabelBench, frames: np.ndarray, gap: int, stall: int) -> None:
     """Frames with random gaps on the row port and stalls on the record port: the same zones."""
-    expected = all_departures(frames, bench.skin.connectivity)
+    expected = all_departures(frames, bench.skin.connectivity, bench.skin.labeller)
     got = bench.run(frames, gap=gap, stall=stall, seed=gap + 100 * stall + 1)
     assert np.array_equal(got.frame, expected.frame)
     assert np.array_equal(got.sorted_moments(), expected.sorted_moments())
@@ -99,8 +103,8 @@ def check_stalled(bench: LabelBench, frames: np.ndarray, gap: int, stall: int) -
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("columns", [4, 5])
-def test_every_small_frame(benches, record_property, columns, connectivity):
-    bench = benches(4, columns, connectivity)
+def test_every_small_frame(benches, record_property, columns, connectivity, labeller):
+    bench = benches(4, columns, connectivity, labeller)
     total, part = 1 << 4 * columns, 1 << 16
     worst = 0
     for first in range(0, total, part):
@@ -112,50 +116,50 @@ def test_every_small_frame(benches, record_property, columns, connectivity):
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("size", SQUARES)
-def test_shapes_that_break_labellers(benches, record_property, size, connectivity):
+def test_shapes_that_break_labellers(benches, record_property, size, connectivity, labeller):
     frames = np.array([cells for _, cells in shapes.variants(size, size)])
-    check_exact(benches(size, size, connectivity), frames)
-    check_stalled(benches(size, size, connectivity), frames, gap=20, stall=60)
+    check_exact(benches(size, size, connectivity, labeller), frames)
+    check_stalled(benches(size, size, connectivity, labeller), frames, gap=20, stall=60)
     record_property("cases", len(frames))
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("size", RANDOM, ids=str)
-def test_random_frames(benches, record_property, size, connectivity):
+def test_random_frames(benches, record_property, size, connectivity, labeller):
     frames = random_frames(*size, RANDOM[size], seed=size[0] * 100 + size[1])
-    check_exact(benches(*size, connectivity), frames)
+    check_exact(benches(*size, connectivity, labeller), frames)
     record_property("cases", len(frames))
 
 
-def test_random_frames_are_enough():
+def test_random_frames_are_enough(labeller):
     assert sum(RANDOM.values()) >= 100_000
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("gap", "stall"), [(0, 50), (50, 0), (30, 30), (10, 90)])
-def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity):
+def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity, labeller):
     small = every_frame(4, 4)
-    check_stalled(benches(4, 4, connectivity), small, gap, stall)
+    check_stalled(benches(4, 4, connectivity, labeller), small, gap, stall)
     large = random_frames(16, 16, 1000, seed=gap)
-    check_stalled(benches(16, 16, connectivity), large, gap, stall)
+    check_stalled(benches(16, 16, connectivity, labeller), large, gap, stall)
     record_property("cases", len(small) + len(large))
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("name", RECORDINGS)
-def test_recordings(benches, record_property, name, connectivity):
+def test_recordings(benches, record_property, name, connectivity, labeller):
     path = DATA / f"{name}.dev.npz"
     if not path.exists():
         pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
     with np.load(path, allow_pickle=False) as file:
         frames = file["pressed"]
-    check_exact(benches(*frames.shape[1:], connectivity), frames)
+    check_exact(benches(*frames.shape[1:], connectivity, labeller), frames)
     record_property("cases", len(frames))
 
 
-def test_a_wrong_sum_would_be_seen(benches, monkeypatch):
+def test_a_wrong_sum_would_be_seen(benches, monkeypatch, labeller):
     """The comparison itself: one bit of one record, and one clock, each make it fail."""
-    bench = benches(4, 4, 8)
+    bench = benches(4, 4, 8, labeller)
     frames = every_frame(4, 4, first=1000, count=100)
     right = bench.run(frames)
     for field, place in (("moments", (40, 1)), ("cycle", 40)):

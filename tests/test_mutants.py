@@ -1,6 +1,7 @@
 """The comparison with the golden model notices changes of the gateware's netlist: a sample of `make mutants`."""
 
 import dataclasses
+import itertools
 
 import pytest
 
@@ -8,7 +9,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.board import Board
 from contactfpga_sim.compare import Mismatch
 from contactfpga_sim.golden import Timeline
-from contactfpga_sim.mutants import campaign, netlist, proof, stimuli, trial
+from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
 from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
 
 SAMPLE = 150
@@ -61,11 +62,59 @@ def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
         trial.expected(board, stimulus)
 
 
-def test_no_mutant_that_was_killed_is_proved_equivalent_and_some_others_are(sample):
-    killed = [mutant for mutant in sample.mutants if mutant not in sample.left][:2]
-    proved = proof.equivalent(sample.skin, [*killed, *sample.left[:8]])
-    assert not any(proved[:2])
-    assert any(proved[2:])
+def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
+    skin = SKINS["4x4, fast"]
+    mutants = netlist.draw(netlist.candidates(skin), 60, seed=1)
+    left = campaign.left_by(skin, mutants, stimuli.quick(skin))
+    killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
+    told = [killed[stage] for stage in ("label", "link")]
+    proved = proof.equivalent(skin, [*told, *left[:4]], limit_s=1)
+    assert not any(proved[: len(told)])
+    assert any(proved[len(told) :])
+
+
+def test_only_noise_tells_a_receiver_that_takes_any_pulse_for_a_byte():
+    skin = SKINS["8x8"]
+    mutants = [m for m in netlist.candidates(skin) if m.place == "serial.py:64" and "-mode const1" in m.change]
+    model = netlist.model(skin, mutants)
+    stimulus = next(stimulus for stimulus in stimuli.quick(skin) if stimulus.noise)
+    left = trial.survivors(skin, model, range(1, len(mutants) + 1), [stimulus._replace(noise=())])
+    assert len(trial.survivors(skin, model, left, [stimulus])) < len(left)
+
+
+def equals(graph, bits, value):
+    result = 1
+    for place, bit in enumerate(bits):
+        result = graph.both(result, bit ^ 1 ^ (value >> place & 1))
+    return result
+
+
+@pytest.mark.parametrize("highest", [2, 4, 6])
+def test_a_counter_reaches_what_it_counts_to_and_nothing_above(highest, tmp_path):
+    """Three latches that count while an input is high, and begin anew behind ``highest``."""
+    graph = aig.Graph(4)
+    bits, counts = [2, 4, 6], 8
+    ends = equals(graph, bits, highest)
+    nexts, carry = {}, 1
+    for bit in bits:
+        counted = graph.both(graph.differ(bit, carry), ends ^ 1)
+        carry = graph.both(bit, carry)
+        nexts[bit >> 1] = graph.any([graph.both(counts, counted), graph.both(counts ^ 1, bit)])
+    answer = solve.reached(graph, nexts, equals(graph, bits, highest), 10, tmp_path)
+    assert answer.outcome == "reached"
+    assert sum(clock[counts >> 1] for clock in answer.path[:-1]) % (highest + 1) == highest
+    assert solve.reached(graph, nexts, equals(graph, bits, highest + 1), 10, tmp_path).outcome == "never"
+
+
+def test_a_graph_computes_what_its_gates_say():
+    graph = aig.Graph(3)
+    formula = graph.any([graph.differ(2, 5), graph.both(4, 6), 0])
+    for a, b, c in itertools.product((0, 1), repeat=3):
+        values = graph.values({1: a, 2: b, 3: c}, [formula])
+        assert values[formula >> 1] ^ formula & 1 == ((a ^ (1 - b)) | (b & c))
+    assert graph.both(2, 3) == 0
+    assert graph.both(2, 1) == graph.both(2, 2) == 2
+    assert graph.any([]) == graph.differ(4, 4) == 0
 
 
 def test_a_table_counts_the_fates_by_stage():

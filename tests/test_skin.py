@@ -57,15 +57,27 @@ REFUSED = [
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
     # scan and debounce
     ({"diodes": "none"}, "diodes is 'none'; it must be one of 'col2row', 'row2col'"),
-    ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster'"),
+    ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster', 'adaptive'"),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"settle_us": -5}, "settle_us is -5.0; it must lie between 0.0 and 10000.0 us"),
     ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
-        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us)",
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with "
+        "labeller = 'run'",
     ),
+    (
+        {"settle_us": 1.0, "labeller": "serial"},
+        "settle_us + release_us is 24 clocks; 16 columns and 64 zones a frame need 27 clocks (2.25 us) with labeller = "
+        "'serial'",
+    ),
+    (
+        {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
+        "settle_us + release_us is 48 clocks; 24 columns and 1 zones a frame need 51 clocks (4.25 us) with labeller = "
+        "'serial'",
+    ),
+    ({"labeller": "fast"}, "labeller is 'fast'; it must be one of 'run', 'serial'"),
     (
         {"debounce": "fast"},
         "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk'",
@@ -77,6 +89,28 @@ REFUSED = [
     (
         {"debounce": "asym_eager_defer_pk", "debounce_release_us": 393_121},
         "debounce_release_us is 393121.0; it must lie between 0.0 and 393120.0 us",
+    ),
+    # adaptive scan
+    ({"scan": "adaptive", "rows": 1}, "rows is 1; it must lie between 2 and 64 with scan = 'adaptive'"),
+    (
+        {"scan": "adaptive", "row_drive": "74hc595"},
+        "row_drive is '74hc595'; scan = 'adaptive' needs row_drive = 'direct'",
+    ),
+    (
+        {"scan": "adaptive", "column_read": "74hc165"},
+        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct'",
+    ),
+    (
+        {"scan": "adaptive", "settle_us": 2.0},
+        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones a frame need 43 clocks (3.58333 us)",
+    ),
+    (
+        {"scan": "adaptive", "rows": 64, "columns": 64},
+        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones a frame need 185 clocks (15.4167 us)",
+    ),
+    (
+        {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.1},
+        "keep_alive_ms is 0.1; one scan takes 0.156 ms",
     ),
     # report and link
     ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'cells'"),
@@ -144,6 +178,9 @@ JUST_WITHIN = [
     {"send": "always", "keep_alive_ms": 500},
     {"zone_capacity": 1},
     {"zone_capacity": 64},
+    {"scan": "adaptive", "rows": 2},
+    {"scan": "adaptive", "settle_us": 2.6},
+    {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.156},
     {"settle_us": 10_000, "release_us": 10_000},
     {"settle_us": 0.8},
     {"debounce": "sym_defer_pk", "debounce_press_us": 393_120, "debounce_release_us": 0},
@@ -324,6 +361,7 @@ OTHER = {
     "debounce": "sym_defer_pk",
     "debounce_press_us": 4000.0,
     "debounce_release_us": 4000.0,
+    "labeller": "serial",
     "report": "cells",
     "send": "on_change",
     "keep_alive_ms": 50.0,

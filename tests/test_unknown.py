@@ -6,7 +6,7 @@ from amaranth.hdl import Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import Scanner
 from contactfpga_sim import bench_unknown
-from contactfpga_sim.bench_unknown import INITIALISED, Unknown, forget
+from contactfpga_sim.bench_unknown import Unknown, forget, initialised
 from contactfpga_sim.compare import compare
 from contactfpga_sim.covering import stimulus
 from contactfpga_sim.golden import predict
@@ -17,6 +17,10 @@ SKINS = {
     "moments": SMALL,
     "16x16": Skin(),
     "4-connected": SMALL.replace(connectivity=4, zone_capacity=4),
+    "serial": SMALL.replace(labeller="serial"),
+    "serial, 4-connected": SMALL.replace(labeller="serial", connectivity=4, rows=9, columns=7, zone_capacity=4),
+    "projection": SMALL.replace(labeller="projection"),
+    "single": SMALL.replace(labeller="single"),
     "symmetric": SMALL.replace(debounce="sym_defer_pk", debounce_press_us=60.0, debounce_release_us=120.0),
     "eager": SMALL.replace(
         debounce="asym_eager_defer_pk",
@@ -42,11 +46,11 @@ def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
 
 
 @with_icarus
-@pytest.mark.parametrize("missing", ["link", "debounce"])
-def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing):
-    skin = SKINS["symmetric"]
+@pytest.mark.parametrize(("missing", "name"), [("link", "symmetric"), ("debounce", "symmetric"), ("label", "serial")])
+def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing, name):
+    skin = SKINS[name]
     cycles = 20 * facts(skin).scan_clocks
-    kept = [pattern for pattern in INITIALISED if missing not in pattern]
+    kept = [pattern for pattern in initialised(skin) if missing not in pattern]
     with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
         bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles, kept)
 
@@ -77,8 +81,17 @@ def test_a_word_that_is_read_while_it_is_written_is_seen(monkeypatch):
         bench_unknown.run(SMALL, stimulus(SMALL, cycles, seed=3), cycles)
 
 
+@with_icarus
+def test_a_bracket_that_is_read_while_it_is_written_is_seen(monkeypatch):
+    monkeypatch.setattr("contactfpga_hdl.label.serial.place_of", lambda derived, column: column & 0)
+    skin = SKINS["serial"]
+    cycles = 6 * facts(skin).scan_clocks
+    with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
+        bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles)
+
+
 def test_only_what_is_named_keeps_its_value():
     hello, frame = r"  reg [7:0] \link.store[3] ", r"  reg [7:0] \link.store[2] "
-    text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", INITIALISED)
+    text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", initialised(SMALL))
     assert known == {r"\link.store[3]": "8'h41"}
     assert text == f"{hello};\n{frame};\n  reg busy ;\n  wire x = y;\n"

@@ -50,7 +50,7 @@ def build(skin: Skin, board: Board, folder: Path, seed: int = 1) -> report.Repor
         stale.unlink(missing_ok=True)
     plan.extract(str(folder))
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
-    _run(folder, board)
+    _run(folder, board, seed)
     found = report.read(folder, LOG)
     if not found.met:
         bitstream.unlink()
@@ -66,7 +66,7 @@ def plan_for(board: Board, skin: Skin, seed: int = 1):
     board.check(skin)
     top = BoardTop(board, skin)
     options = synthesis.overrides(board.fpga)
-    options["nextpnr_opts"] = f"{_NEXTPNR} --seed {seed}"
+    options["nextpnr_opts"] += f" {_NEXTPNR} --seed {seed}"
     return platform_for(board).build(top, NAME, do_build=False, debug_verilog=False, **options)
 
 
@@ -79,7 +79,7 @@ def tool(name: str) -> str:
     return found
 
 
-def _run(folder: Path, board: Board) -> None:
+def _run(folder: Path, board: Board, seed: int) -> None:
     tools = {variable: tool(name) for variable, name in _TOOLS[board.bitstream].items()}
     script = ["cmd", "/c", f"build_{NAME}.bat"] if os.name == "nt" else ["sh", f"build_{NAME}.sh"]
     # In its own folder, with relative names: these tools do not see /tmp by its absolute name.
@@ -92,7 +92,7 @@ def _run(folder: Path, board: Board) -> None:
         except subprocess.TimeoutExpired:
             _stop(run)
             raise BuildFailed(
-                f"{board.title}: place and route did not end in {LIMIT_S} s; another seed may do (--seed 2); "
+                f"{board.title}: place and route did not end in {LIMIT_S} s; another seed may do (--seed {seed + 1}); "
                 f"see {folder / 'build.log'}"
             ) from None
         log.seek(0)

@@ -19,8 +19,11 @@ class Debounce(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
+        super().__init__(self._ports())
+
+    def _ports(self):
         row = row_layout(self.derived)
-        super().__init__({"raw": In(stream.Signature(row)), "rows": Out(stream.Signature(row))})
+        return {"raw": In(stream.Signature(row)), "rows": Out(stream.Signature(row))}
 
     def elaborate(self, platform):
         m = Module()
@@ -32,11 +35,14 @@ class Debounce(wiring.Component):
         self._word = Signal(max(1, word_bits))
         self._next_word = Signal.like(self._word)
         self._next_pressed = Signal()
+        self._row = Signal(range(self.skin.rows))
         if symmetric:
             self._defer_both(m, press, release)
         else:
             self._eager_press(m, press, release)
         self._walk_columns(m)
+        with m.If(self._finish):
+            m.d.sync += self._row.eq(Mux(self._last, 0, self._row + 1))
         return m
 
     def _defer_both(self, m, press, release):
@@ -66,14 +72,14 @@ class Debounce(wiring.Component):
         )
         read, write = state.read_port(), state.write_port()
         column = Signal(range(columns))
-        row = Signal(range(rows))
+        row = self._row
         raw = Signal(columns)
-        last = Signal()
+        self._last = last = Signal()
         busy = Signal()
         # Three clocks a column, overlapped: read its word, work out the next one, write it.
-        decide = Signal()
+        self._decide = decide = Signal()
         store = Signal()
-        finish = Signal()
+        self._finish = finish = Signal()
         address, store_address = Signal.like(write.addr), Signal.like(write.addr)
         m.d.comb += [
             read.addr.eq(Cat(column[:column_bits], row[:row_bits])),
@@ -98,6 +104,6 @@ class Debounce(wiring.Component):
             m.d.sync += write.data.eq(self._next_word)
             m.d.sync += self.rows.payload.cells.eq(Cat(self.rows.payload.cells, self._next_pressed)[1:])
         with m.If(finish):
-            m.d.sync += [self.rows.valid.eq(1), self.rows.payload.last.eq(last), row.eq(Mux(last, 0, row + 1))]
+            m.d.sync += [self.rows.valid.eq(1), self.rows.payload.last.eq(last)]
         with m.Elif(self.rows.ready):
             m.d.sync += self.rows.valid.eq(0)

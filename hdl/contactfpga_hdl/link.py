@@ -30,7 +30,7 @@ class Link(wiring.Component):
         super().__init__(
             {
                 "items": In(stream.Signature(item_layout(self.derived))),
-                "tag": In(tag_layout()),
+                "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
                 "received": In(1),
                 "bytes": Out(stream.Signature(8)),
@@ -97,25 +97,33 @@ class Link(wiring.Component):
             m.d.sync += [overwritten.eq(overwritten + drops), requested.eq(self.tag.requested | drops & requested)]
         if self.skin.send == "on_change":
             keep_alive = self.derived.keep_alive_frames
-            idle = Signal(range(keep_alive), init=keep_alive - 1)  # frames since the last one sent
-            due = idle == keep_alive - 1
+            idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
+            waited, due = self._wait(idle, keep_alive)
             m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | due)
             with m.If(self.packer.decide):
-                m.d.sync += idle.eq(Mux(verdict.send, 0, idle + 1))
+                m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
 
     def _time_hello(self, m):
         self._hello_due = Signal(init=1)
         self._take_hello = Signal()
         period = self.derived.hello_frames
-        frames = Signal(range(max(2, period)))
+        since = Signal(range(max(2, period)))
+        waited, due = self._wait(since, period)
         with m.If(self._take_hello):
             m.d.sync += self._hello_due.eq(0)
         with m.If(self.packer.decide):
-            m.d.sync += frames.eq(frames + 1)
-            with m.If(frames == period - 1):
-                m.d.sync += [frames.eq(0), self._hello_due.eq(1)]
+            m.d.sync += since.eq(waited)
+            with m.If(due):
+                m.d.sync += [since.eq(0), self._hello_due.eq(1)]
         with m.If(self.received):
             m.d.sync += self._hello_due.eq(1)
+
+    def _wait(self, waited, limit):
+        """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
+        if self.skin.scan == "raster":
+            return waited + 1, waited == limit - 1
+        longer = waited + self.tag.slots
+        return longer, longer >= limit
 
     def _send(self, m):
         region = 1 << self._offset_bits

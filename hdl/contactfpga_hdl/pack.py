@@ -57,7 +57,7 @@ class Packer(wiring.Component):
         super().__init__(
             {
                 "items": In(stream.Signature(item_layout(self.derived))),
-                "tag": In(tag_layout()),
+                "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
                 "decide": Out(1),
                 "verdict": In(verdict_layout(self.derived)),

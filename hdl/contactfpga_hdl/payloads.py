@@ -25,9 +25,10 @@ def item_layout(derived: Derived) -> data.StructLayout:
     return data.StructLayout({"data": 8 * derived.item_bytes, "end": 1})
 
 
-def tag_layout() -> data.StructLayout:
-    """What the scanner knows of a frame besides its cells."""
-    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "requested": 1})
+def tag_layout(derived: Derived) -> data.StructLayout:
+    """What the scanner knows of a frame besides its cells; ``slots``, where they differ, counts its row times."""
+    slots = {"slots": derived.max_frame_slots.bit_length()} if derived.skin.scan == "adaptive" else {}
+    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "requested": 1, **slots})
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:

@@ -34,7 +34,8 @@ def row_driver(skin: Skin) -> wiring.Signature:
 
     ``pattern`` holds the rows of the next slot as ones. It must be stable from ``shift``, given
     ``Derived.row_shift_clocks`` before the slot, until ``drive`` in the last clock before it. They are driven from the
-    clock after ``drive`` to that of ``release``. Direct rows need no ``shift``, and after power-up drive row 0 at once.
+    clock after ``drive`` to that of ``release``. Direct rows need no ``shift``, and after power-up drive row 0 at once,
+    in an adaptive scan all rows.
     """
     return wiring.Signature(
         {
@@ -77,7 +78,8 @@ class DirectRows(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        selected = Signal(self.skin.rows, init=1)
+        first = 1 if self.skin.scan == "raster" else (1 << self.skin.rows) - 1
+        selected = Signal(self.skin.rows, init=first)
         with m.If(self.drive):
             m.d.sync += selected.eq(self.pattern)
         with m.Elif(self.release):

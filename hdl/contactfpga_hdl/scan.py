@@ -4,12 +4,12 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import STUCK_MAX, TIME_BITS, Derived
+from contactfpga.derived import TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
 from contactfpga_hdl.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
-from contactfpga_hdl.popcount import popcount
 from contactfpga_hdl.shift import ColumnChain, RowChain
+from contactfpga_hdl.stuck import Stuck, present
 
 
 class Scanner(wiring.Component):
@@ -30,7 +30,7 @@ class Scanner(wiring.Component):
             {
                 "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
                 "rows": Out(stream.Signature(row_layout(self.derived))),
-                "tag": Out(tag_layout()),
+                "tag": Out(tag_layout(self.derived)),
                 "request": In(1),
                 "contact": Out(1),
             }
@@ -109,9 +109,8 @@ class Scanner(wiring.Component):
         ]
         with m.Switch(self._row):
             for row in sorted({row for row, _ in self.skin.mask}):
-                present = sum(1 << c for c in range(self.skin.columns) if (row, c) not in self.skin.mask)
                 with m.Case(row):
-                    m.d.comb += self._pressed.eq(self._columns & present)
+                    m.d.comb += self._pressed.eq(self._columns & present(self.skin, row))
 
     def _offer_row(self, m):
         with m.If(self._sampled):
@@ -133,21 +132,13 @@ class Scanner(wiring.Component):
             ]
 
     def _watch_stuck(self, m):
-        present = sum(
-            1 << c
-            for c in range(self.skin.columns)
-            if any((row, c) not in self.skin.mask for row in range(self.skin.rows))
-        )
-        stuck = Signal(self.skin.columns)
-        with m.If(self._released):
-            m.d.sync += stuck.eq(stuck | self._columns & present)
-        # Counted in two clocks, as 64 columns are too many for one.
-        groups = [stuck[first : first + 8] for first in range(0, self.skin.columns, 8)]
-        counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
-        with m.If(self._sampled & self._last):
-            m.d.sync += [stuck.eq(0), *(count.eq(popcount(group)) for count, group in zip(counts, groups))]
-        total = popcount(counts)
-        m.d.sync += self.tag.stuck.eq(Mux(total > STUCK_MAX, STUCK_MAX, total))
+        m.submodules.stuck = stuck = Stuck(self.skin)
+        m.d.comb += [
+            stuck.columns.eq(self._columns),
+            stuck.released.eq(self._released),
+            stuck.take.eq(self._sampled & self._last),
+            self.tag.stuck.eq(stuck.count),
+        ]
 
     def _tag_frame(self, m):
         """Time and request at the first row's sample; the tag takes them over with the last row's strobe."""

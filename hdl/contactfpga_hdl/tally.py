@@ -19,7 +19,8 @@ class Tally(wiring.Component):
     """Moments of each row, a group of columns a clock.
 
     The groups' shares come from two clocks behind ``taken`` on, one in each clock without ``hold``; before and after,
-    they are zero. A row has at most :data:`GROUPS`. No other may be taken until ``busy`` falls, behind the last one.
+    they are zero. A row has at most :data:`GROUPS`, an empty one none. Only empty ones may be taken until ``busy``
+    falls, behind the last group.
     """
 
     def __init__(self, skin: Skin):
@@ -51,13 +52,9 @@ class Tally(wiring.Component):
         offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
         first_counted = Signal.like(first)
         with m.If(self.taken):
-            m.d.sync += [
-                cells.eq(self.row.cells),
-                first.eq(0),
-                left.eq(self._groups + 1),
-                y.eq(y_next),
-                y_next.eq(Mux(self.row.last, 0, y_next + 1)),
-            ]
+            m.d.sync += y_next.eq(Mux(self.row.last, 0, y_next + 1))
+        with m.If(self.taken & self.row.cells.any()):
+            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(y_next)]
         with m.Elif(self.busy & ~self.hold):
             m.d.sync += [
                 cells.eq(cells >> self._columns),
@@ -88,8 +85,9 @@ class Change(wiring.Component):
         m.submodules.before = before = memory.Memory(shape=self.skin.columns, depth=self.skin.rows, init=[])
         read, write = before.read_port(), before.write_port()
         y = Signal(range(self.skin.rows))
+        following = Mux(self.row.last, 0, y + 1)[: len(y)]
         m.d.comb += [
-            read.addr.eq(y),
+            read.addr.eq(Mux(self.taken, following, y)),  # rows may follow each other without a pause
             write.addr.eq(y),
             write.data.eq(self.row.cells),
             write.en.eq(self.taken),
@@ -97,7 +95,7 @@ class Change(wiring.Component):
         with m.If(self.clear):
             m.d.sync += self.changed.eq(0)
         with m.If(self.taken):
-            m.d.sync += y.eq(Mux(self.row.last, 0, y + 1))
+            m.d.sync += y.eq(following)
             with m.If(read.data != self.row.cells):
                 m.d.sync += self.changed.eq(1)
         return m

@@ -6,13 +6,17 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
+from contactfpga_hdl.adaptive import AdaptiveScanner
 from contactfpga_hdl.audit import Audit, Bitmap
 from contactfpga_hdl.debounce import Debounce
-from contactfpga_hdl.label import RunLabeller
+from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
 from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
+from contactfpga_hdl.timed_debounce import TimedDebounce
+
+SCANNERS = {"raster": Scanner, "adaptive": AdaptiveScanner}
 
 
 class Top(wiring.Component):
@@ -53,7 +57,7 @@ class Top(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         bit_clocks = Derived(self.skin).bit_clocks
-        m.submodules.scan = scan = Scanner(self.skin)
+        m.submodules.scan = scan = SCANNERS[self.skin.scan](self.skin)
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
@@ -80,12 +84,15 @@ class Top(wiring.Component):
     def _debounced(self, m, scan):
         if self.skin.debounce == "none":
             return scan.rows
-        m.submodules.debounce = debounce = Debounce(self.skin)
+        adaptive = self.skin.scan == "adaptive"
+        m.submodules.debounce = debounce = TimedDebounce(self.skin) if adaptive else Debounce(self.skin)
         wiring.connect(m, scan.rows, debounce.raw)
+        if adaptive:
+            m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
     def _zones(self, m, rows, scan, link):
-        m.submodules.label = label = RunLabeller(self.skin)
+        m.submodules.label = label = LABELLERS[self.skin.labeller](self.skin)
         m.submodules.audit = audit = Audit(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)

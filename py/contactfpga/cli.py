@@ -21,6 +21,7 @@ _COMMANDS = {
     "board": "contactfpga_sim.board",
     "replay": "contactfpga_sim.replay",
     "cover": "contactfpga.commands.cover",
+    "chart": "contactfpga_sim.chart.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -53,7 +54,7 @@ def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
     if (error.name or "").split(".")[0] == "rich":
         extra = "cli"
     else:
-        extra = "boards" if command == "build" else "sim"
+        extra = {"build": "boards", "chart": "chart"}.get(command, "sim")
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     _flash(commands.add_parser("flash", help="write a bitstream into a board"))
     _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
     cover_flags.add(commands.add_parser("cover", help="compute the soft cover: impact, sensitivity, design"))
+    _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
     return parser
 
 
@@ -124,6 +126,17 @@ def _replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threshold", type=float, help="cells above this count as pressed; needed for numbers")
     parser.add_argument("--pitch-mm", type=float, default=10.0, help="distance of rows and columns (default: 10)")
     parser.add_argument("--json", action="store_true", help="one JSON object a frame and line")
+
+
+def _chart(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--method", action="append", metavar="NAME", help="only this one; can be repeated")
+    parser.add_argument("--family", action="append", metavar="NAME", help="only these scenes; can be repeated")
+    parser.add_argument("--placements", type=int, default=1000, metavar="N", help="for each point (default: 1000)")
+    parser.add_argument("--seed", type=int, default=0, help="of the placements (default: 0)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a core)")
+    parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work instead")
+    parser.add_argument("--no-size", action="store_true", help="leave out place and route")
+    parser.add_argument("--output", metavar="DIR", default="build/chart", help="folder (default: build/chart)")
 
 
 if __name__ == "__main__":

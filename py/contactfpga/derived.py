@@ -46,9 +46,9 @@ class Derived:
 
     @property
     def release_clocks(self) -> int:
-        """No row is driven so long: as asked, and until the columns are shifted and the next row is latched."""
+        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched or chosen."""
         column = self.column_load_clocks + self.column_shift_clocks
-        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks)
+        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks, self.choice_clocks)
 
     @property
     def row_clocks(self) -> int:
@@ -80,7 +80,23 @@ class Derived:
         return self.column_chain_lines * self.column_load_clocks
 
     @property
+    def row_levels(self) -> int:
+        """ceil(log2 rows): how often the rows can be halved until one is left."""
+        return (self.skin.rows - 1).bit_length()
+
+    @property
+    def choice_clocks(self) -> int:
+        """From a strobe until an adaptive scan can drive its next rows; 0 in a raster scan, which knows them."""
+        return max(self.row_levels, 2) + 4 if self.skin.scan == "adaptive" else 0
+
+    @property
+    def max_frame_slots(self) -> int:
+        """The most row times that a frame can take."""
+        return self.skin.rows + (2 * self.row_levels + 2 if self.skin.scan == "adaptive" else 0)
+
+    @property
     def frame_clocks(self) -> int:
+        """One scan period: every row once. Frames of an adaptive scan take fewer or more clocks."""
         return self.row_clocks * self.skin.rows
 
     @property
@@ -89,21 +105,57 @@ class Derived:
 
     @property
     def min_row_clocks(self) -> int:
-        """A row must last until debounce and labeller are done with the one before it, and a frame until the one
-        before it is packed: the scanner's tag is kept for no longer."""
-        debouncing = 0 if self.skin.debounce == "none" else self.skin.columns + 3
-        packed = 1 + debouncing + self.max_steps + 3 + 2 + self.max_stored_bytes + 4
-        return max(self.skin.columns + 6, 10, math.ceil(packed / self.skin.rows))
+        """A row must last until debounce and labeller are done with the one before it, end mark and all, and a frame
+        until the one before it is packed: the scanner's tag is kept for no longer."""
+        if self.skin.scan == "adaptive":
+            return max(self._handing_clocks, *map(self._packing_clocks, range(self.skin.rows + 1)))
+        packed = self._packed_clocks + self.max_stored_bytes
+        return max(self.skin.columns + 6, 10, self.label_clocks + 1, math.ceil(packed / self.skin.rows))
+
+    @property
+    def _debounce_clocks(self) -> int:
+        return 0 if self.skin.debounce == "none" else self.skin.columns + 3
+
+    @property
+    def _packed_clocks(self) -> int:
+        """From the offer of a frame's last row to the end of its packing, but for the bytes packed in this time."""
+        return 1 + self._debounce_clocks + self.label_clocks + 2 + 4
+
+    @property
+    def _handing_clocks(self) -> int:
+        """An adaptive scan hands on all that a slot tells before the next one's strobe: a row that was driven alone,
+        then all others as empty, a row a clock, up to the end mark."""
+        serial = self.skin.labeller == "serial" and self.skin.report == "moments"
+        busy = self.label_clocks if serial else self.label_clocks - 2
+        empty = self.skin.columns + 2 if serial else 1
+        return self._debounce_clocks + 2 * busy + self.skin.rows * empty + 8
+
+    def _packing_clocks(self, rows: int) -> int:
+        """What a row time must last at least for a frame with this many pressed rows to be packed before the next
+        frame ends, in which all of these are driven again, and all others together."""
+        if self.skin.report == "cells":
+            items = self.skin.rows
+        elif self.skin.connectivity == 8:
+            items = min(rows, math.ceil(self.skin.rows / 2)) * math.ceil(self.skin.columns / 2)
+        else:
+            items = math.ceil(rows * self.skin.columns / 2)
+        plain = min(items, self.max_items) * self.item_bytes + self.trailer_bytes
+        clocks = self._packed_clocks + self.skin.rows + plain + math.ceil(plain / 254)
+        return math.ceil(clocks / min(rows + 1, self.skin.rows))
 
     @property
     def keep_alive_frames(self) -> int:
-        """A frame is sent at the latest after this many scans."""
-        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / self.frame_clocks + 1e-9)
+        """A frame is sent at the latest after this many scans; in an adaptive scan, after so many row times."""
+        clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
+        if self.skin.scan == "adaptive":
+            return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
+        return math.floor(clocks / self.frame_clocks + 1e-9)
 
     @property
     def hello_frames(self) -> int:
-        """A hello is due after this many scans."""
-        return max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
+        """A hello is due after this many scans; in an adaptive scan, after so many row times."""
+        scans = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
+        return scans * self.skin.rows if self.skin.scan == "adaptive" else scans
 
     @property
     def press_scans(self) -> int:
@@ -115,7 +167,22 @@ class Derived:
         """Scan periods that last at least debounce_release_us."""
         return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
+    @property
+    def press_slots(self) -> int:
+        """The least row times that are more than one scan period short of ``press_scans``; see docs/timing.md."""
+        return max(0, (self.press_scans - 1) * self.skin.rows + 1)
+
+    @property
+    def release_slots(self) -> int:
+        """The same of ``release_scans``."""
+        return max(0, (self.release_scans - 1) * self.skin.rows + 1)
+
     # ---- widths in bits and sizes in bytes
+
+    @functools.cached_property
+    def slot_bits(self) -> int:
+        """Of a count of row times in which a debounce time, and two frames more, can be told."""
+        return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
 
     @functools.cached_property
     def cells(self) -> int:
@@ -202,9 +269,17 @@ class Derived:
         return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
 
     @property
-    def max_steps(self) -> int:
-        """The most clocks, but one, that the labeller takes for a row."""
-        return self.open_zones if self.skin.report == "moments" else 0
+    def label_clocks(self) -> int:
+        """The most clocks from a frame's last row to its end mark."""
+        if self.skin.report == "cells":
+            return 3
+        columns = self.skin.columns
+        return {
+            "run": self.open_zones + 3,
+            "serial": columns + self.open_zones + 2,
+            "projection": columns + 3,
+            "single": columns + 4,
+        }[self.skin.labeller]
 
     @functools.cached_property
     def backlog(self) -> int:
@@ -212,12 +287,14 @@ class Derived:
 
         Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
         them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
-        are packed before the next one comes.
+        are packed before the next one comes. An adaptive scan lets empty rows out, so that every row may close as many
+        zones, and bitmap rows of two frames may wait.
         """
+        adaptive = self.skin.scan == "adaptive"
         if self.skin.report == "cells":
-            return 4
+            return 2 * self.skin.rows + 2 if adaptive else 4
         busy = self.open_zones * self.record_bytes
-        late = max(0.0, 1 - 2 * self.row_clocks / busy)
+        late = max(0.0, 1 - (1 if adaptive else 2) * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
 
 

@@ -25,10 +25,11 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "surface": ("plane", "cylinder"),
     "connectivity": (4, 8),
     "diodes": ("col2row", "row2col"),
-    "scan": ("raster",),
+    "scan": ("raster", "adaptive"),
     "row_drive": ("direct", "74hc595"),
     "column_read": ("direct", "74hc165"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
+    "labeller": ("run", "serial", "projection", "single"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
 }
@@ -68,7 +69,7 @@ class Skin:
     diodes: str = "col2row"
     """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down."""
     scan: str = "raster"
-    """Order of the rows; ``raster`` drives one row after the other."""
+    """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched."""
     settle_us: float = 5.0
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
@@ -91,6 +92,10 @@ class Skin:
     debounce_release_us: float = 5000.0
     """How long a release must last to count, in us."""
 
+    labeller: str = "run"
+    """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
+    a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
+    cells are one zone."""
     report: str = "moments"
     """``moments``: area, sum x and sum y of each zone; ``cells``: the pressed cells as a bitmap."""
     send: str = "always"
@@ -205,6 +210,7 @@ class Skin:
             _within(name, getattr(self, name), 0.01, 1000.0, "mm")
         self._check_mask()
         self._check_registers()
+        self._check_scan()
         if self.surface == "plane":
             if self.radius_mm is not None:
                 raise SkinError(f"radius_mm is {self.radius_mm}; a plane has none, leave it out")
@@ -259,6 +265,14 @@ class Skin:
                 f"shift_hz is {self.shift_hz}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
             )
 
+    def _check_scan(self) -> None:
+        if self.scan == "raster":
+            return
+        _within("rows", self.rows, 2, MAX_LINES, "with scan = 'adaptive'")
+        for name in ("row_drive", "column_read"):
+            if getattr(self, name) != "direct":
+                raise SkinError(f"{name} is {getattr(self, name)!r}; scan = 'adaptive' needs {name} = 'direct'")
+
     def _check_link(self) -> None:
         if self.clock_hz % 1_000_000 or not 1_000_000 <= self.clock_hz <= 400_000_000:
             raise SkinError(f"clock_hz is {self.clock_hz}; it must be a whole number of MHz from 1 to 400 MHz")
@@ -287,15 +301,16 @@ class Skin:
             if derived.clocks(getattr(self, name)) < 1:
                 raise SkinError(f"{name} is {getattr(self, name)}; it must be at least one clock, {1 / megahertz:g} us")
         if derived.row_clocks < derived.min_row_clocks:
+            rows = f"{self.rows} rows, " if self.scan == "adaptive" else ""
             raise SkinError(
-                f"settle_us + release_us is {derived.row_clocks} clocks; {self.columns} columns and "
+                f"settle_us + release_us is {derived.row_clocks} clocks; {rows}{self.columns} columns and "
                 f"{self.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
-                f"({derived.min_row_clocks / megahertz:g} us)"
+                f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{self.labeller}'"
             )
         if self.send == "on_change" and derived.keep_alive_frames < 1:
             raise SkinError(
                 f"keep_alive_ms is {self.keep_alive_ms}; one scan takes "
-                f"{derived.frame_clocks / self.clock_hz * 1e3:g} ms"
+                f"{derived.max_frame_slots * derived.row_clocks / self.clock_hz * 1e3:g} ms"
             )
         if self.debounce == "none":
             return

@@ -31,7 +31,8 @@ RESET_CLOCKS = 4
 INITIALISED = (r"link\.store\[\d+\] += 8'h(?!00)", r"debounce\.state\[")
 """Memory words that the design needs at power-up and the bitstream brings: the hello's bytes, of which none is zero,
 and the states of debounce. They are put there after the first clock: until then unknown registers may write anywhere.
-In an FPGA they hold zero or their initial value, and the reset keeps them there."""
+In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial` there are
+zeros, too: :func:`initialised`."""
 
 _GATES = (
     f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "
@@ -43,18 +44,27 @@ class Unknown(AssertionError):
     """An output is unknown after the first clock of the reset."""
 
 
+def initialised(skin: Skin) -> tuple[str, ...]:
+    """:data:`INITIALISED`, and of the memory of the labeller `serial` the half that stays zero."""
+    if skin.labeller != "serial" or skin.report == "cells":
+        return INITIALISED
+    places = skin.columns if skin.connectivity == 4 else -(-skin.columns // 2)
+    half = 1 << (places - 1).bit_length()
+    return (*INITIALISED, rf"label\.groups\[({'|'.join(map(str, range(half, 2 * half)))})\]")
+
+
 def available() -> bool:
     """Whether Icarus Verilog is installed."""
     return shutil.which("iverilog") is not None
 
 
 def run(
-    skin: Skin, timeline: Timeline, cycles: int, initialised: Sequence[str] = INITIALISED, limit_s: float = 200.0
+    skin: Skin, timeline: Timeline, cycles: int, known_words: Sequence[str] | None = None, limit_s: float = 200.0
 ) -> Trace:
     """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
 
-    ``initialised``: patterns of what is known at power-up, as :data:`INITIALISED`. Raises :class:`Unknown` when a row,
-    the transmit or the contact pin is not known, and :class:`OutOfTime`.
+    ``known_words``: patterns of what is known at power-up, :func:`initialised` if left out. Raises :class:`Unknown`
+    when a row, the transmit or the contact pin is not known, and :class:`OutOfTime`.
     """
     from contactfpga_hdl.top import Top
 
@@ -62,7 +72,8 @@ def run(
         folder = Path(name)
         (folder / "model.il").write_text(native.rtlil(Top(skin)))
         native.yosys(_GATES, folder)
-        gates, known = forget((folder / "gates.v").read_text(), initialised)
+        patterns = initialised(skin) if known_words is None else known_words
+        gates, known = forget((folder / "gates.v").read_text(), patterns)
         (folder / "gates.v").write_text(gates)
         (folder / "bench.v").write_text(_bench(skin, timeline, cycles, known))
         _run(folder, limit_s, "iverilog", "-g2005", "-o", "bench", "bench.v", "gates.v")

@@ -87,6 +87,10 @@ class Board:
         """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
         self._library.board_send(self._board, data, ctypes.c_size_t(len(data)))
 
+    def pull_low(self, cycles: int) -> None:
+        """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
+        self._library.board_pull_low(self._board, ctypes.c_uint64(cycles))
+
     def take(self, boundary: str) -> np.ndarray:
         """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
         index = ctypes.c_uint(BOUNDARIES.index(boundary))

@@ -18,6 +18,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "diodes": ("col2row", "row2col"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
+    "labeller": ("run", "serial", "projection", "single"),
     "report": ("moments", "cells"),
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),
@@ -30,6 +31,15 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "row_time": ("tight", "uneven", "long"),
     "keep_alive_scans": (1, 3, 1000),
 }
+
+ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
+    "scan": ("adaptive",),
+    "sheet": ((2, 1), (2, 9), (9, 1), (5, 7), (12, 4), (16, 16), (33, 3)),
+    "row_chains": (0,),
+    "column_chains": (0,),
+    "shift_hz": (8_000_000,),
+}
+"""The same for the adaptive scan, which takes rows and columns on pins of their own only."""
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
@@ -78,11 +88,12 @@ def pairs_in(rows: list[list[int]]) -> set[tuple[int, int, int, int]]:
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
-    """The Skin for an assignment of :data:`CHOICES`."""
+    """The Skin for an assignment of :data:`CHOICES` or :data:`ADAPTIVE`."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
-    values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "report", "send")}
+    values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
     values |= {"rows": rows, "columns": columns, "clock_hz": megahertz * 1_000_000, "baud": baud}
+    values["scan"] = choice.get("scan", "raster")
     if choice["surface"] == "cylinder":
         values |= {"surface": "cylinder", "radius_mm": 2.0 * columns + 5.5, "pitch_y_mm": 7.25}
     if rows * columns > 1 and choice["mask"] == "cells":
@@ -96,10 +107,12 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     values |= {"debounce_press_us": 0.0, "debounce_release_us": 0.0}  # until the scan time is known
     settle, release = _row_time(values, choice["row_time"], megahertz)
     values |= {"settle_us": settle, "release_us": release}
-    scan_us = facts(Skin(**values | {"send": "always"})).scan_clocks / megahertz
+    known = facts(Skin(**values | {"send": "always"}))
+    scan_us = known.scan_clocks / megahertz
     press, back = choice["debounce_scans"]
     values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
-    values["keep_alive_ms"] = min(100.0, (choice["keep_alive_scans"] + 0.5) * scan_us / 1000)
+    frame_us = known.frame_slots * known.row_clocks / megahertz
+    values["keep_alive_ms"] = min(100.0, (choice["keep_alive_scans"] + 0.5) * frame_us / 1000)
     return Skin(**values)
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import re
 import sys
@@ -17,16 +18,28 @@ import numpy as np
 
 from contactfpga import protocol
 from contactfpga.derived import Derived
-from contactfpga.skin import Skin
+from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.board import Board
+from contactfpga_sim.golden import Timeline
+from contactfpga_sim.golden.adaptive import Scanner
+from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.label_bench import LabelBench
-from contactfpga_sim.scenes import edge, fingertip, palm, two_fingers
+from contactfpga_sim.scenes import CONTACTS, edge, fingertip, palm, two_fingers
 from contactfpga_sim.shapes import variants
 
 TACTILE = (fingertip, two_fingers, palm, edge)
 
 INSTANTS = 96
 """Touch instants, spread evenly over a scan."""
+
+RECORDINGS = Path("../shared/data")
+"""Where recordings lie that are no part of the project."""
+
+RECORDED = 100
+"""Frames of a recording that are looked at."""
+
+HELD_SCANS = 4
+"""Scan periods for which a frame is held; a sheet that is recorded a hundred times a second holds it for more."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -127,19 +140,27 @@ def reference_row(name: str, skin: Skin) -> str:
 def labeller_table() -> str:
     """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
     lines = [
-        "| cells | connectivity | built-in tactile scenes, worst | shapes that break labellers, worst | bound |",
-        "|---|---|---|---|---|",
+        "| labeller | cells | connectivity | built-in tactile scenes, worst "
+        "| shapes that break labellers, worst | bound |",
+        "|---|---|---|---|---|---|",
     ]
-    for size in (16, 32, 64):
-        for connectivity in (8, 4):
-            skin = Skin(rows=size, columns=size, connectivity=connectivity, settle_us=10.0)
-            touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
-            shapes = np.stack([cells for _, cells in variants(size, size)])
-            with LabelBench(skin) as bench:
-                clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
-            bound = math.ceil(size / 2) + 4 if connectivity == 8 else size + 4
-            lines.append(f"| {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |")
+    for labeller in ("run", "serial"):
+        for size in (16, 32, 64):
+            for connectivity in (8, 4):
+                lines.append(labeller_row(labeller, size, connectivity))
     return "\n".join(lines)
+
+
+def labeller_row(labeller: str, size: int, connectivity: int) -> str:
+    """One row of :func:`labeller_table`."""
+    skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
+    touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
+    shapes = np.stack([cells for _, cells in variants(size, size)])
+    with LabelBench(skin) as bench:
+        clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
+    more = math.ceil(size / 2) if connectivity == 8 else size
+    bound = more + 4 if labeller == "run" else size + more + 1
+    return f"| `{labeller}` | {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |"
 
 
 def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
@@ -147,7 +168,75 @@ def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
     return np.roll(cells, len(cells) - 1 - int(cells.sum(axis=1).argmax()), axis=0)
 
 
-TABLES: dict[str, Callable[[], str]] = {"reference": reference_table, "labeller": labeller_table}
+def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
+    """How long a frame of an adaptive scan takes, and how many times shorter that is than a raster scan.
+
+    ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, which the gateware keeps in every clock.
+    """
+    lines = [
+        "| scene | sheet | clock | active rows, mean | raster scan | adaptive, mean / worst | gain |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    return "\n".join(lines + [gain_row(name, frames) for name, frames in scenes.items()])
+
+
+def gain_row(name: str, frames: np.ndarray) -> str:
+    """One line of :func:`gain_table`. Each frame is held for some scan periods: most of them see a sheet at rest.
+
+    The mean is that of the frame which is under way at an instant picked at random.
+    """
+    _, rows, columns = frames.shape
+    known = facts(adaptive_skin(rows, columns))
+    hold = HELD_SCANS * known.scan_clocks
+    scanner = Scanner(known, Timeline([(index * hold, cells, None) for index, cells in enumerate(frames)]), [])
+    ends: list[int] = []
+    while not ends or ends[-1] < len(frames) * hold:
+        scanner.frame()
+        ends.append(scanner.slots[-1].end)
+    us = np.diff(ends, prepend=0) / known.clocks_per_us
+    scan_us = known.scan_clocks / known.clocks_per_us
+    mean = (us**2).sum() / us.sum()
+    active = frames.any(axis=2).sum(axis=1).mean()
+    return (
+        f"| {name} | {rows}x{columns} | {known.clocks_per_us} MHz | {active:.1f} | {scan_us:.0f} us | "
+        f"{mean:.1f} / {us.max():.1f} us | {scan_us / mean:.1f} |"
+    )
+
+
+def adaptive_skin(rows: int, columns: int) -> Skin:
+    """A sheet with 5 us settle and 1 us release a row, and the slowest clock that an adaptive scan of it can have."""
+    zones = min(64, math.ceil(rows / 2) * math.ceil(columns / 2))
+    for megahertz in (12, 24, 36, 48):
+        with contextlib.suppress(SkinError):
+            return Skin(
+                rows=rows, columns=columns, scan="adaptive", zone_capacity=zones, clock_hz=megahertz * 1_000_000
+            )
+    raise AssertionError("no clock is fast enough")
+
+
+def built_in_scenes() -> dict[str, np.ndarray]:
+    """(n, 16, 16) frames of every contact scene: one of those at rest, 50 of the moving one, over half a second."""
+    skin = adaptive_skin(16, 16)
+    times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
+    return {f"`{name}`": np.stack([make(skin)(t) for t in times[name]]) for name, make in CONTACTS.items()}
+
+
+def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
+    """Evenly spaced frames of each recording in the folder."""
+    found = {}
+    for path in sorted(folder.glob("*.npz")):
+        frames = np.load(path, allow_pickle=False)["pressed"]
+        found[path.name.partition(".")[0]] = frames[:: max(1, len(frames) // RECORDED)][:RECORDED]
+    return found
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "reference": reference_table,
+    "labeller": labeller_table,
+    "gain": lambda: gain_table(built_in_scenes()),
+}
+if RECORDINGS.is_dir():  # else their table stays as it is
+    TABLES["recorded"] = lambda: gain_table(recorded_scenes())
 
 
 def update(text: str, tables: Mapping[str, Callable[[], str]] = TABLES) -> str:

@@ -48,15 +48,15 @@ class Labelled:
 
 
 class LabelBench:
-    """A compiled labeller for sheets of the Skin's size and connectivity.
+    """The Skin's labeller, compiled, for sheets of its size and connectivity.
 
     Building it takes some seconds the first time (:mod:`contactfpga_sim.native`).
     """
 
-    def __init__(self, skin: Skin, labeller: str = "RunLabeller"):
+    def __init__(self, skin: Skin):
         self.skin = skin
         self._derived = Derived(skin)
-        library = native.load(_model(skin, labeller))
+        library = native.load(_model(skin))
         library.bench_new.restype = ctypes.c_void_p
         library.bench_records.restype = ctypes.c_void_p
         library.bench_timings.restype = ctypes.c_void_p
@@ -76,7 +76,7 @@ class LabelBench:
             if not 0 <= value < 100:
                 raise ValueError(f"{name} is {value}; it must lie between 0 and 99 per cent")
         words = np.ascontiguousarray(to_words(frames))
-        work = (rows * (columns + 2) + 64) * max(count, 1)
+        work = (rows * (2 * columns + 2) + 64) * max(count, 1)
         limit = 4 * work * 100 // (100 - max(gap, stall))
         finished = self._library.bench_run(
             self._bench,
@@ -121,17 +121,17 @@ class LabelBench:
         )
 
 
-def _model(skin: Skin, labeller: str) -> native.Model:
+def _model(skin: Skin) -> native.Model:
     def elaborate() -> Any:
-        from contactfpga_hdl import label
+        from contactfpga_hdl.label import LABELLERS
 
-        return getattr(label, labeller)(skin)
+        return LABELLERS[skin.labeller](skin)
 
     derived = Derived(skin)
     return native.Model(
-        title=f"the {skin.rows}x{skin.columns} labeller",
+        title=f"the {skin.rows}x{skin.columns} labeller {skin.labeller}",
         driver="label.cpp",
-        key=f"{labeller} {native.skin_key(skin)}",
+        key=f"labeller {native.skin_key(skin)}",
         elaborate=elaborate,
         defines={
             "ROWS": skin.rows,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from contactfpga.skin import Skin
 from contactfpga_hdl import boards, build, sizes
-from contactfpga_sim import figures
+from contactfpga_sim import figures, size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 """Sheets that the boards page shows beside the default ones."""
@@ -21,20 +21,20 @@ EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 def gateware_table() -> str:
     """The whole design and the labeller alone, by sheet and device."""
     lines = [
-        "| design | device | " + " | ".join(f"{size}x{size}" for size in sizes.SIZES) + " |",
+        "| design | device | " + " | ".join(f"{lines}x{lines}" for lines in sizes.SIZES) + " |",
         "|---" * (2 + len(sizes.SIZES)) + "|",
     ]
     for name in sizes.DESIGNS:
         for device in sizes.DEVICES:
-            cells = " | ".join(gateware_cell(name, device, size) for size in sizes.SIZES)
+            cells = " | ".join(gateware_cell(name, device, lines) for lines in sizes.SIZES)
             lines.append(f"| {name} | {device.title} | {cells} |")
     return "\n".join(lines)
 
 
-def gateware_cell(name: str, device: sizes.Device, size: int) -> str:
+def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
     """LUT4, flip-flops, block RAMs and clock of a design."""
-    print(f"{name}, {device.title}, {size}x{size}: {sizes.SEEDS} times place and route", file=sys.stderr)
-    found = sizes.measure(lambda: sizes.DESIGNS[name](sizes.square(size)), device)
+    print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
+    found = size.measure(lambda: sizes.DESIGNS[name](sizes.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
 
 

@@ -32,8 +32,13 @@ public:
 class Sender {
 public:
     std::deque<uint8_t> bytes;
+    uint64_t low = 0;  // clocks for which the pin is low, before anything else
 
     bool level() {
+        if (low) {
+            low--;
+            return false;
+        }
         if (clocks_ == 0) {
             if (bytes.empty())
                 return true;
@@ -203,6 +208,8 @@ EXPORT void board_hold(Board *board, const uint64_t *cells, size_t frames, uint6
 EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
     board->sender.bytes.insert(board->sender.bytes.end(), bytes, bytes + count);
 }
+
+EXPORT void board_pull_low(Board *board, uint64_t cycles) { board->sender.low = cycles; }
 
 EXPORT const Event *board_events(Board *board, unsigned boundary, size_t *count) {
     *count = board->events[boundary].size();

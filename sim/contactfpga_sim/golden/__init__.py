@@ -6,7 +6,7 @@ declared fields of a Skin.
 
 from contactfpga_sim.golden.predict import predict
 from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
-from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_steps
+from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
 from contactfpga_sim.golden.zones import zones
 
 __all__ = [
@@ -17,6 +17,6 @@ __all__ = [
     "all_departures",
     "last_record_clocks",
     "predict",
-    "row_steps",
+    "row_clocks",
     "zones",
 ]

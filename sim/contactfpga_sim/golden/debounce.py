@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 
@@ -50,3 +52,76 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
                 pressed = False
         counts.append(pressed)
     return counts
+
+
+class Timed:
+    """The same where samples are not a scan apart; times are counted in slots, a row time each.
+
+    ``press`` and ``release`` in scan periods of ``rows`` slots. A time is over at the first sample that comes later
+    than one scan period less behind its beginning: with samples a scan period apart, when it is over.
+    """
+
+    def __init__(self, method: str, press: int, release: int, rows: int):
+        self._rule = {"none": self._none, "sym_defer_pk": self._sym, "asym_eager_defer_pk": self._eager}[method]
+        self._press, self._release, self._rows = press, release, rows
+        self._switches: dict[tuple[int, int], _Switch] = {}
+
+    def take(self, cells: np.ndarray, slots: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
+        """(R, C) bool samples of a frame; ``slots`` tells when, for the rows that were driven alone.
+
+        Returns what each switch counts as, and the rows with one that counts as pressed or has a time running.
+        """
+        counts = np.zeros_like(cells)
+        for row, slot in slots.items():
+            for column in range(cells.shape[1]):
+                reads, place = bool(cells[row, column]), (row, column)
+                if reads or place in self._switches:
+                    switch = self._switches.setdefault(place, _Switch())
+                    self._rule(switch, reads, slot)
+                    counts[place] = switch.pressed
+                    if not switch.pressed and switch.since is None:
+                        del self._switches[place]
+        return counts, frozenset(row for row, _ in self._switches)
+
+    def _over(self, since: int, slot: int, scans: int) -> bool:
+        return slot - since > (scans - 1) * self._rows
+
+    def _none(self, switch: _Switch, reads: bool, slot: int) -> None:
+        switch.pressed = reads
+
+    def _sym(self, switch: _Switch, reads: bool, slot: int) -> None:
+        if reads == switch.pressed:
+            switch.since = None
+            return
+        if switch.since is None:
+            switch.since = slot
+        time = self._release if switch.pressed else self._press
+        if self._over(switch.since, slot, time):
+            switch.pressed, switch.since = reads, None
+
+    def _eager(self, switch: _Switch, reads: bool, slot: int) -> None:
+        if not switch.pressed:
+            switch.pressed, switch.ignored_since = reads, slot
+            return
+        if switch.ignored_since is not None:
+            if not self._over(switch.ignored_since, slot, self._press):
+                return
+            switch.ignored_since = None
+        if reads:
+            switch.since = None
+            return
+        if switch.since is None:
+            switch.since = slot
+            if self._release:
+                return
+        if self._over(switch.since, slot, self._release):
+            switch.pressed, switch.since = False, None
+
+
+@dataclasses.dataclass
+class _Switch:
+    pressed: bool = False
+    since: int | None = None
+    """The slot since when it reads otherwise."""
+    ignored_since: int | None = None
+    """The slot of its press, while what it reads is ignored."""

@@ -86,11 +86,30 @@ class Facts:
         """Clocks of the pulse that takes the columns."""
         return 0 if self.skin.column_read == "direct" else self.shift_bit
 
+    @property
+    def adaptive(self) -> bool:
+        return self.skin.scan == "adaptive"
+
+    @functools.cached_property
+    def halvings(self) -> int:
+        """ceil(log2 R)."""
+        return math.ceil(math.log2(self.rows))
+
+    @functools.cached_property
+    def choice(self) -> int:
+        """Clocks that an adaptive scan takes to choose its next rows."""
+        return 4 + max(2, self.halvings) if self.adaptive else 0
+
+    @functools.cached_property
+    def frame_slots(self) -> int:
+        """The most row times that a frame takes."""
+        return self.rows + (2 * self.halvings + 2 if self.adaptive else 0)
+
     @functools.cached_property
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
-        return max(asked, self.load + self.column_shift, latch)
+        return max(asked, self.load + self.column_shift, latch, self.choice)
 
     @functools.cached_property
     def settle(self) -> int:
@@ -103,7 +122,7 @@ class Facts:
 
     @functools.cached_property
     def scan_clocks(self) -> int:
-        """Clocks of one whole scan."""
+        """Clocks of one scan period: every row once."""
         return self.rows * self.row_clocks
 
     @functools.cached_property
@@ -123,12 +142,17 @@ class Facts:
         return upwards(self._scans(exact(self.skin.debounce_release_us)))
 
     @functools.cached_property
-    def keep_alive_scans(self) -> int:
-        return downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+    def keep_alive_slots(self) -> int:
+        """Row times after which an unchanged frame is sent: so many that one more frame could take too long."""
+        if self.adaptive:
+            row_us = Fraction(self.row_clocks, self.clocks_per_us)
+            return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
+        return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
 
     @functools.cached_property
-    def hello_scans(self) -> int:
-        return max(1, math.floor(self._scans(Fraction(500_000))))
+    def hello_slots(self) -> int:
+        """Row times after which a hello is due."""
+        return self.rows * max(1, math.floor(self._scans(Fraction(500_000))))
 
     def _scans(self, microseconds: Fraction) -> Fraction:
         return microseconds * self.clocks_per_us / self.scan_clocks

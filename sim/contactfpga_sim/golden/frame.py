@@ -101,8 +101,8 @@ class Packer:
         self._facts = facts
         self._link = link
         self._free = 0
-        self._index = 0
-        self._last_sent = 0
+        self._since_sent = 0
+        self._since_hello = 0
         self._before: np.ndarray | None = None
         self._overwritten = 0
         self._carried_request = False
@@ -115,20 +115,23 @@ class Packer:
             self._free = taken + packet.push(data.to_bytes(self._facts.item_bytes, "little"))
         taken = max(self._free, items.end + 2)
         self._link.advance(taken)
+        self._since_sent += items.scan.slots
+        self._since_hello += items.scan.slots
         if self._is_sent(items):
             self._send(packet, items, taken)
+            self._since_sent = 0
         else:
             self._free = taken + 1
         self._before = items.cells
-        self._index += 1
-        if self._index % self._facts.hello_scans == 0:
+        if self._since_hello >= self._facts.hello_slots:
             self._link.want_hello(taken + 1)
+            self._since_hello = 0
 
     def _is_sent(self, items: Items) -> bool:
         if self._facts.skin.send == "always" or self._before is None or items.scan.requested:
             return True
         changed = not np.array_equal(items.cells, self._before)
-        return changed or self._index - self._last_sent >= self._facts.keep_alive_scans
+        return changed or self._since_sent >= self._facts.keep_alive_slots
 
     def _send(self, packet: Packet, items: Items, taken: int) -> None:
         requested = items.scan.requested
@@ -139,7 +142,6 @@ class Packer:
         closing = packet.push(self._trailer(items, requested))
         self._link.offer(taken + closing + 2, packet.wire())
         self._free = taken + closing + 2
-        self._last_sent = self._index
 
     def _trailer(self, items: Items, requested: bool) -> bytes:
         facts = self._facts

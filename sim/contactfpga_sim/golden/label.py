@@ -1,58 +1,50 @@
-"""When the labeller lets its zones out: the cluster and step rule of docs/timing.md, on geometry alone."""
+"""When a labeller lets its zones out: where zones end is geometry, how many clocks that takes is the labeller's rule in
+docs/timing.md. The rule of ``run``, clusters and steps, is here, that of ``serial`` in :mod:`label_serial`; those that
+are not exact have their own idea of a zone in :mod:`label_shadows`."""
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
 
+from contactfpga_sim.golden import label_serial, label_shadows
+from contactfpga_sim.golden.work import Departure, Labelling
 from contactfpga_sim.golden.zones import flood, moments
 
 
-@dataclasses.dataclass(frozen=True)
-class Departure:
-    """A zone that leaves: while row ``row`` is worked, in its step ``step`` (from 1)."""
-
-    row: int
-    step: int
-    area: int
-    sum_x: int
-    sum_y: int
-
-
-@dataclasses.dataclass(frozen=True)
-class Labelling:
-    """The labeller's work on one frame."""
-
-    steps: tuple[int, ...]
-    """Steps of every row."""
-    departures: tuple[Departure, ...]
-    """Zones in the order they leave."""
-
-
-def labelling(cells: np.ndarray, connectivity: int) -> Labelling:
-    """Steps and departures for an (R, C) bool frame."""
+def labelling(cells: np.ndarray, connectivity: int, labeller: str = "run") -> Labelling:
+    """Clocks and departures for an (R, C) bool frame."""
     cells = np.ascontiguousarray(cells, bool)
-    return _labelling(cells.tobytes(), cells.shape, connectivity)
+    return _labelling(cells.tobytes(), cells.shape, connectivity, labeller)
 
 
 @functools.lru_cache(maxsize=4096)
-def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int) -> Labelling:
+def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: str) -> Labelling:
     cells = np.frombuffer(packed, bool).reshape(shape)
+    if labeller in BY_SHADOW:
+        return BY_SHADOW[labeller](cells)
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
-    strips = [cluster_steps(above[y : y + 2], connectivity) for y in range(shape[0])]
+    strips = [RULES[labeller](above[y : y + 2], connectivity) for y in range(shape[0])]
     labels, count = flood(cells, connectivity)
     above_labels = np.vstack([np.zeros((1, shape[1]), int), labels])
     departures = []
     for zone in range(1, count + 1):
         row = min(int(np.nonzero(labels == zone)[0].max()) + 1, shape[0] - 1)
-        last_step = strips[row][0][above_labels[row : row + 2] == zone].max()
-        departures.append(Departure(row, int(last_step), *moments(labels, zone)))
-    departures.sort(key=lambda zone: (zone.row, zone.step))
-    places = [(zone.row, zone.step) for zone in departures]
-    assert len(set(places)) == len(places), "two zones would leave in one step"
-    return Labelling(tuple(steps for _, steps in strips), tuple(departures))
+        clock = strips[row][0][above_labels[row : row + 2] == zone].max()
+        departures.append(Departure(row, int(clock), *moments(labels, zone)))
+    departures.sort(key=lambda zone: (zone.row, zone.clock))
+    places = [(zone.row, zone.clock) for zone in departures]
+    assert len(set(places)) == len(places), "two zones would leave in one clock"
+    return Labelling(tuple(busy for _, busy, _ in strips), strips[-1][2], tuple(departures))
+
+
+def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
+    """For the (2, C) cells of two adjacent rows, all in clocks behind the one in which the lower was handed over:
+    when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
+    """
+    last_step, steps = cluster_steps(strip, connectivity)
+    return last_step + 2, steps + 1, steps + 3
 
 
 def cluster_steps(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
@@ -73,3 +65,10 @@ def cluster_steps(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int
 def runs(row: np.ndarray) -> int:
     """Runs of adjacent pressed cells in a (C,) bool row."""
     return int(row[0]) + int(np.sum(row[1:] & ~row[:-1]))
+
+
+RULES = {"run": run_clocks, "serial": label_serial.cluster_clocks}
+"""Of the exact ones, by the name that ``labeller`` has in a Skin."""
+
+BY_SHADOW = {"projection": label_shadows.projection, "single": label_shadows.single}
+"""Of the others; connectivity makes no difference to them."""

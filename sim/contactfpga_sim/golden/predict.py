@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import debounce, label, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, label, scan, serial
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.frame import Items, Packer, hello, join
 from contactfpga_sim.golden.link import Link
@@ -20,10 +21,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
     known = facts(skin)
     received = serial.received(timeline.requests, known.bit_clocks)
-    scanned = scan.scans(known, timeline, received, cycles // known.scan_clocks + 1)
-    counted = debounce.debounced(
-        np.array([one.cells for one in scanned]), skin.debounce, known.press_scans, known.release_scans
-    )
+    scanned, counted, contact = (_adaptive if known.adaptive else _raster)(known, timeline, received, cycles)
     trace = Trace(cycles)
     link = Link(hello(known), known.bit_clocks)
     for cycle in (0, *(cycle + 1 for cycle in received)):
@@ -35,8 +33,28 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     link.advance(cycles)
     trace.bytes = link.bytes
     trace.line = serial.line(link.bytes, known.bit_clocks)
-    trace.contact = scan.contact(known, scanned)
+    trace.contact = contact
     return trace.until(cycles)
+
+
+Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
+"""Frames, their cells as they count once debounced, and changes of the contact pin."""
+
+
+def _raster(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
+    scanned = scan.scans(facts, timeline, received, cycles // facts.scan_clocks + 1)
+    counted = debounce.debounced(
+        np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
+    )
+    return scanned, counted, scan.contact(facts, scanned)
+
+
+def _adaptive(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
+    scanner = adaptive.Scanner(facts, timeline, received)
+    frames = [scanner.frame()]
+    while scanner.slots[-1].end < cycles:
+        frames.append(scanner.frame())
+    return [one for one, _ in frames], [counted for _, counted in frames], scanner.contact
 
 
 class Labeller:
@@ -46,24 +64,26 @@ class Labeller:
         self._facts = facts
         self._trace = trace
         self._free = 0
+        self._handed = -1
 
     def take(self, one: scan.Scan, cells: np.ndarray) -> Items:
         """Work one frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
         facts = self._facts
-        late = facts.columns + 3 if facts.debounced else 0
+        late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
         words = [int(np.sum(1 << np.nonzero(row)[0].astype(object))) for row in cells]
-        work = label.labelling(cells, facts.skin.connectivity)
+        work = label.labelling(cells, facts.skin.connectivity, facts.skin.labeller)
         handed = []
         for row, offered in enumerate(one.offered):
             last = row == facts.rows - 1
-            cycle = max(offered + late, self._free)
+            cycle = max(max(offered, self._handed + 1) + late * (row in one.alone), self._free)
+            self._handed = cycle
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
             if facts.moments:
-                self._free = cycle + work.steps[row] + 1
+                self._free = cycle + work.busy[row]
         if facts.moments:
-            records = [(handed[zone.row] + zone.step + 2, self._record(zone)) for zone in work.departures]
-            end = handed[-1] + work.steps[-1] + 3
+            records = [(handed[zone.row] + zone.clock, self._record(zone)) for zone in work.departures]
+            end = handed[-1] + work.end
         else:
             records = list(zip(handed, words, strict=True))
             end = handed[-1] + 3

@@ -25,6 +25,10 @@ class Scan:
     """Device time of the first row's strobe, less what the columns were shifted; unbounded."""
     requested: bool
     """A byte came in since the scan before began."""
+    slots: int
+    """Row times it took."""
+    alone: frozenset[int]
+    """Rows that were driven alone."""
 
 
 def strobe(facts: Facts, slot: int) -> int:
@@ -58,6 +62,8 @@ def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int)
                 stuck=_stuck(facts, timeline, slots),
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
                 requested=any(early <= cycle < late for cycle in requests),
+                slots=facts.rows,
+                alone=frozenset(range(facts.rows)),
             )
         )
     return result

@@ -9,6 +9,8 @@ import dataclasses
 
 import numpy as np
 
+from contactfpga_sim.golden import label_serial
+
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 
 
@@ -20,8 +22,8 @@ class Departures:
     """(N + 1,) int64."""
     row: np.ndarray
     """(n,) int64: the row that is worked while the zone leaves."""
-    step: np.ndarray
-    """(n,) int64: the step of that row, from 1, with which it leaves."""
+    clock: np.ndarray
+    """(n,) int64: in which clock behind the one in which that row was handed over it leaves."""
     moments: np.ndarray
     """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave."""
 
@@ -36,32 +38,33 @@ class Departures:
         return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
 
-def all_departures(frames: np.ndarray, connectivity: int) -> Departures:
+def all_departures(frames: np.ndarray, connectivity: int, labeller: str = "run") -> Departures:
     """Every zone of (N, R, C) bool frames, and when it leaves."""
     frames = np.asarray(frames, bool)
     count, rows, columns = frames.shape
     chunk = max(1, _AT_ONCE // (rows * columns))
-    parts = [_departures(frames[i : i + chunk], connectivity) for i in range(0, count, chunk)]
+    parts = [_departures(frames[i : i + chunk], connectivity, labeller) for i in range(0, count, chunk)]
     numbers = [np.diff(part.offsets) for part in parts]
     return Departures(
         offsets=np.concatenate([[0], np.cumsum(np.concatenate(numbers or [np.zeros(0, int)]))]),
         row=np.concatenate([np.zeros(0, int), *(part.row for part in parts)]),
-        step=np.concatenate([np.zeros(0, int), *(part.step for part in parts)]),
+        clock=np.concatenate([np.zeros(0, int), *(part.clock for part in parts)]),
         moments=np.concatenate([np.zeros((0, 3), int), *(part.moments for part in parts)]),
     )
 
 
-def row_steps(frames: np.ndarray, connectivity: int) -> np.ndarray:
-    """(N, R) int64: steps the labeller takes for each row of (N, R, C) bool frames."""
-    return _strips(np.asarray(frames, bool), connectivity)[1]
+def row_clocks(frames: np.ndarray, connectivity: int, labeller: str = "run") -> tuple[np.ndarray, np.ndarray]:
+    """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks from one to the next that can be handed over,
+    and to the end mark if it is the last."""
+    return _RULES[labeller](np.asarray(frames, bool), connectivity)[1:]
 
 
-def last_record_clocks(frames: np.ndarray, connectivity: int) -> np.ndarray:
+def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: str = "run") -> np.ndarray:
     """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
-    found = all_departures(frames, connectivity)
+    found = all_departures(frames, connectivity, labeller)
     result = np.zeros(len(frames), int)
     final = found.row == frames.shape[1] - 1
-    np.maximum.at(result, found.frame[final], found.step[final] + 2)
+    np.maximum.at(result, found.frame[final], found.clock[final])
     return result
 
 
@@ -86,7 +89,7 @@ def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
         inner[...] = np.append(least.ravel(), nothing)[least]
 
 
-def _departures(frames: np.ndarray, connectivity: int) -> Departures:
+def _departures(frames: np.ndarray, connectivity: int, labeller: str) -> Departures:
     count, rows, columns = frames.shape
     labels = min_labels(frames, connectivity)
     roots, zone = np.unique(labels[frames], return_inverse=True)
@@ -95,16 +98,16 @@ def _departures(frames: np.ndarray, connectivity: int) -> Departures:
     last_row = np.zeros(total, int)
     np.maximum.at(last_row, zone, y)
     leaves = np.minimum(last_row + 1, rows - 1)
-    last_step, _ = _strips(frames, connectivity)
-    step = np.zeros(total, int)
+    last_clock = _RULES[labeller](frames, connectivity)[0]
+    clock = np.zeros(total, int)
     for place in (0, 1):  # the zone's cells in the row before the one worked, and in that row itself
         near = y == leaves[zone] - 1 + place
-        np.maximum.at(step, zone[near], last_step[frame[near], leaves[zone[near]], x[near]])
+        np.maximum.at(clock, zone[near], last_clock[frame[near], leaves[zone[near]], x[near]])
     moments = np.stack([np.bincount(zone, weight, total) for weight in (np.ones(len(y)), x, y)], axis=1)
     owner = roots // (rows * columns)
-    order = np.lexsort((step, leaves, owner))
+    order = np.lexsort((clock, leaves, owner))
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
-    return Departures(offsets, leaves[order], step[order], moments.astype(int)[order])
+    return Departures(offsets, leaves[order], clock[order], moments.astype(int)[order])
 
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
@@ -129,3 +132,11 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
     for column in range(frames.shape[2] - 2, -1, -1):
         reached[..., column] = np.where(joins[column + 1], reached[..., column + 1], reached[..., column])
     return reached, steps
+
+
+def _run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    last_step, steps = _strips(frames, connectivity)
+    return last_step + 2, steps + 1, steps + 3
+
+
+_RULES = {"run": _run_clocks, "serial": label_serial.strip_clocks}

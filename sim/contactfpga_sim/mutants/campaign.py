@@ -1,7 +1,7 @@
 """``make mutants``: mutants of the gateware, how many of them the comparison with the golden model tells, and the rest.
 
-For each Skin mutants are drawn at random. For those that short stimuli leave a proof of equivalence is tried, and what
-is not proved goes through long stimuli. What is left then is listed.
+For each Skin mutants are drawn at random. Those that short stimuli leave are tried for a proof of equivalence; what is
+left then goes through long stimuli, and through longer trials of a proof. What is alive in the end is listed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import re
 import sys
+import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,6 +22,9 @@ from contactfpga_sim.mutants.stimuli import SKINS, Stimulus, quick, thorough, un
 
 BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
+
+CHECKED = 2
+"""So many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
 
 _SECTION = re.compile(r"(<!-- mutants -->).*?(<!-- end -->)", re.DOTALL)
 
@@ -46,17 +50,26 @@ def left_by(skin: Skin, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) 
 
 
 def examine(name: str, count: int, seed: int, say: Callable[[str], None] = lambda _: None) -> list[Result]:
-    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`."""
+    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`.
+
+    Raises :class:`contactfpga_sim.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
+    """
     skin = SKINS[name]
     say("draw")
     drawn = netlist.draw(netlist.candidates(skin), count, seed)
     say(f"{len(drawn)} mutants, short stimuli")
     left = left_by(skin, drawn, quick(skin))
     say(f"{len(left)} left, proofs")
-    proved = {mutant for mutant, same in zip(left, proof.equivalent(skin, left)) if same}
-    say(f"{len(left) - len(proved)} left, long stimuli")
-    long = [*thorough(skin), until_time_wraps(skin)]
-    alive = set(left_by(skin, [mutant for mutant in left if mutant not in proved], long))
+    killed = [mutant for mutant in drawn if mutant not in left][:CHECKED]
+    proved = _proved(skin, [*left, *killed], proof.QUICK_S)
+    if wrong := proved & {*killed}:
+        raise proof.ProofFailed(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
+    left = [mutant for mutant in left if mutant not in proved]
+    say(f"{len(left)} left, long stimuli")
+    left = left_by(skin, left, [*thorough(skin), until_time_wraps(skin)])
+    say(f"{len(left)} left, longer proofs")
+    proved |= _proved(skin, left, proof.LONG_S)
+    alive = {*left} - proved
     say(f"{len(alive)} alive")
     fates = (
         (mutant, "equivalent" if mutant in proved else "alive" if mutant in alive else "killed") for mutant in drawn
@@ -64,10 +77,14 @@ def examine(name: str, count: int, seed: int, say: Callable[[str], None] = lambd
     return [Result(name, mutant, fate) for mutant, fate in fates]
 
 
+def _proved(skin: Skin, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
+    return {mutant for mutant, same in zip(mutants, proof.equivalent(skin, mutants, limit_s)) if same}
+
+
 def table(results: Sequence[Result]) -> str:
     """Counts by stage, as Markdown; the share is that of the mutants not proved equivalent."""
     lines = [
-        f"| stage | mutants | killed | equivalent, proved at depth {proof.DEPTH} | alive | killed of the rest |",
+        "| stage | mutants | killed | equivalent, proved | alive | killed of the rest |",
         "|---|---|---|---|---|---|",
     ]
     for stage in [*dict.fromkeys(STAGES.values()), "all"]:
@@ -100,9 +117,7 @@ def main() -> int:
     parser.add_argument("--page", type=Path, help="write the table into this page")
     args = parser.parse_args()
     results = _run(args.skin or list(SKINS), args.each, args.seed, args.jobs)
-    print(listed(results))
-    print()
-    print(table(results))
+    print(f"{listed(results)}\n\n{table(results)}")
     if args.page:
         text = _SECTION.sub(lambda found: f"{found[1]}\n{table(results)}\n{found[2]}", args.page.read_text())
         args.page.write_text(text)
@@ -111,18 +126,25 @@ def main() -> int:
 
 
 def _run(names: Sequence[str], each: int, seed: int, jobs: int) -> list[Result]:
-    """All Skins, each with its line of progress."""
+    """All Skins, with a bar of progress for each, or where stderr is no terminal with a line for each step."""
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    steps = 5
+    started = time.monotonic()
     columns = (TextColumn("{task.fields[skin]}"), BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns) as progress, ThreadPoolExecutor(jobs) as pool:
+    live = sys.stderr.isatty()
+    with (
+        Progress(*columns, console=Console(stderr=True), disable=not live) as progress,
+        ThreadPoolExecutor(jobs) as pool,
+    ):
 
         def one(name: str) -> list[Result]:
-            task = progress.add_task("", total=steps, skin=name)
+            task = progress.add_task("", total=6, skin=name)
 
             def say(step: str) -> None:
                 progress.update(task, description=step, advance=1)
+                if not live:
+                    print(f"{time.monotonic() - started:5.0f} s  {name}: {step}", file=sys.stderr, flush=True)
 
             return examine(name, each, seed, say)
 

@@ -25,11 +25,10 @@ STAGES = {
 }
 """Modules of the design, as Top names them, and the stage they count for."""
 
-# No test drives the reset: registers start from their initial values. Bits that are constant anyway are dropped, as a
-# mutant of them would be none. Memories stay whole: what is in them is no logic.
+# No test drives the reset: registers start from their initial values. What does nothing is dropped, as a mutant of it
+# would be none. Memories stay whole: what is in them is no logic.
 PREPARE = (
-    "delete -port w:rst; setundef -undriven -zero; opt_expr; opt_merge; opt_clean; "
-    "wreduce; opt_expr; opt_clean; memory -nomap; opt_clean"
+    "delete -port w:rst; setundef -undriven -zero; opt -full; wreduce; peepopt; opt -full; memory -nomap; opt -full"
 )
 # A fault at Q is one at D a clock later, one at a clock no change of the logic; no memory here has a reset.
 _LEFT_OUT = ("Q", "CLK", "RD_CLK", "WR_CLK", "RD_ARST", "RD_SRST")
@@ -69,17 +68,21 @@ def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
 
 def model(skin: Skin, mutants: Sequence[Mutant]) -> native.Model:
     """The board in which ``Board.restart(n)`` picks ``mutants[n - 1]``."""
-    changes = [f"mutate -ctrl mutant {_SELECT_BITS} {n} {m.change}" for n, m in enumerate(mutants, 1)]
-    if len(changes) >= 1 << _SELECT_BITS:
-        raise ValueError(f"{len(changes)} mutants in one board; at most {(1 << _SELECT_BITS) - 1}")
     plain = board.model_of(skin)
     return dataclasses.replace(
         plain,
         title=f"{len(mutants)} mutants of {plain.title}",
-        passes="\n".join((PREPARE, *changes, "opt_expr; opt_merge; opt_clean")),
+        passes="\n".join((PREPARE, *switches(mutants), "opt_expr; opt_merge; opt_clean")),
         quiet=True,
         defines={**plain.defines, "MUTANTS": len(mutants)},
     )
+
+
+def switches(mutants: Sequence[Mutant]) -> list[str]:
+    """Yosys commands that put the mutants into the prepared design, picked by its new input ``mutant``."""
+    if len(mutants) >= 1 << _SELECT_BITS:
+        raise ValueError(f"{len(mutants)} mutants in one board; at most {(1 << _SELECT_BITS) - 1}")
+    return [f"mutate -ctrl mutant {_SELECT_BITS} {n} {mutant.change}" for n, mutant in enumerate(mutants, 1)]
 
 
 def _parsed(line: str) -> Mutant | None:

@@ -1,65 +1,161 @@
-"""Which mutants are no change at all: equivalence from every state, by SAT.
+"""Which mutants are no change at all: proofs that hold in every clock from power-up.
 
-Both boards, every register and memory word of them cut open: what it holds is an input, what it takes next an output.
-If no state and no input tells their outputs apart, then two boards that start alike never differ. This is induction of
-depth 1 over all registers and proves equivalence for ever; what it does not prove may be equivalent all the same, where
-states that never come tell the two apart.
+The question is put to a solver as one of reachability. Gateware and mutant run side by side on the same inputs. Only
+those registers of which the mutant may hold something else are there twice; it is asked whether a clock ever comes in
+which an output or any other register would differ. Where the answer is a path to such a clock, the registers that
+differ at its end are doubled too, and it is asked again.
+
+To keep the question small, some registers are cut open: they may hold anything in any clock. That allows more than
+ever happens, so what is never reached is never reached with them whole either.
 """
 
 from __future__ import annotations
 
+import math
+import re
 import tempfile
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
+from types import TracebackType
 
+from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim import board, native
-from contactfpga_sim.mutants.netlist import PREPARE, Mutant
+from contactfpga_sim.mutants import aig
+from contactfpga_sim.mutants.netlist import PREPARE, Mutant, switches
+from contactfpga_sim.mutants.solve import reached
 
-DEPTH = 1
-"""Clocks that the induction looks at."""
+QUICK_S, LONG_S = 4, 45
+"""How long may be asked with the same registers cut."""
 
-_TIMEOUT_S = 30
-_AT_ONCE = 20
-# Each register gets one wire of its own, with a public name: `expose` gives every name of a register a port, and two
-# ports would let it hold two values at once.
-_CUT = (
-    "memory_map; dffunmap; opt_expr; opt_merge; opt_clean -purge; "
-    "splitnets -driver; rename -enumerate; expose -dff -evert-dff"
+_GATES = (
+    "memory_map; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; "
+    "aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
-_LEVELS = (("gold", 0), ("gate", 1))
-_MITER = (
-    "miter -equiv -flatten -make_assert gold gate miter; hierarchy -top miter; "
-    "opt_expr; opt_merge; opt_expr; opt_merge; opt_clean"
-)
+_STORE = "link.store["  # the frames' memory, by far the most registers
+_CLOCKS = ("scan._clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
+# Outputs that say what is handed over, and the one that says when.
+_HANDED = {
+    "row_cells": "row_transfer",
+    "row_last": "row_transfer",
+    "record_data": "record_transfer",
+    "record_end": "record_transfer",
+    "byte_data": "byte_transfer",
+}
 
 
-def equivalent(skin: Skin, mutants: Sequence[Mutant], done: Callable[[], None] = lambda: None) -> list[bool]:
-    """For each mutant whether it is proved equivalent; ``done()`` is called after each."""
-    verdicts: list[bool] = []
-    with tempfile.TemporaryDirectory(prefix="contactfpga-") as name:
-        folder = Path(name)
+class ProofFailed(ContactFPGAError):
+    """Something is wrong with the proof itself; the message says what."""
+
+
+class Prover:
+    """Gateware and some mutants of it, as one circuit whose inputs ``mutant`` pick one."""
+
+    def __init__(self, skin: Skin, mutants: Sequence[Mutant]):
+        self._mutants = list(mutants)
+        self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
+        folder = Path(self._folder.name)
         (folder / "model.il").write_text(native.rtlil(board.model_of(skin).elaborate()))
-        for start in range(0, len(mutants), _AT_ONCE):
-            some = mutants[start : start + _AT_ONCE]
-            native.yosys("\n".join(_commands(some)), folder)
-            for number in range(len(some)):
-                verdicts.append("no model found: SUCCESS" in (folder / f"{number}.txt").read_text())
-                done()
+        native.yosys("\n".join(("read_rtlil model.il", native.FLATTEN, PREPARE, *switches(mutants), _GATES)), folder)
+        self._circuit = aig.read(folder / "design.aig", folder / "names.txt")
+        self._graph = aig.Graph(len(self._circuit.inputs) + len(self._circuit.latches))
+        count = len(self._circuit.inputs)
+        self._inputs = [2 * (1 + i) for i in range(count)]
+        self._latches = [2 * (1 + count + i) for i in range(len(self._circuit.latches))]
+        self._nexts, self._driven = self._placed(0, self._latches)
+
+    def __enter__(self) -> Prover:
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, traceback: TracebackType | None) -> None:
+        self._folder.cleanup()
+
+    def equivalent(self, mutant: Mutant, limit_s: int) -> bool:
+        """Whether the mutant is proved equivalent; at most ``limit_s`` seconds for each choice of what is cut."""
+        number = self._mutants.index(mutant) + 1
+        return any(self._never_differs(number, cut, limit_s) for cut in self._cuts(mutant))
+
+    def _cuts(self, mutant: Mutant) -> Iterator[frozenset[int]]:
+        """Sets of registers that may hold anything, the largest first."""
+        every, store = frozenset(range(len(self._latches))), self._named(_STORE)
+        part = re.findall(r"-cell (?:\$flatten)?\\?(\w+)\.", mutant.change)[0]
+        inside = self._named(f"{part}.", "?") - store
+        yield every - inside
+        yield every - inside - (self._named("scan.") - self._named(*_CLOCKS))
+        yield store
+
+    def _never_differs(self, number: int, cut: frozenset[int], limit_s: int) -> bool:
+        twins: dict[int, int] = {}
+        end = time.monotonic() + limit_s
+        while (left := end - time.monotonic()) > 0:
+            latches = list(self._latches)
+            for index, twin in twins.items():
+                latches[index] = twin
+            nexts, driven = self._placed(number, latches)
+            differing = self._differing(nexts, twins)
+            bad = self._graph.any([*differing.values(), *self._seen(driven)])
+            takes = {old >> 1: new for i, (old, new) in enumerate(zip(self._latches, self._nexts)) if i not in cut}
+            takes |= {twin >> 1: nexts[index] for index, twin in twins.items()}
+            answer = reached(self._graph, takes, bad, math.ceil(left), Path(self._folder.name))
+            if answer.outcome != "reached":
+                return answer.outcome == "never"
+            values = self._last(takes, answer.path, [bad, *differing.values()])
+            if not _value(values, bad):
+                raise ProofFailed("the solver's path does not lead where gateware and mutant differ")
+            found = {index for index, differ in differing.items() if _value(values, differ)}
+            if not found or found & cut:
+                return False
+            twins |= {index: self._graph.variable() for index in sorted(found)}
+        return False
+
+    def _placed(self, number: int, latches: Sequence[int]) -> tuple[list[int], list[int]]:
+        """Mutant ``number`` over these latches: what they take next, and the outputs."""
+        inputs = list(self._inputs)
+        for index, name in enumerate(self._circuit.inputs):
+            if found := re.fullmatch(r"mutant\[(\d+)\]", name):
+                inputs[index] = number >> int(found[1]) & 1
+        return self._graph.place(self._circuit, inputs, latches)
+
+    def _differing(self, nexts: Sequence[int], twins: Collection[int]) -> dict[int, int]:
+        """For each register that is there once where the mutant's takes something else."""
+        pairs = enumerate(zip(self._nexts, nexts))
+        return {i: self._graph.differ(one, other) for i, (one, other) in pairs if one != other and i not in twins}
+
+    def _seen(self, driven: Sequence[int]) -> Iterable[int]:
+        """Where outputs differ that someone looks at: what is handed over, only while it is."""
+        names = self._circuit.outputs
+        for name, one, other in zip(names, self._driven, driven):
+            when = _HANDED.get(name.partition("[")[0])
+            looked_at = self._driven[names.index(f"{when}[0]")] if when else 1
+            yield self._graph.both(self._graph.differ(one, other), looked_at)
+
+    def _last(self, takes: dict[int, int], path: list[dict[int, int]], roots: list[int]) -> dict[int, int]:
+        """The values of what ``roots`` depend on in the last clock of a path."""
+        state: dict[int, int] = {}
+        for inputs in path[:-1]:
+            values = self._graph.values({**state, **inputs}, takes.values())
+            state = {node: _value(values, literal) for node, literal in takes.items()}
+        return self._graph.values({**state, **path[-1]}, roots)
+
+    def _named(self, *prefixes: str) -> frozenset[int]:
+        names = enumerate(self._circuit.latches)
+        return frozenset(index for index, some in names if any(name.startswith(prefixes) for name in some))
+
+
+def _value(values: dict[int, int], literal: int) -> int:
+    return values[literal >> 1] ^ literal & 1
+
+
+def equivalent(
+    skin: Skin, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
+) -> list[bool]:
+    """For each mutant whether it is proved equivalent; ``done()`` is called after each."""
+    verdicts = []
+    if not mutants:
+        return []
+    with Prover(skin, mutants) as prover:
+        for mutant in mutants:
+            verdicts.append(prover.equivalent(mutant, limit_s))
+            done()
     return verdicts
-
-
-def _commands(mutants: Sequence[Mutant]) -> list[str]:
-    commands = ["read_rtlil model.il", native.FLATTEN, PREPARE, "design -save plain"]
-    for number, mutant in enumerate(mutants):
-        commands += [
-            "design -load plain",
-            # One netlist with a switch is cut, not two netlists, whose registers would be named differently.
-            f"mutate -ctrl mutant 1 1 {mutant.change}",
-            _CUT,
-            "copy top gold; rename top gate",
-            *(f"cd {name}; delete -port w:mutant; connect -set mutant 1'{level}; cd .." for name, level in _LEVELS),
-            _MITER,
-            f"tee -q -o {number}.txt sat -prove-asserts -timeout {_TIMEOUT_S} miter",
-        ]
-    return commands

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -95,12 +95,16 @@ class Stimulus(NamedTuple):
     name: str
     timeline: Timeline
     cycles: int
+    noise: Sequence[tuple[int, int]] = ()
+    """At which cycle the receive pin goes low, and for how many: too short for a start bit, or with no stop bit behind
+    it, so that no byte is received."""
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that come and go at any time, requests and stuck columns; then every adversarial shape for one scan."""
+    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks))
+    yield _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
     yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
 
 
@@ -109,6 +113,8 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
     larger one, and more than half a second of board time, after which a hello comes unasked."""
     for seed in range(3, 9):
         yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks))
+    yield _noisy(skin, 300)
+    yield _crowded(skin, 300)
     yield _frames(skin, "frames", _various_frames(skin))
     yield _rare(skin, "a second", 1_100_000)
 
@@ -127,6 +133,36 @@ def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
     starts = np.cumsum(gaps) + int(rng.integers(scan))
     pieces = covering.stimulus(skin, cycles, seed).pieces
     return Stimulus(f"random {seed}", Timeline(pieces, [int(cycle) for cycle in starts if cycle < cycles]), cycles)
+
+
+def _noisy(skin: Skin, scans: int) -> Stimulus:
+    """Bytes, and between them what is none: a low level of up to half a bit, or until behind the stop bit's middle.
+
+    Most come so far apart that what each does is seen.
+    """
+    rng = np.random.default_rng(17)
+    known = facts(skin)
+    bit, cycles = known.bit_clocks, scans * known.scan_clocks
+    requests, noise = [], []
+    start = 5
+    while start < cycles:
+        kind = rng.choice(["byte", "pulse", "break"], p=[0.2, 0.5, 0.3])
+        if kind == "byte":
+            requests.append(start)
+        else:
+            longest = 9 * bit + bit // 2 + 1
+            noise.append((start, longest if kind == "break" else int(rng.integers(1, bit // 2 + 1))))
+        start += 11 * bit + int(rng.integers(2 * bit)) + int(rng.choice([0, 2, 15])) * known.scan_clocks
+    return Stimulus("noise", Timeline(covering.stimulus(skin, cycles, 19).pieces, requests), cycles, noise)
+
+
+def _crowded(skin: Skin, scans: int) -> Stimulus:
+    """Hellos one behind the other: more frames are overwritten than the counter of them can count."""
+    known = facts(skin)
+    scan, three_bytes = known.scan_clocks, 30 * known.bit_clocks
+    requests = range(scan, (scans - 5) * scan, three_bytes)
+    pieces = covering.stimulus(skin, scans * scan, 29).pieces
+    return Stimulus("crowded", Timeline(pieces, requests), scans * scan)
 
 
 def _various_frames(skin: Skin) -> np.ndarray:

@@ -39,7 +39,7 @@ def expected(board: Board, stimulus: Stimulus) -> Events:
     Raises :class:`contactfpga_sim.compare.Mismatch` where they differ.
     """
     board.restart()
-    bench_native.play(board, stimulus.timeline, stimulus.cycles)
+    _play(board, stimulus, stimulus.cycles)
     events = {name: board.take(name) for name in OBSERVED}
     trace = bench_native.trace(events, stimulus.cycles)
     compare(golden.predict(board.skin, stimulus.timeline, stimulus.cycles), trace)
@@ -54,9 +54,17 @@ def killed_at(board: Board, number: int, stimulus: Stimulus, events: Events) -> 
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
         until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
-        bench_native.play(board, stimulus.timeline, until)
+        _play(board, stimulus, until)
         for name in OBSERVED:
             first, last = np.searchsorted(events[name]["cycle"], (start, until))
             if not np.array_equal(board.take(name), events[name][first:last]):
                 return name
     return None
+
+
+def _play(board: Board, stimulus: Stimulus, until: int) -> None:
+    for start, cycles in stimulus.noise:
+        if board.cycle <= start < until:
+            bench_native.play(board, stimulus.timeline, start)
+            board.pull_low(cycles)
+    bench_native.play(board, stimulus.timeline, until)

@@ -4,13 +4,14 @@ import argparse
 import sys
 import time
 
-from contactfpga_sim.proofs import label, link, pack, records, scan, serial, streams
+from contactfpga_sim.proofs import label, label_serial, link, pack, records, scan, serial, streams
 from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
     *label.CASES,
     *records.CASES,
+    *label_serial.CASES,
     *streams.CASES,
     *pack.CASES,
     *link.CASES,

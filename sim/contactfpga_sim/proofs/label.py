@@ -37,7 +37,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     is no restriction.
 
     Claimed: the stacks neither overflow nor run empty; no place of the table is written while an open zone lies there,
-    or read while none does or in the clock in which it is written; behind a frame's last row no zone is open, in the table or on a stack.
+    or read while none does or in the clock in which it is written; behind a frame's last row no zone is open, in the
+    table or on a stack.
     """
     m = proof.m
     dut = RunLabeller(skin_of(2, columns, connectivity))

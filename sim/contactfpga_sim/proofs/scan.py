@@ -86,8 +86,7 @@ def _slots(proof: Proof, derived):
 _DRIVE_BUGS = (
     Bug("no release", DirectRows, "elaborate", "m.Elif(self.release)", "m.Elif(0)"),
     Bug("the next row early", DirectRows, "elaborate", "selected.eq(0)", "selected.eq(self.pattern)"),
-    Bug("two rows from power-up", DirectRows, "elaborate", "selected = Signal(self.skin.rows, init=1)",
-        "selected = Signal(self.skin.rows, init=3)"),
+    Bug("two rows from power-up", DirectRows, "elaborate", "init=first", "init=3"),
     Bug("a row twice", Scanner, "_drive_rows", "init=1 << begun", "init=1 << 0 * begun"),
 )  # fmt: skip
 _OFFER_BUGS = (
@@ -95,7 +94,7 @@ _OFFER_BUGS = (
     Bug("never taken back", Scanner, "_offer_row", "m.Elif(self.rows.ready)", "m.Elif(0)"),
     Bug("a strobe early", DirectColumns, "elaborate", "self.done.eq(begun)", "self.done.eq(self.begin)"),
     Bug("the released sample is a row", Scanner, "_sample_columns", "reader.done & done_is_row", "reader.done"),
-    Bug("unmasked", Scanner, "_mask_row", "self._columns & present", "self._columns"),
+    Bug("unmasked", Scanner, "_mask_row", "self._columns & present(self.skin, row)", "self._columns"),
 )
 CASES = (
     Case("one row at a time", "4 rows, col2row", partial(one_row_at_a_time, diodes="col2row"), 2, _DRIVE_BUGS, 80),

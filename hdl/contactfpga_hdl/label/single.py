@@ -1,0 +1,66 @@
+"""All pressed cells are one zone: the smallest labeller, enough where there is never more than one contact."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
+
+
+class SingleLabeller(wiring.Component):
+    """Rows in, at most one zone record a frame out; a column a clock.
+
+    A row of C columns takes C + 2 clocks, an empty one takes one, unless it is the last row of a frame with a pressed
+    cell. If that is handed over in clock h, the zone leaves in clock h + C + 2.
+    """
+
+    def __init__(self, skin: Skin):
+        self.derived = Derived(skin)
+        super().__init__(
+            {
+                "rows": In(stream.Signature(row_layout(self.derived))),
+                "records": Out(stream.Signature(record_layout(self.derived))),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        skin = self.derived.skin
+        row = self.rows.payload
+        enable = ~self.records.valid | self.records.ready
+        cells, x = Signal(skin.columns), Signal(range(skin.columns + 1))
+        y, y_next = (Signal(range(max(2, skin.rows)), name=name) for name in ("y", "y_next"))
+        zone = Signal(moments_layout(self.derived))
+        walks, last, pressed = Signal(), Signal(), Signal()
+        leaves, ends, end = Signal(), Signal(), Signal()
+        final = x == skin.columns  # a clock behind the last column, so that the zone holds while it leaves
+        m.d.comb += self.rows.ready.eq(enable & ~walks)
+        with m.If(enable):
+            m.d.sync += [leaves.eq(walks & final & last), ends.eq(~walks & last), end.eq(ends)]
+            with m.If(leaves):
+                m.d.sync += zone.eq(0)
+        with m.If(enable & walks):
+            m.d.sync += [cells.eq(cells >> 1), x.eq(x + 1), walks.eq(~final)]
+            with m.If(cells[0]):
+                m.d.sync += [zone.area.eq(zone.area + 1), zone.sum_x.eq(zone.sum_x + x), zone.sum_y.eq(zone.sum_y + y)]
+        with m.Elif(enable):
+            m.d.sync += last.eq(0)
+        with m.If(self.rows.valid & self.rows.ready):
+            any_pressed = pressed | row.cells.any()
+            m.d.sync += [
+                cells.eq(row.cells),
+                x.eq(0),
+                y.eq(y_next),
+                y_next.eq(Mux(row.last, 0, y_next + 1)),
+                last.eq(row.last),
+                pressed.eq(any_pressed & ~row.last),
+                walks.eq(row.cells.any() | row.last & any_pressed),
+            ]
+        m.d.comb += [
+            self.records.valid.eq(leaves | end),
+            self.records.payload.zone.eq(zone),
+            self.records.payload.end.eq(end),
+        ]
+        return m

@@ -1,0 +1,125 @@
+"""The chart as a picture and as a table of numbers."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from contactfpga_sim.chart.errors import METRICS
+from contactfpga_sim.chart.study import Point, front
+
+AXES = {
+    "miscounted": "scenes miscounted, share",
+    "missed": "contacts missed, share",
+    "barycenter_mm": "barycenter error, mm",
+    "area": "area error, share of the area",
+}
+FLOOR = {"miscounted": 3e-4, "missed": 3e-4, "barycenter_mm": 1e-2, "area": 1e-2}
+"""Errors below are drawn here, as there is no 0 on an axis of powers of ten."""
+
+COLOURS = {"run": "#00798c", "serial": "#d1495b", "projection": "#edae49", "single": "#66a182", "cells": "#8d6a9f"}
+MARKERS = {5.0: "s", 10.0: "o", 20.0: "^"}
+
+
+def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "barycenter_mm")) -> Figure:
+    """A row of panels for each family of scenes, a column for each metric; both axes in powers of ten."""
+    matplotlib.rcParams["svg.hashsalt"] = "contactfpga"  # the same numbers give the same file
+    families = list(dict.fromkeys(point.task.family for point in points))
+    figure = Figure(figsize=(6.5 * len(metrics), 4.2 * len(families) + 1), layout="constrained")
+    panels = figure.subplots(len(families), len(metrics), squeeze=False)
+    for row, family in zip(panels, families, strict=True):
+        some = [point for point in points if point.task.family == family]
+        for panel, metric in zip(row, metrics, strict=True):
+            _panel(panel, some, metric)
+            panel.set_title(f"{family}: {AXES[metric]}", fontsize=10)
+    figure.legend(*_legend(points), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
+    return figure
+
+
+def _panel(panel, points: Sequence[Point], metric: str) -> None:
+    panel.set(xscale="log", yscale="log", xlabel="touch to last byte, us (median; line to the worst)")
+    panel.grid(alpha=0.2, which="both")
+    places = [(point.speed.median_us, max(point.total[metric].mean, FLOOR[metric])) for point in points]
+    best = front(places)
+    corners = np.array([places[index] for index in best]).reshape(-1, 2)
+    panel.step(*corners.T, where="post", color="black", linewidth=0.7)
+    panel.axhline(FLOOR[metric], color="grey", linewidth=0.5, linestyle=":")
+    for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
+        found, colour = point.total[metric], _colour(point)
+        low, high = (max(end, FLOOR[metric]) for end in (found.low, found.high))
+        panel.plot([x, point.speed.worst_us], [y, y], color=colour, alpha=0.25, linewidth=1)
+        panel.plot([x, x], [low, high], color=colour, alpha=0.35, linewidth=1)
+        panel.plot(point.speed.bound_us, y, marker="|", color=colour, alpha=0.6)
+        marker, edge = MARKERS[point.task.skin.pitch_x_mm], "black" if index in best else "white"
+        panel.plot(x, y, marker, color=colour, markersize=8, markeredgecolor=edge, zorder=3 + (index in best))
+    for index in best:
+        x, y = places[index]
+        alike = [point for point, place in zip(points, places, strict=True) if _alike(place, (x, y))]
+        text = "\n".join(map(_label, alike))
+        panel.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4), fontsize=6)
+    panel.margins(0.12, 0.2)
+
+
+def _alike(place: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Too close to be told apart in the picture."""
+    return abs(math.log(place[0] / other[0])) < 0.02 and abs(math.log(place[1] / other[1])) < 0.05
+
+
+def _label(point: Point) -> str:
+    return point.task.method + (f" ({point.luts:,} LUT4)" if point.luts else "")
+
+
+def _colour(point: Point) -> str:
+    skin = point.task.skin
+    return COLOURS["cells" if skin.report == "cells" else skin.labeller]
+
+
+def _legend(points: Sequence[Point]):
+    from matplotlib.lines import Line2D
+
+    used = list(dict.fromkeys(_colour(point) for point in points))
+    names = {colour: name for name, colour in COLOURS.items()}
+    lines = [Line2D([], [], color=colour, marker="o", linestyle="") for colour in used]
+    labels = [names[colour] for colour in used]
+    for pitch in sorted({point.task.skin.pitch_x_mm for point in points}):
+        lines.append(Line2D([], [], color="grey", marker=MARKERS[pitch], linestyle=""))
+        labels.append(f"{pitch:g} mm")
+    lines += [Line2D([], [], color="grey", marker="o", linestyle="", markeredgecolor="black", markeredgewidth=1.5)]
+    lines += [Line2D([], [], color="grey", marker="|", linestyle="")]
+    return lines, [*labels, "Pareto front", "bound of the time"]
+
+
+def command(point: Point) -> str:
+    """What works out this point alone."""
+    task = point.task
+    return (
+        f'contactfpga chart --method "{task.method}" --family {task.family} --placements {task.count} '
+        f"--seed {task.seed}"
+    )
+
+
+def write_csv(points: Sequence[Point], path: Path) -> None:
+    """All numbers, a line a point: errors with their 95 % intervals, times in us, LUT4 and clock on the UP5K."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        kinds = [f"{kind}_{name}{end}" for kind in ("total", "labeller", "sensing") for name in METRICS
+                 for end in ("", "_low", "_high")]  # fmt: skip
+        times = ("median_us", "worst_us", "bound_us")
+        table.writerow(["family", "method", "placements", *times, "luts", "fmax_mhz", *kinds, "command"])
+        for point in points:
+            values = [
+                f"{value:.6g}"
+                for kind in (point.total, point.labeller, point.sensing)
+                for name in METRICS
+                for value in (kind[name].mean, kind[name].low, kind[name].high)
+            ]
+            speeds = [f"{getattr(point.speed, name):.1f}" for name in times]
+            size = ["" if point.luts is None else point.luts, f"{point.fmax_mhz:.1f}" if point.fmax_mhz else ""]
+            task = point.task
+            table.writerow([task.family, task.method, task.count, *speeds, *size, *values, command(point)])

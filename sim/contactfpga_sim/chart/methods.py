@@ -1,0 +1,34 @@
+"""The methods and settings that the chart compares, all on sheets of one extent."""
+
+from __future__ import annotations
+
+from contactfpga.skin import Skin
+
+EXTENT_MM = 160.0
+"""Width and height of every sheet."""
+
+PITCHES_MM = (5.0, 10.0, 20.0)
+
+
+def sheet(pitch_mm: float, **settings) -> Skin:
+    """A square sheet of :data:`EXTENT_MM` with switches ``pitch_mm`` apart."""
+    lines = round(EXTENT_MM / pitch_mm)
+    return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **settings)
+
+
+def _methods() -> dict[str, Skin]:
+    methods = {}
+    for pitch in PITCHES_MM:
+        for labeller in ("run", "serial", "projection", "single"):
+            methods[f"{labeller}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
+        methods[f"cells, {pitch:g} mm"] = sheet(pitch, report="cells")
+    methods["run, 10 mm, 4-connected"] = sheet(10.0, connectivity=4)
+    methods["run, 10 mm, 1 Mbaud"] = sheet(10.0, baud=1_000_000)
+    methods["run, 10 mm, debounced 0.5 ms"] = sheet(
+        10.0, debounce="sym_defer_pk", debounce_press_us=500.0, debounce_release_us=500.0
+    )
+    return methods
+
+
+METHODS: dict[str, Skin] = _methods()
+"""By name; each one has gateware, and its time comes from the golden model of that gateware."""

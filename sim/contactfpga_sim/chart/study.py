@@ -1,0 +1,157 @@
+"""The points of the chart: every method on every family of scenes, worked out in pieces by any executor."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, as_completed
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_hdl import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim import kept, size
+from contactfpga_sim.chart import errors, speed
+from contactfpga_sim.chart.errors import METRICS, Interval
+from contactfpga_sim.chart.speed import Speed
+from contactfpga_sim.families import placements
+from contactfpga_sim.scenes import Scene
+
+PIECE = 125
+"""Placements that are worked out together."""
+
+DEVICE = sizes.UP5K
+"""For which LUT4 and clock are given."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A method on a family of scenes."""
+
+    method: str
+    skin: Skin
+    family: str
+    count: int
+    seed: int
+    timed: int = 48
+    """Touches whose time is worked out."""
+    checked: int = 2
+    """Of these so many go through the gateware, too."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """What came of a task."""
+
+    task: Task
+    total: dict[str, Interval]
+    """By metric: zones against the contacts."""
+    labeller: dict[str, Interval]
+    """The method's zones against the connected pieces of the pressed cells."""
+    sensing: dict[str, Interval]
+    """These pieces against the contacts."""
+    speed: Speed
+    luts: int | None
+    fmax_mhz: float | None
+
+
+_ERRORS = ("total", "labeller", "sensing")
+
+
+def study(
+    tasks: Sequence[Task],
+    executor: Executor,
+    with_size: bool = True,
+    step: Callable[[str, int], None] = lambda name, of: None,
+) -> list[Point]:
+    """Work out all tasks; ``step(name, number of all)`` is called after each piece.
+
+    What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
+    any other with the same interface, a Dask cluster's for instance.
+    """
+    jobs = [(task, first) for task in tasks for first in range(0, task.count, PIECE)]
+    skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
+    number = len(jobs) + len(tasks) + len(skins)
+    pieces = {executor.submit(accuracy, task, first): (task, first) for task, first in jobs}
+    times = {executor.submit(timing, task): task for task in tasks}
+    places = {executor.submit(_size, skin): skin for skin in skins}
+    for future in as_completed([*pieces, *times, *places]):
+        future.result()
+        step("placements" if future in pieces else "times" if future in times else "place and route", number)
+    found: dict[Task, dict[str, dict[str, list[float]]]] = {}
+    for future, (task, _) in sorted(pieces.items(), key=lambda item: item[1][1]):
+        for kind, metrics in future.result().items():
+            for metric, values in metrics.items():
+                found.setdefault(task, {}).setdefault(kind, {}).setdefault(metric, []).extend(values)
+    speeds = {task: future.result() for future, task in times.items()}
+    measured = {skin: future.result() for future, skin in places.items()}
+    return [
+        Point(
+            task,
+            *({name: errors.interval(found[task][kind][name]) for name in METRICS} for kind in _ERRORS),
+            speed=Speed(**speeds[task]),
+            luts=measured[task.skin].luts if with_size else None,
+            fmax_mhz=measured[task.skin].fmax_mhz if with_size else None,
+        )
+        for task in tasks
+    ]
+
+
+def accuracy(task: Task, first: int) -> dict[str, dict[str, list[float]]]:
+    """Errors of one piece of a task's placements, by kind and metric."""
+
+    def new() -> dict:
+        found: dict[str, dict[str, list[float]]] = {kind: {name: [] for name in METRICS} for kind in _ERRORS}
+        last = min(first + PIECE, task.count)
+        for scene in placements(task.family, last - first, task.seed, task.skin, first=first):
+            for kind, values in zip(_ERRORS, _scene_errors(scene, task.skin), strict=True):
+                for name in METRICS:
+                    found[kind][name].append(float(getattr(values, name)))
+        return found
+
+    return kept.kept("accuracy", _key(task, "accuracy", first), new)
+
+
+def _scene_errors(scene: Scene, skin: Skin) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
+    cells = scene.pressed(0.0, skin)
+    there = errors.contacts(scene.truth(0.0, skin))
+    exact, found = errors.exact_zones(cells, skin), errors.method_zones(cells, skin)
+    return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
+
+
+def timing(task: Task) -> dict[str, float]:
+    """The fields of a task's :class:`Speed`."""
+
+    def new() -> dict[str, float]:
+        scenes = placements(task.family, task.timed, task.seed + 1, task.skin)
+        frames = [cells for cells in (scene.pressed(0.0, task.skin) for scene in scenes) if cells.any()]
+        if not frames:
+            return dict.fromkeys((field.name for field in dataclasses.fields(Speed)), math.nan)
+        return dataclasses.asdict(speed.measure(task.skin, frames, task.checked))
+
+    return kept.kept("timing", _key(task, "timing", task.timed), new)
+
+
+def _size(skin: Skin) -> sizes.Size:
+    return size.measure(lambda: Top(skin), DEVICE, seeds=1)
+
+
+def _key(task: Task, kind: str, number: int) -> str:
+    skin = json.dumps(dataclasses.asdict(task.skin), sort_keys=True)
+    return f"{kept.sources()} {kind} {number} {task.count} {task.seed} {task.checked} {task.family} {skin}"
+
+
+def front(points: Iterable[tuple[float, float]]) -> list[int]:
+    """Numbers of the (time, error) points that no other one beats in one and equals in the other, by rising time."""
+    order = sorted(
+        (time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all()
+    )
+    best, found = math.inf, []
+    for _, error, index in order:
+        if error < best:
+            best = error
+            found.append(index)
+    return found

@@ -1,0 +1,183 @@
+"""The adaptive scanner: its slots, what is sampled in them, and the contact pin."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+
+from contactfpga_sim.golden import debounce, seek
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.scan import Scan
+from contactfpga_sim.golden.trace import Timeline
+
+
+@dataclasses.dataclass(frozen=True)
+class Slot:
+    """A row time and the rows that are driven in it."""
+
+    begin: int
+    rows: frozenset[int]
+    strobe: int
+    """When its columns have come through the synchronisers."""
+    released: int
+    """The first cycle without a driven row; the end of the slot if they stay driven."""
+    end: int
+    """The cycle in which the next slot begins."""
+
+
+class Scanner:
+    """Goes through a timeline frame by frame. ``received``: cycles at which a byte was received."""
+
+    def __init__(self, facts: Facts, timeline: Timeline, received: Iterable[int]):
+        self.slots: list[Slot] = []
+        """All slots so far."""
+        self.contact: list[tuple[int, int]] = []
+        """(cycle, level) of every change of the contact pin so far."""
+        self._facts = facts
+        self._timeline = timeline
+        self._changes = [piece[0] for piece in timeline.pieces]
+        self._requests = sorted(received)
+        self._listed: frozenset[int] = frozenset()
+        self._busy: frozenset[int] = frozenset()
+        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
+        self._present: np.ndarray = ~np.all(facts.mask, axis=0)
+        self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
+
+    def frame(self) -> tuple[Scan, np.ndarray]:
+        """The next frame, and its cells as they count once debounced."""
+        facts = self._facts
+        cells = np.zeros((facts.rows, facts.columns), bool)
+        offered = [0] * facts.rows
+        hits = set()
+        alone_in: dict[int, int] = {}
+        stuck = np.zeros(facts.columns, bool)
+        first = len(self.slots)
+        choices = seek.frame(facts.rows, self._listed)
+        choice = next(choices)
+        while choice:
+            rows, alone = choice
+            begin = self.slots[-1].end if self.slots else 0
+            strobe = self._strobe(begin, rows)
+            stuck |= self._released_before()
+            columns = self._columns(strobe - 2, rows)
+            hit = bool((columns & self._present).any())
+            if alone:
+                (row,) = rows
+                cells[row] = columns & ~facts.mask[row]
+                hits |= {row} if hit else set()
+                alone_in[row] = len(self.slots)
+                self._rise(strobe + 1, bool(cells[row].any()))
+            else:
+                self._watch(rows, strobe)
+                self._rise(strobe + 1, bool((columns & self._clean).any()))
+            if alone or not hit:
+                for row in rows:
+                    offered[row] = strobe + 1
+            self._drive(min(begin, strobe), strobe, rows, hit)
+            try:
+                choice = choices.send(hit)
+            except StopIteration:
+                break
+        self._end(strobe + 2, bool(cells.any()))
+        self._listed = self._busy | hits
+        counted, busy = self._debounce.take(cells, alone_in)
+        self._busy = busy if facts.debounced else frozenset(hits)
+        begun = self.slots[first].strobe
+        scan = Scan(
+            cells=cells,
+            offered=offered,
+            stuck=int(np.sum(stuck & self._present)),
+            time_us=begun // facts.clocks_per_us,
+            requested=self._asked_before(begun),
+            slots=len(self.slots) - first,
+            alone=frozenset(alone_in),
+        )
+        return scan, counted
+
+    def _strobe(self, begin: int, rows: frozenset[int]) -> int:
+        """When the slot's columns count: behind its settle time; of idle rows that stay driven, when one is seen."""
+        regular = begin + self._facts.settle + 1
+        if not self._watched():
+            return regular
+        awake = self._first_seen(self.slots[-1].strobe + 1, regular - 2, rows, self._present)
+        return regular if awake is None else awake + 2
+
+    def _drive(self, begin: int, strobe: int, rows: frozenset[int], hit: bool) -> None:
+        facts = self._facts
+        end = begin + facts.row_clocks
+        if not self._idle(rows):
+            self.slots.append(Slot(begin, rows, strobe, begin + facts.settle, end))
+        elif hit:
+            self.slots.append(Slot(begin, rows, strobe, strobe + 1, strobe + 1 + facts.release))
+        else:
+            self.slots.append(Slot(begin, rows, strobe, end, end))
+
+    def _idle(self, rows: frozenset[int]) -> bool:
+        return len(rows) == self._facts.rows
+
+    def _columns(self, cycle: int, rows: frozenset[int]) -> np.ndarray:
+        """Columns that read pressed in a cycle in which these rows are driven."""
+        cells, stuck = self._timeline.at(cycle)
+        columns = np.zeros(self._facts.columns, bool)
+        if cells is not None:
+            columns |= np.asarray(cells, bool)[sorted(rows)].any(axis=0)
+        if stuck is not None:
+            columns |= np.asarray(stuck, bool)
+        return columns
+
+    def _released_before(self) -> np.ndarray:
+        """Columns that read pressed in the clock before this slot, if no row was driven then."""
+        if not self.slots or self.slots[-1].released == self.slots[-1].end:
+            return np.zeros(self._facts.columns, bool)
+        return self._columns(self.slots[-1].end - 1, frozenset())
+
+    def _watched(self) -> bool:
+        """Whether the last slot was idle and its rows stay driven."""
+        return bool(self.slots) and self.slots[-1].released == self.slots[-1].end
+
+    def _watch(self, rows: frozenset[int], strobe: int) -> None:
+        """Idle rows stayed driven since the strobe before: each cycle counts for the pin."""
+        if self._watched():
+            seen = self._first_seen(self.slots[-1].strobe, strobe - 2, rows, self._clean)
+            if seen is not None:
+                self._rise(seen + 3, True)
+
+    def _first_seen(self, begin: int, end: int, rows: frozenset[int], counts: np.ndarray) -> int | None:
+        """The first cycle from ``begin`` to ``end`` in which a column that counts reads pressed."""
+        inside = self._changes[bisect.bisect_right(self._changes, begin) : bisect.bisect_right(self._changes, end)]
+        for cycle in (begin, *inside):
+            if cycle <= end and (self._columns(cycle, rows) & counts).any():
+                return cycle
+        return None
+
+    def _rise(self, cycle: int, pressed: bool) -> None:
+        if pressed and (not self.contact or not self.contact[-1][1]):
+            self.contact.append((cycle, 1))
+
+    def _end(self, cycle: int, pressed: bool) -> None:
+        """A frame with or without a pressed row; where idle rows stay driven, what is seen a clock before counts."""
+        slot = self.slots[-1]
+        if self._watched() and (self._columns(cycle - 3, slot.rows) & self._clean).any():
+            self._rise(cycle, True)
+        elif not pressed and self.contact and self.contact[-1][1]:
+            self.contact.append((cycle, 0))
+
+    def _asked_before(self, cycle: int) -> bool:
+        asked = bisect.bisect_left(self._requests, cycle)
+        del self._requests[:asked]
+        return asked > 0
+
+
+def driven(facts: Facts, slots: Iterable[Slot]) -> list[tuple[int, int]]:
+    """(cycle, rows) of every change of the rows that are driven; bit r is row r."""
+    changes: list[tuple[int, int]] = []
+    for slot in slots:
+        word = sum(1 << row for row in slot.rows)
+        if not changes or changes[-1][1] != word:
+            changes.append((slot.begin, word))
+        if slot.released < slot.end:
+            changes.append((slot.released, 0))
+    return changes

@@ -1,0 +1,48 @@
+"""What the labellers `projection` and `single` take for zones, and when they let them out (docs/timing.md)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactfpga_sim.golden.work import Departure, Labelling
+
+
+def projection(cells: np.ndarray) -> Labelling:
+    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band."""
+    rows, columns = cells.shape
+    pressed = cells.any(axis=1)
+    walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
+    departures = []
+    for first, past in _runs(pressed):
+        closing = min(past, rows - 1)
+        for left, right in _runs(cells[first:past].any(axis=0)):
+            box = np.zeros_like(cells)
+            box[first:past, left:right] = cells[first:past, left:right]
+            departures.append(Departure(closing, right + 2, *_moments(box)))
+    return _work(walks, columns, departures)
+
+
+def single(cells: np.ndarray) -> Labelling:
+    """All pressed cells of an (R, C) bool frame as one zone."""
+    rows, columns = cells.shape
+    any_pressed = bool(cells.any())
+    walks = [*cells[:-1].any(axis=1), any_pressed]
+    departures = [Departure(rows - 1, columns + 2, *_moments(cells))] if any_pressed else []
+    return _work(walks, columns + 1, departures)
+
+
+def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
+    """A row that is walked takes so many clocks more; the end mark comes three clocks behind the last row's walk."""
+    steps = [clocks if walk else 0 for walk in walks]
+    return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
+
+
+def _runs(line: np.ndarray) -> list[tuple[int, int]]:
+    """(first, past the last) of the runs of ones."""
+    edges = np.flatnonzero(np.diff(np.pad(line.astype(int), 1)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _moments(cells: np.ndarray) -> tuple[int, int, int]:
+    y, x = np.nonzero(cells)
+    return len(x), int(x.sum()), int(y.sum())

@@ -1,0 +1,177 @@
+"""And-inverter graphs, as files in the AIGER format and in memory.
+
+A literal is twice a node's number, plus 1 for its complement; literal 0 is false, 1 is true. All latches start at 0.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+
+@dataclasses.dataclass(frozen=True)
+class Circuit:
+    """What a file holds. Nodes are numbered inputs first, then latches, then gates, each behind its operands."""
+
+    inputs: Sequence[str]
+    """Their names, a bit as ``name[3]``."""
+    latches: Sequence[tuple[str, ...]]
+    """All names of each."""
+    outputs: Sequence[str]
+    nexts: Sequence[int]
+    """The literal that each latch takes next."""
+    driven: Sequence[int]
+    """The literal of each output."""
+    gates: Sequence[tuple[int, int]]
+    """The two literals whose conjunction each is."""
+
+
+def read(path: Path, names: Path) -> Circuit:
+    """A binary AIGER file, and what Yosys' ``write_aiger -map`` says of it. What has no name there is called ``?``."""
+    header, _, rest = path.read_bytes().partition(b"\n")
+    _, inputs, latches, outputs, gates = (int(word) for word in header.split()[1:6])
+    lines = rest.split(b"\n", latches + outputs)
+    literals = [int(line.split()[0]) for line in lines[:-1]]
+    deltas = _decoded(lines[-1])
+    pairs = []
+    for number in range(inputs + latches + 1, inputs + latches + gates + 1):
+        left = 2 * number - next(deltas)
+        pairs.append((left, left - next(deltas)))
+    called = _names(names)
+    return Circuit(
+        [called["input", i][0] for i in range(inputs)],
+        [tuple(called["latch", i]) for i in range(latches)],
+        [called["output", i][0] for i in range(outputs)],
+        literals[:latches],
+        literals[latches:],
+        pairs,
+    )
+
+
+def _names(path: Path) -> dict[tuple[str, int], list[str]]:
+    found = defaultdict(list)
+    for line in path.read_text().splitlines():
+        kind, number, *rest = line.split(" ", 3)
+        if rest:
+            # Yosys turns a latch around that starts at 1.
+            found[kind.removeprefix("inv"), int(number)].append(f"{rest[1]}[{rest[0]}]")
+    return defaultdict(lambda: ["?"], found)
+
+
+def _decoded(data: bytes) -> Iterator[int]:
+    value = shift = 0
+    for byte in data:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            yield value
+            value = shift = 0
+
+
+def _encoded(value: int) -> bytes:
+    out = bytearray()
+    while value >= 0x80:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+class Graph:
+    """Nodes that can be added to; a gate that is there already, or that is a constant or an operand, is not added."""
+
+    def __init__(self, variables: int):
+        """Nodes 1 to ``variables`` are variables."""
+        self.operands: list[tuple[int, int] | None] = [None] * (variables + 1)
+        self._known: dict[tuple[int, int], int] = {}
+
+    def variable(self) -> int:
+        """The literal of a new variable."""
+        self.operands.append(None)
+        return 2 * (len(self.operands) - 1)
+
+    def both(self, left: int, right: int) -> int:
+        """The literal of the conjunction."""
+        if left > right:
+            left, right = right, left
+        if left == 0 or left ^ right == 1:
+            return 0
+        if left == 1 or left == right:
+            return right
+        found = self._known.get((left, right))
+        if found is None:
+            found = self._known[left, right] = 2 * len(self.operands)
+            self.operands.append((left, right))
+        return found
+
+    def any(self, literals: Iterable[int]) -> int:
+        """The literal of the disjunction."""
+        none = 1
+        for literal in literals:
+            none = self.both(none, literal ^ 1)
+        return none ^ 1
+
+    def differ(self, left: int, right: int) -> int:
+        """The literal that holds where exactly one of the two does."""
+        return self.both(self.both(left, right) ^ 1, self.both(left ^ 1, right ^ 1) ^ 1)
+
+    def place(self, circuit: Circuit, inputs: Sequence[int], latches: Sequence[int]) -> tuple[list[int], list[int]]:
+        """The circuit's logic over these literals of inputs and latches: what latches take next, and the outputs."""
+        literals = [0, *inputs, *latches]
+        for left, right in circuit.gates:
+            literals.append(self.both(literals[left >> 1] ^ left & 1, literals[right >> 1] ^ right & 1))
+        nexts, driven = ([literals[old >> 1] ^ old & 1 for old in some] for some in (circuit.nexts, circuit.driven))
+        return nexts, driven
+
+    def cone(self, roots: Iterable[int]) -> list[int]:
+        """Numbers of the nodes that the roots depend on, each behind its operands."""
+        seen, todo = {0}, [root >> 1 for root in roots]
+        while todo:
+            node = todo.pop()
+            if node not in seen:
+                seen.add(node)
+                if operands := self.operands[node]:
+                    todo += [operands[0] >> 1, operands[1] >> 1]
+        return sorted(seen)[1:]
+
+    def values(self, variables: Mapping[int, int], roots: Iterable[int]) -> dict[int, int]:
+        """0 or 1 for each node that the roots depend on; variables that are not given are 0."""
+        values = {0: 0}
+        for node in self.cone(roots):
+            operands = self.operands[node]
+            if operands is None:
+                values[node] = variables.get(node, 0)
+            else:
+                left, right = operands
+                values[node] = (values[left >> 1] ^ left & 1) & (values[right >> 1] ^ right & 1)
+        return values
+
+
+def write(graph: Graph, nexts: Mapping[int, int], bad: int, path: Path) -> list[int]:
+    """Write what ``bad``, the only output, depends on. ``nexts``: which literal takes each variable that is a latch.
+
+    Returns the variables that became inputs, in the order in which they stand in the file.
+    """
+    latches: set[int] = set()
+    cone = graph.cone([bad])
+    while found := {node for node in cone if node in nexts} - latches:
+        latches |= found
+        cone = graph.cone([bad, *(nexts[node] for node in latches)])
+    gates = [node for node in cone if graph.operands[node]]
+    inputs = [node for node in cone if not graph.operands[node] and node not in latches]
+    kept = sorted(latches)
+    number = {0: 0, **{node: index for index, node in enumerate((*inputs, *kept, *gates), 1)}}
+
+    def literal(old: int) -> int:
+        return 2 * number[old >> 1] | old & 1
+
+    lines = [f"aig {len(number) - 1} {len(inputs)} {len(kept)} 1 {len(gates)}"]
+    lines += [str(literal(nexts[node])) for node in kept] + [str(literal(bad)), ""]
+    body = bytearray()
+    for node in gates:
+        right, left = sorted(literal(operand) for operand in graph.operands[node] or ())
+        body += _encoded(2 * number[node] - left) + _encoded(left - right)
+    path.write_bytes("\n".join(lines).encode() + bytes(body))
+    return inputs

@@ -1,0 +1,204 @@
+"""The labeller that takes a cell a clock: its records are the zones, and its memories neither overflow nor collide."""
+
+from functools import partial
+
+from amaranth.hdl import Const, Mux, Signal, Value
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.label.serial import SerialLabeller
+from contactfpga_hdl.label.steps import nesting, place_of
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.label import rows_into
+from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.zones import OpenRow, next_row
+
+
+def _skin(rows: int, columns: int, connectivity: int) -> Skin:
+    return Skin(
+        rows=rows, columns=columns, connectivity=connectivity, labeller="serial", settle_us=100, zone_capacity=1
+    )
+
+
+def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+    """Free and assumed: as below.
+
+    Claimed: what is wanted of the memory is there, nothing is written to a place in use or outside the table, no word
+    is used that was read while it was written, the brackets nest no deeper than there is room, and behind a frame no
+    place is in use.
+    """
+    dut, open_row = _labeller(proof, columns, connectivity, rows, proof.lemma)
+    m, places = proof.m, dut.derived.open_zones
+    live = Signal(places)  # in use: by zones of the row before that are to come or of the new row, or groups that wait
+    write, wanted = dut._write, dut._wanted
+    read = dut._read.addr[: len(dut._place)]
+    taken = Mux(wanted, Const(1) << read, 0)[:places]
+    stored = Mux(write.en, Const(1) << write.addr, 0)[:places]
+    m.d.sync += live.eq(live & ~taken | Mux(dut._whole & dut._last, 0, stored))
+    with m.If(wanted):
+        proof.claim((taken & live).any())
+        proof.claim(~write.en | (write.addr != read))
+    with m.If(write.en):
+        proof.claim((stored & ~live).any())
+    for port, written in ((dut._read_earlier, dut._write_earlier), (dut._read_later, dut._write_later)):
+        lost = Signal(name=f"lost_{port.data.name}")
+        with m.If(port.en):
+            m.d.sync += lost.eq(written.en & (written.addr == port.addr))
+        proof.claim(~(dut._begins & lost))
+        proof.claim(~written.en | (written.addr < places))
+    depth = Signal(range(nesting(dut.derived) + 1))
+    opens, closes = dut._joins & dut._later & ~dut._earlier, dut._joins & dut._earlier & ~dut._later
+    m.d.sync += depth.eq(depth + opens - closes)
+    proof.claim(~opens | (depth < nesting(dut.derived)))
+    proof.claim(~closes | (depth != 0))
+    with m.If(dut.rows.ready):
+        proof.claim(~dut._last | (live == 0))
+        firsts = (Mux(leader, 1 << place_of(dut.derived, x), 0) for x, leader in enumerate(open_row.leaders()))
+        proof.lemma(live == sum(firsts, Const(0, places)))
+        proof.lemma(depth == 0)
+
+
+def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+    """Free: any rows at any time. Assumed: records are taken as they come.
+
+    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and behind a last row
+    one end mark; that is so after C + e + 2 clocks at most.
+    """
+    _labeller(proof, columns, connectivity, rows, proof.claim)
+
+
+def _labeller(proof: Proof, columns: int, connectivity: int, rows: int, claim) -> tuple[SerialLabeller, OpenRow]:
+    """The labeller beside the specification, and what is said of both."""
+    m = proof.m
+    dut = SerialLabeller(_skin(rows, columns, connectivity))
+    inside = proof.put(dut)
+    valid, cells, last = rows_into(proof, dut)
+    m.d.comb += dut.records.ready.eq(1)
+    wanted = proof.chosen(len(dut.records.payload.zone.as_value()), "wanted")
+    handed, record = valid & dut.rows.ready, dut.records.payload
+
+    y = Signal(range(rows))
+    open_row = OpenRow(dut.derived, "open")
+    after, ended = next_row(m, dut.derived, open_row, cells, last, y, wanted)
+    expected, expected_end = Signal(range(2 * columns + 1)), Signal()
+    seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
+    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
+    ends_now = seen_ends + (dut.records.valid & record.end)
+    longest = columns + dut.derived.open_zones + 2
+    age = Signal(range(longest + 2), init=longest)
+    with m.If(handed):
+        m.d.sync += [*open_row.copy(after, when=~last), expected.eq(ended), expected_end.eq(last)]
+        m.d.sync += [seen.eq(0), seen_ends.eq(0), age.eq(1), y.eq(Mux(last, 0, y + 1))]
+    with m.Else():
+        m.d.sync += [seen.eq(seen_now), seen_ends.eq(ends_now), age.eq(Mux(dut.rows.ready, longest, age + 1))]
+    claim((age < longest) | (age == longest) & dut.rows.ready)
+    with m.If(dut.rows.ready):
+        claim(seen_now == expected)
+        claim(ends_now == expected_end)
+        _at_rest(proof, dut, inside, open_row)
+        proof.lemma(Mux(dut._last, 0, dut._y + 1)[: len(y)] == y)
+    _open_rows(proof, open_row)
+    for place in range(dut.derived.open_zones, 2 << len(dut._place)):
+        proof.lemma((place < 1 << len(dut._place)) | (inside.word("groups", place) == 0))
+    return dut, open_row
+
+
+def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
+    """Between two rows brackets and table say of the open row what the specification knows of it."""
+    derived, columns = dut.derived, range(dut.derived.skin.columns)
+    starts = Signal(len(columns), name="run_starts")
+    proof.m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
+    moments = len(dut._group.as_value())
+    for x in columns:
+        place = place_of(derived, x)
+        earlier, later = open_row.reach[x][:x].any(), (open_row.reach[x] & starts)[x + 1 :].any()
+        with proof.m.If(starts[x]):
+            proof.lemma(inside.word("earlier", place) == earlier)
+            proof.lemma(inside.word("later", place) == later)
+        with proof.m.If(starts[x] & ~earlier):
+            word = inside.word("groups", place)
+            proof.lemma(word[:moments] == open_row.moments[x].as_value())
+            proof.lemma(~word[moments])  # has_run
+    proof.lemma(dut._before == open_row.cells << 1)
+    proof.lemma((dut._cells == 0) & ~dut._c_left & ~dut._b_left & ~dut._walking & ~dut._tail & ~dut._second)
+    proof.lemma(dut._whole & ~dut._has_run & (dut._group.as_value() == 0))
+    started = proof.before(Const(1))  # at power-up it is not known what the memory reads
+    proof.lemma(~started | (dut._found.as_value() == 0))
+
+
+def _open_rows(proof: Proof, open_row: OpenRow) -> None:
+    """What the specification's own registers can hold."""
+    columns = range(len(open_row.cells))
+    for x in columns:
+        reach, moments = open_row.reach[x], open_row.moments[x].as_value()
+        proof.lemma((reach & ~open_row.cells) == 0)
+        proof.lemma(reach[x] == open_row.cells[x])
+        proof.lemma(open_row.cells[x] | (reach == 0) & (moments == 0))
+        for j in columns[x + 1 :]:
+            same = (reach == open_row.reach[j]) & (moments == open_row.moments[j].as_value())
+            proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
+        if x:
+            proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
+
+
+def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+    """Free: any rows at any time, and when records are taken.
+
+    Claimed: while a record waits no row is taken, no bracket is written, and no register changes.
+    """
+    dut = SerialLabeller(_skin(rows, columns, connectivity))
+    inside = proof.put(dut)
+    rows_into(proof, dut)
+    proof.m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
+    waits = dut.records.valid & ~dut.records.ready
+    with proof.m.If(waits):
+        proof.claim(~dut.rows.ready & ~dut._write_earlier.en & ~dut._write_later.en)
+    with proof.m.If(proof.before(waits)):
+        for register in (dut.records.valid, dut.records.payload, *inside.registers()):
+            proof.claim(Value.cast(register) == proof.before(register))
+
+
+_STALL_BUGS = (
+    Bug("the walk runs on", SerialLabeller, "_walk", "m.If(self._enable)", "m.If(self._enable | 1)"),
+    Bug("rows are taken", SerialLabeller, "_walk", "self._enable & ~self._walking", "~self._walking"),
+    Bug("runs are forgotten", SerialLabeller, "_know_runs", "m.If(self._enable)", "m.If(self._enable | 1)"),
+    Bug("brackets are written", SerialLabeller, "_write_brackets", "later.en.eq(self._enable & ", "later.en.eq("),
+)
+_BUGS = (
+    Bug("clusters end with the row before", SerialLabeller, "_cut", "~(self._c | self._b)", "~self._b"),
+    Bug("a zone is expected to go on for ever", SerialLabeller, "_write_brackets",
+        "self._starts | self._closes & self._whole & self._has_run", "self._starts"),
+    Bug("the table is not read", SerialLabeller, "_read_group", "(~self._earlier | self._whole)",
+        "self._earlier & self._whole"),
+    Bug("a zone leaves a row early", SerialLabeller, "_let_out", "(~self._has_run |", "(self._has_run |"),
+    Bug("always in the first row", SerialLabeller, "_walk", "Mux(self._last, 0, self._y + 1)", "0"),
+)  # fmt: skip
+
+
+_OVERFLOW_BUGS = (
+    Bug("always in the first place", SerialLabeller, "_sum", "addr.eq(self._first)", "addr.eq(0)"),
+    Bug("a place is read again", SerialLabeller, "_read_group", "(~self._earlier | self._whole)", "1"),
+    Bug("brackets are read too late", SerialLabeller, "_read_brackets", "self._advance & odd", "self._advance"),
+    Bug("the last row is a row like others", SerialLabeller, "_walk", "self._c & ~self._last", "self._c"),
+)  # fmt: skip
+
+
+def _case(claim, columns: int, connectivity: int, clocks: int, rows: int = 4, **options) -> Case:
+    build = partial(claim, columns=columns, connectivity=connectivity, rows=rows)
+    title = f"serial: {claim.__name__.replace('_', ' ')}"
+    return Case(title, f"{columns} columns, {rows} rows, {connectivity}-connected", build, clocks, **options)
+
+
+CASES = (
+    _case(records_are_the_zones, 1, 8, 8),
+    _case(records_are_the_zones, 1, 4, 8),
+    _case(records_are_the_zones, 2, 8, 9),
+    _case(records_are_the_zones, 2, 4, 11),
+    _case(records_are_the_zones, 3, 8, 12, bugs=_BUGS, bug_clocks=14),
+    _case(records_are_the_zones, 3, 4, 14, campaign=True),
+    _case(nothing_overflows, 1, 8, 8),
+    _case(nothing_overflows, 2, 4, 11),
+    _case(nothing_overflows, 3, 8, 12, bugs=_OVERFLOW_BUGS, bug_clocks=17),
+    _case(stalls_change_nothing, 8, 8, 2, bugs=_STALL_BUGS, bug_clocks=16),
+    _case(stalls_change_nothing, 8, 4, 2),
+)

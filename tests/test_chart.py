@@ -1,0 +1,191 @@
+"""The chart of speed against accuracy: its numbers against other ways to get them."""
+
+import csv
+import dataclasses
+import itertools
+import math
+import shlex
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from contactfpga import cli, protocol
+from contactfpga.derived import Derived
+from contactfpga.skin import Skin
+from contactfpga_sim import kept
+from contactfpga_sim.board import Board
+from contactfpga_sim.chart import errors, speed, study
+from contactfpga_sim.chart.errors import Blob
+from contactfpga_sim.chart.methods import EXTENT_MM, METHODS
+from contactfpga_sim.chart.study import Task
+from contactfpga_sim.compare import Mismatch
+
+SMALL = METHODS["run, 20 mm"]
+
+
+@pytest.fixture(autouse=True)
+def results_of_this_test_only(tmp_path, monkeypatch):
+    compiled = kept.cache_folder()
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    return compiled
+
+
+def task(method="run, 20 mm", family="pair", count=20, **options):
+    return Task(method, METHODS[method], family, count, seed=3, timed=4, checked=1, **options)
+
+
+def test_found_and_there_are_paired_at_the_least_total_distance():
+    rng = np.random.default_rng(1)
+    for found_count, there_count in itertools.product(range(1, 5), repeat=2):
+        found, there = (
+            [Blob(*map(float, rng.uniform(1, 50, 3))) for _ in range(count)] for count in (found_count, there_count)
+        )
+        few, many = sorted((found, there), key=len)
+        least = min(
+            sum(math.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm) for one, other in zip(few, chosen))
+            for chosen in itertools.permutations(many, len(few))
+        )
+        got = errors.errors(found, there)
+        assert got.barycenter_mm * len(few) == pytest.approx(least)
+        assert got.missed == pytest.approx(max(0, there_count - found_count) / there_count)
+        assert got.miscounted == (found_count != there_count)
+
+
+def test_what_is_not_there_has_no_distance():
+    nothing = errors.errors([], [Blob(1.0, 0.0, 0.0)])
+    assert nothing.missed == 1
+    assert nothing.miscounted
+    assert math.isnan(nothing.barycenter_mm)
+    assert math.isnan(nothing.area)
+
+
+def test_area_errors_are_relative_to_what_is_there():
+    assert errors.errors([Blob(150.0, 3.0, 4.0)], [Blob(100.0, 0.0, 0.0)]) == errors.Errors(False, 0.0, 5.0, 0.5)
+
+
+@pytest.mark.parametrize(("hits", "count"), [(0, 1000), (1, 1000), (500, 1000), (7, 7)])
+def test_shares_have_wilsons_interval(hits, count):
+    got = errors.interval([1.0] * hits + [0.0] * (count - hits))
+    want = binomtest(hits, count).proportion_ci(method="wilson")
+    assert (got.mean, got.low, got.high) == pytest.approx((hits / count, want.low, want.high), abs=1e-12)
+
+
+def test_the_interval_of_a_mean_holds_it_95_times_of_100():
+    rng = np.random.default_rng(5)
+    inside = 0
+    for _ in range(1000):
+        got = errors.interval(rng.exponential(2.0, 400).tolist())
+        inside += got.low <= 2.0 <= got.high
+    assert 925 <= inside <= 970
+
+
+def test_the_front_holds_what_nothing_else_beats():
+    rng = np.random.default_rng(2)
+    points = [tuple(map(float, rng.integers(0, 12, 2))) for _ in range(60)] + [(math.nan, 0.0)]
+    best = [points[index] for index in study.front(points)]
+    for x, y in points[:-1]:
+        beaten = any(u <= x and v <= y and (u, v) != (x, y) for u, v in points[:-1])
+        assert ((x, y) in best) == (not beaten)
+    assert best == sorted(best)
+
+
+def test_the_time_is_that_of_the_compiled_board():
+    cells = np.zeros((8, 8), bool)
+    cells[2:4, 3] = True
+    for share in (0.0, 0.3, 0.77):
+        clocks, size = speed.touch(SMALL, cells, share)
+        start = speed.touch_cycle(SMALL, share)
+        with Board(SMALL) as board:
+            board.hold(np.zeros((1, 8, 8), bool), start)
+            board.hold(cells[None], clocks + 1)
+            got = board.take("received")
+        assert got["data"][-1] == protocol.DELIMITER
+        assert int(got["cycle"][-1]) == pytest.approx(start + clocks, abs=Derived(SMALL).bit_clocks)
+        assert list(got["data"][-size:]).count(protocol.DELIMITER) == 1
+
+
+def test_a_board_that_takes_longer_is_noticed(monkeypatch):
+    right = speed.bench_native.run
+    later = dataclasses.replace(SMALL, settle_us=6.0)
+    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: right(later, *rest))
+    cells = np.ones((8, 8), bool)
+    with pytest.raises(Mismatch):
+        speed.touch(SMALL, cells, 0.5, check=True)
+
+
+def test_no_touch_is_faster_than_the_bound():
+    cells = np.zeros((8, 8), bool)
+    cells[0, 0] = True
+    assert speed.measure(SMALL, [cells] * 9, 0).bound_us < speed.measure(SMALL, [cells] * 9, 0).median_us
+
+
+def test_exact_labellers_add_no_error_and_the_others_do():
+    names = [f"{labeller}, 10 mm" for labeller in ("run", "serial", "cells", "projection", "single")]
+    found = {name: study.accuracy(task(name, "fingers", 60), 0) for name in names}
+    wrong = {name: sum(kinds["labeller"]["miscounted"]) for name, kinds in found.items()}
+    assert wrong["run, 10 mm"] == wrong["serial, 10 mm"] == wrong["cells, 10 mm"] == 0
+    assert 0 < wrong["projection, 10 mm"] < wrong["single, 10 mm"]
+    for name in names:
+        assert found[name]["sensing"] == found[names[0]]["sensing"]
+    assert sum(found[names[-1]]["total"]["miscounted"]) > 50
+
+
+def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    tasks = [task(), task("single, 20 mm", "bumper", 130)]
+    with ThreadPoolExecutor(2) as pool:
+        points = study.study(tasks, pool, with_size=False)
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "others")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert study.study(tasks, client.get_executor(), with_size=False) == points
+
+
+def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatch):
+    calls = []
+    monkeypatch.setattr(study, "_scene_errors", lambda *args: calls.append(1) or (errors.Errors(False, 0, 0, 0),) * 3)
+    study.accuracy(task(), 0)
+    study.accuracy(task(), 0)
+    assert len(calls) == 20
+    monkeypatch.setattr(kept, "sources", lambda: "other code")
+    study.accuracy(task(), 0)
+    assert len(calls) == 40
+
+
+def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, capsys):
+    options = ["--no-size", "--jobs", "1", "--output"]
+    first, second = tmp_path / "first", tmp_path / "second"
+    names = ("run, 20 mm", "single, 20 mm")
+    methods = [word for name in names for word in ("--method", name)]
+    assert cli.main(["chart", *methods, "--family", "fingers", "--placements", "12", *options, str(first)]) == 0
+    assert "chart.png" in capsys.readouterr().out
+    assert (first / "chart.png").stat().st_size > 10_000
+    assert (first / "chart.svg").read_text().count("<svg") == 1
+    lines = list(csv.DictReader((first / "chart.csv").read_text().splitlines()))
+    assert [line["method"] for line in lines] == list(names)
+    again = shlex.split(lines[1]["command"])[1:]
+    assert cli.main([*again, *options, str(second)]) == 0
+    assert list(csv.DictReader((second / "chart.csv").read_text().splitlines())) == lines[1:]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--method", "guess"], "--method 'guess' is not known; take one of: run, 5 mm"),
+        (["--family", "guess"], "--family 'guess' is not known; take one of: bumper"),
+        (["--placements", "0"], "--placements is 0; it must be at least 1"),
+    ],
+)
+def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
+    assert cli.main(["chart", *arguments]) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_all_sheets_have_the_same_extent():
+    for skin in METHODS.values():
+        assert skin.rows * skin.pitch_y_mm == skin.columns * skin.pitch_x_mm == EXTENT_MM
+        assert isinstance(skin, Skin)
