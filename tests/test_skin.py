@@ -77,7 +77,7 @@ REFUSED = [
         "settle_us + release_us is 48 clocks; 24 columns and 1 zones a frame need 51 clocks (4.25 us) with labeller = "
         "'serial'",
     ),
-    ({"labeller": "fast"}, "labeller is 'fast'; it must be one of 'run', 'serial'"),
+    ({"labeller": "fast"}, "labeller is 'fast'; it must be one of 'run', 'serial', 'projection', 'single'"),
     (
         {"debounce": "fast"},
         "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk'",

@@ -218,7 +218,10 @@ def built_in_scenes() -> dict[str, np.ndarray]:
     """(n, 16, 16) frames of every contact scene: one of those at rest, 50 of the moving one, over half a second."""
     skin = adaptive_skin(16, 16)
     times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
-    return {f"`{name}`": np.stack([make(skin)(t) for t in times[name]]) for name, make in CONTACTS.items()}
+    return {
+        f"`{name}`": np.stack([make(skin).pressed(float(t), skin) for t in times[name]])
+        for name, make in CONTACTS.items()
+    }
 
 
 def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:

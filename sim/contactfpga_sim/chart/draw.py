@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactfpga_sim.chart.errors import METRICS
-from contactfpga_sim.chart.study import Point, front
+from contactfpga_sim.chart.study import KINDS, Point, front
 
 AXES = {
     "miscounted": "scenes miscounted, share",
@@ -45,13 +46,13 @@ def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "ba
 def _panel(panel, points: Sequence[Point], metric: str) -> None:
     panel.set(xscale="log", yscale="log", xlabel="touch to last byte, us (median; line to the worst)")
     panel.grid(alpha=0.2, which="both")
-    places = [(point.speed.median_us, max(point.total[metric].mean, FLOOR[metric])) for point in points]
+    places = [(point.speed.median_us, max(point.errors["total"][metric].mean, FLOOR[metric])) for point in points]
     best = front(places)
     corners = np.array([places[index] for index in best]).reshape(-1, 2)
     panel.step(*corners.T, where="post", color="black", linewidth=0.7)
     panel.axhline(FLOOR[metric], color="grey", linewidth=0.5, linestyle=":")
     for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
-        found, colour = point.total[metric], _colour(point)
+        found, colour = point.errors["total"][metric], _colour(point)
         low, high = (max(end, FLOOR[metric]) for end in (found.low, found.high))
         panel.plot([x, point.speed.worst_us], [y, y], color=colour, alpha=0.25, linewidth=1)
         panel.plot([x, x], [low, high], color=colour, alpha=0.35, linewidth=1)
@@ -108,16 +109,16 @@ def write_csv(points: Sequence[Point], path: Path) -> None:
     """All numbers, a line a point: errors with their 95 % intervals, times in us, LUT4 and clock on the UP5K."""
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        kinds = [f"{kind}_{name}{end}" for kind in ("total", "labeller", "sensing") for name in METRICS
+        kinds = [f"{kind}_{name}{end}" for kind in KINDS for name in METRICS
                  for end in ("", "_low", "_high")]  # fmt: skip
         times = ("median_us", "worst_us", "bound_us")
         table.writerow(["family", "method", "placements", *times, "luts", "fmax_mhz", *kinds, "command"])
         for point in points:
             values = [
                 f"{value:.6g}"
-                for kind in (point.total, point.labeller, point.sensing)
+                for kind in KINDS
                 for name in METRICS
-                for value in (kind[name].mean, kind[name].low, kind[name].high)
+                for value in dataclasses.astuple(point.errors[kind][name])[:3]
             ]
             speeds = [f"{getattr(point.speed, name):.1f}" for name in times]
             size = ["" if point.luts is None else point.luts, f"{point.fmax_mhz:.1f}" if point.fmax_mhz else ""]

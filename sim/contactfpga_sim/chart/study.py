@@ -6,7 +6,8 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, as_completed
+from typing import Any
 
 import numpy as np
 
@@ -42,23 +43,24 @@ class Task:
     """Of these so many go through the gateware, too."""
 
 
+KINDS = ("total", "labeller", "sensing")
+"""Errors: of the method's zones against the contacts; of these zones against the connected pieces of the pressed cells;
+of these pieces against the contacts."""
+
+Found = dict[str, dict[str, list[float]]]
+"""By kind and metric, a value a scene."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Point:
     """What came of a task."""
 
     task: Task
-    total: dict[str, Interval]
-    """By metric: zones against the contacts."""
-    labeller: dict[str, Interval]
-    """The method's zones against the connected pieces of the pressed cells."""
-    sensing: dict[str, Interval]
-    """These pieces against the contacts."""
+    errors: dict[str, dict[str, Interval]]
+    """By kind and metric."""
     speed: Speed
     luts: int | None
     fmax_mhz: float | None
-
-
-_ERRORS = ("total", "labeller", "sensing")
 
 
 def study(
@@ -74,40 +76,45 @@ def study(
     """
     jobs = [(task, first) for task in tasks for first in range(0, task.count, PIECE)]
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    number = len(jobs) + len(tasks) + len(skins)
-    pieces = {executor.submit(accuracy, task, first): (task, first) for task, first in jobs}
-    times = {executor.submit(timing, task): task for task in tasks}
-    places = {executor.submit(_size, skin): skin for skin in skins}
-    for future in as_completed([*pieces, *times, *places]):
+    pieces = [executor.submit(accuracy, task, first) for task, first in jobs]
+    times = [executor.submit(timing, task) for task in tasks]
+    places = [executor.submit(_size, skin) for skin in skins]
+    names: dict[Future[Any], str] = {
+        **dict.fromkeys(pieces, "placements"),
+        **dict.fromkeys(times, "times"),
+        **dict.fromkeys(places, "place and route"),
+    }
+    for future in as_completed(names):
         future.result()
-        step("placements" if future in pieces else "times" if future in times else "place and route", number)
-    found: dict[Task, dict[str, dict[str, list[float]]]] = {}
-    for future, (task, _) in sorted(pieces.items(), key=lambda item: item[1][1]):
-        for kind, metrics in future.result().items():
-            for metric, values in metrics.items():
-                found.setdefault(task, {}).setdefault(kind, {}).setdefault(metric, []).extend(values)
-    speeds = {task: future.result() for future, task in times.items()}
-    measured = {skin: future.result() for future, skin in places.items()}
+        step(names[future], len(names))
+    sizes_by_skin = {skin: future.result() for skin, future in zip(skins, places, strict=True)}
     return [
         Point(
             task,
-            *({name: errors.interval(found[task][kind][name]) for name in METRICS} for kind in _ERRORS),
-            speed=Speed(**speeds[task]),
-            luts=measured[task.skin].luts if with_size else None,
-            fmax_mhz=measured[task.skin].fmax_mhz if with_size else None,
+            _intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
+            Speed(**time.result()),
+            sizes_by_skin[task.skin].luts if with_size else None,
+            sizes_by_skin[task.skin].fmax_mhz if with_size else None,
         )
-        for task in tasks
+        for task, time in zip(tasks, times, strict=True)
     ]
 
 
-def accuracy(task: Task, first: int) -> dict[str, dict[str, list[float]]]:
+def _intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+    return {
+        kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        for kind in KINDS
+    }
+
+
+def accuracy(task: Task, first: int) -> Found:
     """Errors of one piece of a task's placements, by kind and metric."""
 
     def new() -> dict:
-        found: dict[str, dict[str, list[float]]] = {kind: {name: [] for name in METRICS} for kind in _ERRORS}
+        found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
         last = min(first + PIECE, task.count)
         for scene in placements(task.family, last - first, task.seed, task.skin, first=first):
-            for kind, values in zip(_ERRORS, _scene_errors(scene, task.skin), strict=True):
+            for kind, values in zip(KINDS, _scene_errors(scene, task.skin), strict=True):
                 for name in METRICS:
                     found[kind][name].append(float(getattr(values, name)))
         return found

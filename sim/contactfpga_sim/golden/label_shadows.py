@@ -10,12 +10,12 @@ from contactfpga_sim.golden.work import Departure, Labelling
 def projection(cells: np.ndarray) -> Labelling:
     """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band."""
     rows, columns = cells.shape
-    pressed = cells.any(axis=1)
+    pressed = np.any(cells, axis=1)
     walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
     departures = []
     for first, past in _runs(pressed):
         closing = min(past, rows - 1)
-        for left, right in _runs(cells[first:past].any(axis=0)):
+        for left, right in _runs(np.any(cells[first:past], axis=0)):
             box = np.zeros_like(cells)
             box[first:past, left:right] = cells[first:past, left:right]
             departures.append(Departure(closing, right + 2, *_moments(box)))
@@ -26,7 +26,7 @@ def single(cells: np.ndarray) -> Labelling:
     """All pressed cells of an (R, C) bool frame as one zone."""
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
-    walks = [*cells[:-1].any(axis=1), any_pressed]
+    walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
     departures = [Departure(rows - 1, columns + 2, *_moments(cells))] if any_pressed else []
     return _work(walks, columns + 1, departures)
 
