@@ -44,11 +44,11 @@ def test_help_names_every_command(capsys):
         cli.main(["--help"])
     assert caught.value.code == 0
     said = capsys.readouterr().out
-    for command in ("zones", "wire", "board", "doctor", "build", "flash", "replay"):
+    for command in ("zones", "wire", "board", "doctor", "build", "flash", "replay", "cover"):
         assert f"\n    {command} " in said
 
 
-@pytest.mark.parametrize("command", ["zones", "wire", "board", "doctor", "build", "flash", "replay"])
+@pytest.mark.parametrize("command", ["zones", "wire", "board", "doctor", "build", "flash", "replay", "cover"])
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit) as caught:
         cli.main([command, "--help"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import pickle
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError
+from contactfpga.cover import Cover, Switch
 from contactfpga.derived import Derived
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
@@ -412,6 +414,60 @@ def test_empty_file_is_the_reference_skin(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text("")
     assert Skin.load(path) == Skin()
+
+
+COVERED = """rows = 8
+[cover]
+model = "bonded"
+thickness_m = 0.004
+[cover.switch]
+force_n = 0.5
+"""
+
+
+def test_a_file_with_a_cover(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text(COVERED)
+    skin = Skin.load(path)
+    assert skin.cover == Cover("bonded", 0.004, Switch(0.5))
+    path.write_text(skin.to_toml())
+    assert Skin.load(path).cover == skin.cover
+    assert Skin.load(path).replace(columns=8).cover == skin.cover
+    thin = skin.replace(cover=Cover(share=0.25))
+    path.write_text(thin.to_toml())
+    assert Skin.load(path).cover == Cover(share=0.25)
+
+
+def test_another_cover_needs_no_other_bitstream():
+    bare, covered = Skin(), Skin(cover=Cover("bonded", 0.004))
+    assert bare == covered
+    assert bare.fingerprint == covered.fingerprint
+    assert hash(bare) == hash(covered)
+    assert bare.cover is None
+    assert pickle.loads(pickle.dumps(covered)).cover == covered.cover
+    with pytest.raises(SkinError, match=r"cover is 'foam'; it must be a contactfpga\.cover\.Cover"):
+        Skin(cover="foam")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"bonded"', '"sand"', "model is 'sand'; it must be one of patch, point, hertz, bonded, frictionless"),
+        ("thickness_m", "thickness", "unknown key 'thickness' in [cover]; known are model, thickness_m, switch, share"),
+        ("force_n = 0.5", "force = 1", "unknown key 'force' in [cover.switch]; known are force_n, area_m2"),
+        ("force_n = 0.5", "force_n = -1", "force_n is -1; it must be a finite number above 0 N"),
+        ("[cover.switch]\nforce_n = 0.5", "switch = 4", "cover.switch is 4; it must be a part, [cover.switch]"),
+        (COVERED, "cover = 3\n", "cover is 3; it must be a part, [cover]"),
+    ],
+)
+def test_a_cover_that_cannot_be_is_refused(tmp_path, old, new, message):
+    assert old in COVERED
+    path = tmp_path / "skin.toml"
+    path.write_text(COVERED.replace(old, new))
+    with pytest.raises(SkinError) as caught:
+        Skin.load(path)
+    assert "skin.toml: " in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_fields_are_plain_values():

@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from contactfpga.commands import cover_flags
 from contactfpga.errors import ContactFPGAError, MissingExtra
 
 _COMMANDS = {
@@ -19,6 +20,7 @@ _COMMANDS = {
     "flash": "contactfpga.commands.flash",
     "board": "contactfpga_sim.board",
     "replay": "contactfpga_sim.replay",
+    "cover": "contactfpga.commands.cover",
     "chart": "contactfpga_sim.chart.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
@@ -71,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     _build(commands.add_parser("build", help="build a bitstream for a board"))
     _flash(commands.add_parser("flash", help="write a bitstream into a board"))
     _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
+    cover_flags.add(commands.add_parser("cover", help="compute the soft cover: impact, sensitivity, design"))
     _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
     return parser
 

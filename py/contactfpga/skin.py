@@ -9,8 +9,9 @@ import math
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from contactfpga.cover import Cover, CoverError, table
 from contactfpga.errors import ContactFPGAError
 
 MAX_LINES = 64
@@ -109,7 +110,18 @@ class Skin:
     baud: int = 3_000_000
     """Bits a second on the wire."""
 
-    def __post_init__(self) -> None:
+    if TYPE_CHECKING:
+        cover: Cover | None = None
+    else:
+        # No field: fields are what gateware and golden model are built from and the fingerprint tells apart.
+        cover: dataclasses.InitVar[Cover | None] = None
+    """The soft cover, through which scenes press the switches; None: a switch closes when it is touched. The gateware
+    does not know it: Skins that differ in nothing else are equal and have one fingerprint."""
+
+    def __post_init__(self, cover: Cover | None = None) -> None:  # noqa: RUF033  # to type checkers it is a field
+        if cover is not None and not isinstance(cover, Cover):
+            raise SkinError(f"cover is {cover!r}; it must be a contactfpga.cover.Cover")
+        object.__setattr__(self, "cover", cover)
         self._check_types()
         self._check_sheet()
         self._check_link()
@@ -125,10 +137,15 @@ class Skin:
                 values = tomllib.load(file)
             except tomllib.TOMLDecodeError as error:
                 raise SkinError(f"{path}: not a TOML file: {error}") from None
-        known = [field.name for field in dataclasses.fields(cls)]
+        known = [*(field.name for field in dataclasses.fields(cls)), "cover"]
         unknown = sorted(set(values) - set(known))
         if unknown:
             raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}")
+        if "cover" in values:
+            try:
+                values["cover"] = table.read(values["cover"])
+            except CoverError as error:
+                raise SkinError(f"{path}: {error}") from None
         return cls(**values)
 
     def replace(self, **changes: Any) -> Skin:
@@ -143,7 +160,7 @@ class Skin:
         for name, value in dataclasses.asdict(self).items():
             if value is not None:
                 lines.append(f"{name} = {json.dumps(value)}")
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines) + "\n" + (table.write(self.cover) if self.cover else "")
 
     @property
     def fingerprint(self) -> bytes:

@@ -42,7 +42,8 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
             f"a switch {1e3 * offset_m:g} mm from the force is {ratio:.4g} thicknesses of the cover away; from "
             f"{limit:.4g} on a point force on a {within} layer does not press it"
         )
-    return switch.closing_pa * thickness_m**2 / float(medium.exact_spread(within, ratio))
+    spread = medium.spread if within == "halfspace" else medium.exact_spread  # that is a closed form already
+    return switch.closing_pa * thickness_m**2 / float(spread(within, ratio))
 
 
 def reach_m(switch: Switch, force: float, thickness_m: float, within: str = "halfspace") -> float | NoSolution:

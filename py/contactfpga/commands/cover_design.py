@@ -1,0 +1,164 @@
+"""`contactfpga cover design` and `contactfpga cover figures`."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from contactfpga.commands.cover import KPA, MM, UNSOLVED, notes, say, table
+from contactfpga.cover.answer import NoSolution
+from contactfpga.cover.design import Candidate, Design, Thin, design, margin
+from contactfpga.cover.sense import Sense
+from contactfpga.cover.task import Task
+
+HEADS = ("foam", "E kPa", "pressed mm", "for ms", "peak N", "thick mm", "kg/m2", "least N", "pitch mm", "binds")
+THIN_HEADS = (
+    "reaction after ms",
+    "E kPa",
+    "pressed mm",
+    "peak N",
+    "same foam by (8) mm",
+    "by then mm",
+    "stopped at mm",
+)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Run the command."""
+    return _design(args) if args.topic == "design" else _figures(args)
+
+
+def _design(args: argparse.Namespace) -> int:
+    found = design(Task.load(args.file))
+    status = 0 if found.best else UNSOLVED
+    if args.json:
+        return say(_plain(found)) or status
+    columns([HEADS, *(_row(one) for one in found.candidates)])
+    print()
+    first = found.candidates[0]
+    if found.best:
+        assert first.thickness_m is not None
+        assert first.pitch_m is not None
+        assert first.binding is not None
+        force = first.sure.value if first.sure else None
+        table(
+            ("fits", first.foam.name),
+            ("thickness", f"{MM * first.thickness_m:.4g} mm"),
+            ("pitch", f"{MM * first.pitch_m:.4g} mm"),
+            ("force felt everywhere", f"{force:.4g} N" if isinstance(force, float) else "none"),
+            ("closest limit", f"{first.binding.name}, {margin(first.binding)}"),
+            ("model of sensitivity", str(first.least.model) if first.least else ""),
+        )
+    else:
+        print(f"nothing fits; nearest is {first.foam.name}. It would take:")
+        for one in found.relax:
+            print(f"  {one}")
+    notes(list(first.notes))
+    print()
+    columns([THIN_HEADS, *(_thin_row(one) for one in found.thinning)])
+    print(f"the sheet itself: {MM * found.sheet_s:.4g} ms at worst from touch to last byte")
+    return status
+
+
+def _row(one: Candidate) -> tuple[str, ...]:
+    hit, bound = one.hit, one.binding
+    return (
+        one.foam.name,
+        f"{KPA * one.foam.modulus_pa:.4g}" if hit else "",
+        f"{MM * hit.compression_m:.4g}" if hit else "",
+        f"{MM * hit.time_s:.4g}" if hit else "",
+        f"{hit.force_n:.4g}" if hit else "",
+        f"{MM * one.thickness_m:.4g}" if one.thickness_m else "",
+        f"{one.mass_kg_m2:.4g}" if one.mass_kg_m2 else "",
+        f"{one.least.value:.4g}" if one.least and isinstance(one.least.value, float) else "",
+        f"{MM * one.pitch_m:.4g}" if one.pitch_m else "",
+        one.no_solution or (f"{bound.name}, {margin(bound)}" if bound else ""),
+    )
+
+
+def _thin_row(one: Thin) -> tuple[str, ...]:
+    def cell(value: float | None, scale: float) -> str:
+        return "" if value is None else f"{scale * value:.4g}"
+
+    return (
+        cell(one.latency_s, MM),
+        cell(one.modulus_pa, KPA),
+        cell(one.compression_m, MM),
+        cell(one.force_n, 1),
+        cell(one.by_energy_m, MM),
+        cell(one.pressed_m, MM),
+        cell(one.stopped_m, MM),
+    )
+
+
+def columns(rows: list[tuple[str, ...]]) -> None:
+    """Print rows of text as columns, the first one to the left."""
+    wide = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        print("  ".join(f"{cell:<{w}}" if not i else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(row, wide))))
+
+
+def _plain(found: Design) -> dict[str, Any]:
+    return {
+        "fits": found.best is not None,
+        "best": None if found.best is None else _candidate(found.best),
+        "relax": list(found.relax),
+        "candidates": [_candidate(one) for one in found.candidates],
+        "thinning": [dataclasses.asdict(one) for one in found.thinning],
+        "sheet_s": found.sheet_s,
+    }
+
+
+def _candidate(one: Candidate) -> dict[str, Any]:
+    hit, bound = one.hit, one.binding
+    return {
+        "foam": one.foam.name,
+        "source": one.foam.source,
+        "modulus_pa": one.foam.modulus_pa if hit else None,
+        "density_kg_m3": one.foam.density_kg_m3,
+        "compression_m": hit.compression_m if hit else None,
+        "time_s": hit.time_s if hit else None,
+        "peak_n": hit.force_n if hit else None,
+        "by_energy_m": one.by_energy_m,
+        "thickness_m": one.thickness_m,
+        "mass_kg_m2": one.mass_kg_m2,
+        "least_force_n": _number(one.least),
+        "pitch_m": one.pitch_m,
+        "force_n": _number(one.sure),
+        "model": str(one.least.model) if one.least else None,
+        "fits": one.fits,
+        "binding": bound.name if bound else None,
+        "checks": [
+            {"name": check.name, "value": check.value, "limit": check.limit, "used": check.used, "holds": check.holds}
+            for check in one.checks
+        ],
+        "no_solution": one.no_solution,
+        "notes": list(one.notes),
+    }
+
+
+def _number(sensed: Sense | None) -> float | None:
+    return None if sensed is None or isinstance(sensed.value, NoSolution) else sensed.value
+
+
+def _figures(args: argparse.Namespace) -> int:
+    from contactfpga.cover import drawing, line, paper  # matplotlib, which only drawing needs
+
+    folder = Path(args.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
+    data = line.read(args.data) if args.data else None
+    files = drawing.draw(folder, args.format, task, data)
+    known: dict[str, Any] = {"files": [str(file) for file in files]}
+    fitted = line.fit(*data) if data else None
+    if fitted:
+        known |= {"stiffness_n_m": fitted.stiffness_n_m, "correlation": fitted.correlation}
+    if args.json:
+        return say(known)
+    for file in files:
+        print(f"drew {file}")
+    if fitted:
+        print(f"line: {fitted.stiffness_n_m / MM:.4g} N/mm, correlation {fitted.correlation:.5f}")
+    return 0

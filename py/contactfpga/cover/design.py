@@ -1,0 +1,281 @@
+"""The algorithm of the paper's Fig. 3: material, thickness, force and pitch under limits, and which limit binds.
+
+For each foam, and for the modulus that makes the compression last exactly as long as it has to: the impact, the yield
+check, the thickness, then what the sheet under it detects and the pitch that follows. Every limit is checked with its
+margin; nothing is left out of the answer because it does not fit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from contactfpga.cover import elastic, impact, motion, sense
+from contactfpga.cover.answer import NoSolution
+from contactfpga.cover.foams import Foam
+from contactfpga.cover.hertz import Ball
+from contactfpga.cover.impact import Impact
+from contactfpga.cover.latency import latency_s
+from contactfpga.cover.sense import Sense, Sheet
+from contactfpga.cover.task import Task
+
+FREE = "free modulus"
+"""Name of the candidate whose modulus follows from the time."""
+
+STEPS = 6
+"""Latencies that :func:`thinning` looks at, evenly in the logarithm."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Check:
+    """A limit, and what it is compared with."""
+
+    name: str
+    value: float
+    limit: float
+    at_most: bool
+    relax: str
+    """What would have to give way, with the value that would do."""
+
+    @property
+    def used(self) -> float:
+        """How much of the limit is used up: above 1 it is broken."""
+        return self.value / self.limit if self.at_most else self.limit / self.value
+
+    @property
+    def holds(self) -> bool:
+        return self.used <= 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A foam and what follows from it; None where it does not come that far."""
+
+    foam: Foam
+    hit: Impact | None = None
+    by_energy_m: dict[str, float] | None = None
+    """Thickness by (8), by each rule; None where the foam's yield strength is not known."""
+    thickness_m: float | None = None
+    """Of the cover, chosen."""
+    mass_kg_m2: float | None = None
+    """Of the cover, per area; None where the foam's density is not known."""
+    least: Sense | None = None
+    """Force in N that closes a switch right below."""
+    pitch_m: float | None = None
+    sure: Sense | None = None
+    """Force in N that is felt everywhere at that pitch."""
+    checks: tuple[Check, ...] = ()
+    no_solution: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def fits(self) -> bool:
+        return self.no_solution is None and all(check.holds for check in self.checks)
+
+    @property
+    def binding(self) -> Check | None:
+        """The limit that is used up most."""
+        return max(self.checks, key=lambda check: check.used, default=None)
+
+
+@dataclasses.dataclass(frozen=True)
+class Thin:
+    """What a reaction after ``latency_s`` asks of a cover."""
+
+    latency_s: float
+    modulus_pa: float | None
+    """The free modulus at which the compression lasts as much longer than the latency as in the task."""
+    compression_m: float | None
+    force_n: float | None
+    """Its peak force."""
+    by_energy_m: float | None
+    """Thickness of the chosen foam by (8): in proportion to t0/t_c."""
+    pressed_m: float | None
+    """How far the chosen foam is pressed in at that moment."""
+    stopped_m: float | None
+    """How far it is in the end, when the motor brakes from then on with the task's torque: it must be thicker."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Design:
+    """All candidates, the ones that fit first, lightest and then thinnest in front."""
+
+    candidates: tuple[Candidate, ...]
+    thinning: tuple[Thin, ...]
+    sheet_s: float
+    """Worst latency of the task's sheet, without host and motor, in s."""
+
+    @property
+    def best(self) -> Candidate | None:
+        """None if nothing fits."""
+        first = self.candidates[0]
+        return first if first.fits else None
+
+    @property
+    def relax(self) -> tuple[str, ...]:
+        """Where nothing fits: what would have to give way for the candidate that comes nearest."""
+        first = self.candidates[0]
+        if first.fits:
+            return ()
+        if first.no_solution:
+            return (first.no_solution,)
+        return tuple(check.relax for check in first.checks if not check.holds)
+
+
+def design(task: Task) -> Design:
+    """The whole algorithm."""
+    tried = [_judge(task, foam, None) for foam in task.foams]
+    if task.free:
+        tried.append(_free(task))
+    tried.sort(key=_rank)
+    sheet = latency_s(task.skin)
+    return Design(tuple(tried), thinning(task, tried[0].foam if tried[0].hit else None), sheet)
+
+
+def thinning(task: Task, foam: Foam | None) -> tuple[Thin, ...]:
+    """How thin the cover may become as t0 falls from the task's to what the sheet, host and motor achieve."""
+    lowest = min(task.latency_s, latency_s(task.skin) + task.other_s)
+    return tuple(_thin(task, foam, float(t0)) for t0 in np.geomspace(task.latency_s, lowest, STEPS))
+
+
+def _rank(candidate: Candidate) -> tuple[bool, bool, float, float]:
+    """What fits by mass, where it is known, and thickness; what does not by how much it is off."""
+    if candidate.fits:
+        mass = candidate.mass_kg_m2
+        return False, mass is None, mass or 0.0, candidate.thickness_m or 0.0
+    broken = [check.used for check in candidate.checks if not check.holds]
+    return True, candidate.no_solution is not None, len(broken), max(broken, default=0.0)
+
+
+def _free(task: Task) -> Candidate:
+    found = impact.stiffness_for(task.arm, task.speed_m_s, task.time_s)
+    if isinstance(found, NoSolution):
+        return Candidate(Foam(FREE, 1.0, "no modulus gives the time"), no_solution=found.reason)
+    modulus = elastic.young_pa(elastic.ball_of(found.stiffness, task.radius_m).modulus_pa, task.poisson)
+    return _judge(task, Foam(FREE, modulus, f"follows from a compression of {1e3 * task.time_s:g} ms"), found)
+
+
+def _judge(task: Task, foam: Foam, hit: Impact | None) -> Candidate:
+    ball = _ball(task, foam)
+    found = hit or impact.strike(task.arm, task.speed_m_s, elastic.stiffness(ball))
+    if isinstance(found, NoSolution):
+        return Candidate(foam, no_solution=found.reason)
+    strain = task.strain or foam.strain
+    checks = [
+        # The free modulus takes exactly that long, but for the last digits.
+        Check("time", found.time_s * (1 + 1e-12), task.time_s, False, f"time_s at most {found.time_s:.4g} s")
+    ]
+    if task.peak_n is not None:
+        checks.append(Check("peak", found.force_n, task.peak_n, True, f"peak_n at least {found.force_n:.4g} N"))
+    needed, by_energy = found.compression_m / strain, None
+    if foam.yield_pa is not None:
+        by_energy = _by_energy(task, foam, ball, found)
+        needed = max(needed, by_energy[task.rule])
+        limit = elastic.yield_indentation_m(ball, foam.yield_pa)
+        checks.append(
+            Check(
+                "yield",
+                found.compression_m,
+                limit,
+                True,
+                f"a lower speed_m_s, or a foam that yields only beyond {found.compression_m:.4g} m",
+            )
+        )
+    thickness = next((plate for plate in task.plates_m if plate >= needed), needed)
+    checks.append(Check("thickness", thickness, task.thickness_m, True, f"thickness_m at least {thickness:.4g} m"))
+    mass = None if foam.density_kg_m3 is None else foam.density_kg_m3 * thickness
+    if mass is not None and task.mass_kg_m2 is not None:
+        checks.append(Check("mass", mass, task.mass_kg_m2, True, f"mass_kg_m2 at least {mass:.4g} kg/m2"))
+    notes = ("no plate is as thick as that",) if task.plates_m and thickness not in task.plates_m else ()
+    sheet = Sheet(task.switch, thickness, ball if task.contact == "patch" else None)
+    return _sensed(
+        task, Candidate(foam, found, by_energy, thickness, mass, checks=tuple(checks), notes=notes), sheet, ball
+    )
+
+
+def _sensed(task: Task, sofar: Candidate, sheet: Sheet, ball: Ball) -> Candidate:
+    """The force and the pitch, and the limits on them."""
+    checks = list(sofar.checks)
+    least = sheet.detects(0.0, task.model, task.tolerance)
+    notes = [*sofar.notes, *(sofar.hit.notes if sofar.hit else ()), *least.notes]
+    if sofar.hit and ball.patch_m(sofar.hit.force_n) > sheet.thickness_m:
+        notes.append("Hertz stops holding in the impact: its patch is wider than the foam is thick")
+    pitch, sure = None, None
+    if isinstance(least.value, NoSolution):
+        return dataclasses.replace(sofar, least=least, no_solution=least.value.reason, notes=tuple(notes))
+    checks.append(
+        Check("force", least.value, task.force_n, True, f"force_n at least {least.value:.4g} N, or a thinner cover")
+    )
+    if least.value <= task.force_n:
+        reach = sheet.reaches(task.force_n, task.model, task.tolerance)
+        if not isinstance(reach.value, NoSolution):
+            pitch = min(task.pitch_m, sense.pitch_m(reach.value))
+            sure = sheet.detects(sense.worst_offset_m(pitch), task.model, task.tolerance) if pitch > 0 else None
+    if task.pitch_min_m is not None and pitch is not None:
+        wanted = sheet.detects(sense.worst_offset_m(task.pitch_min_m), task.model, task.tolerance).value
+        force = "no force does" if isinstance(wanted, NoSolution) else f"force_n at least {wanted:.4g} N"
+        checks.append(Check("pitch", pitch, task.pitch_min_m, False, f"pitch_min_m at most {pitch:.4g} m, or {force}"))
+    return dataclasses.replace(
+        sofar, least=least, pitch_m=pitch, sure=sure, checks=tuple(checks), notes=tuple(dict.fromkeys(notes))
+    )
+
+
+def _by_energy(task: Task, foam: Foam, ball: Ball, hit: Impact, t0: float | None = None) -> dict[str, float]:
+    """(8) by each rule: as printed with the link's mass, else with the mass that the contact feels."""
+    assert foam.yield_pa is not None
+    stored = elastic.resilience(foam.yield_pa, foam.modulus_pa)
+    share = min(1.0, (task.latency_s if t0 is None else t0) / hit.time_s)
+    return {
+        rule: elastic.thickness_m(
+            ball, task.mass_kg if rule == "printed" else task.arm.mass_kg, task.speed_m_s, stored, share, rule
+        )
+        for rule in elastic.THICKNESS_RULES
+    }
+
+
+def _thin(task: Task, foam: Foam | None, t0: float) -> Thin:
+    found = impact.stiffness_for(task.arm, task.speed_m_s, t0 * task.time_s / task.latency_s)
+    modulus = depth = force = by_energy = pressed = stopped = None
+    if isinstance(found, Impact):
+        stiff = elastic.ball_of(found.stiffness, task.radius_m)
+        modulus = elastic.young_pa(stiff.modulus_pa, task.poisson)
+        depth, force = found.compression_m, found.force_n
+    if foam is not None and foam.name != FREE:
+        ball = _ball(task, foam)
+        hit = impact.strike(task.arm, task.speed_m_s, elastic.stiffness(ball))
+        if isinstance(hit, Impact):
+            if foam.yield_pa is not None:
+                by_energy = _by_energy(task, foam, ball, hit, t0)[task.rule]
+            pressed = _pressed_m(task, hit, t0)
+            stopped = _stopped_m(task, hit, pressed)
+    return Thin(t0, modulus, depth, force, by_energy, pressed, stopped)
+
+
+def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
+    """How far the foam is pressed in so long after the touch, at most delta_c."""
+    if seconds >= hit.time_s:
+        return hit.compression_m
+    course = motion.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)
+    half = len(course.time_s) // 2 + 1
+    return float(np.interp(seconds, course.time_s[:half], course.indentation_m[:half]))
+
+
+def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
+    """Where the compression ends when the torque changes at ``pressed_m``: from the balance at the touch of an arm
+    that brakes all the way, and had at the touch what it did not lose before."""
+    if pressed_m >= hit.compression_m:
+        return hit.compression_m
+    braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)
+    kept = 2 * (task.arm.torque_nm + task.brake_nm) * pressed_m / task.arm.lever_m / task.arm.mass_kg
+    return impact.compression_m(braking, math.sqrt(task.speed_m_s**2 + kept), hit.stiffness)
+
+
+def _ball(task: Task, foam: Foam) -> Ball:
+    return Ball(task.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, task.poisson))
+
+
+def margin(check: Check) -> str:
+    """How much of a limit is used, in words."""
+    return "broken" if not check.holds else f"{100 * min(1.0, check.used):.0f} % used"

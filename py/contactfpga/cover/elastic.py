@@ -1,0 +1,94 @@
+"""What a foam stands: stiffness of the contact, yield (6) and (7), resilience, and thickness by energy (8)."""
+
+from __future__ import annotations
+
+import math
+
+from contactfpga.cover.answer import CoverError, positive
+from contactfpga.cover.hertz import Ball
+
+BETWEEN_SPHERES = 1.1
+CYLINDER_ON_PLANE = 1.5
+"""nu_Y: mean contact pressure over yield strength where the foam first yields; no unit (paper, III.B)."""
+
+_OF_WORK: float = (8 / 15) ** 0.4
+"""W/delta over (E_k^3 E*^2 R*)^(1/5), by W = 8/15 E* sqrt(R*) delta^(5/2): 0.7777. The paper takes it for the force;
+the peak force is F = dW/d delta, 5/2 of it: 1.9442."""
+
+_SHARE: float = 2**0.6 * 16 * math.pi
+"""E_k^(3/5) to (m v0^2)^(3/5), and a volume of 16 contact areas."""
+
+THICKNESS_RULES = {
+    "printed": 84.0,
+    "printed_exact": _SHARE * 1.3 * _OF_WORK ** (2 / 3),
+    "peak_force": _SHARE * 1.3 * (2.5 * _OF_WORK) ** (2 / 3),
+    "hertz": _SHARE * 0.75 ** (2 / 3) * (2.5 * _OF_WORK) ** (2 / 3),
+}
+"""The constant in (8): as printed; the same unrounded (83.7589); with the peak force where the paper has W/delta
+(154.285); with that and the area of Hertz's circle on R*, 0.8255 pi (F R*/E*)^(2/3), in place of 1.3 pi (97.969)."""
+
+
+def effective_modulus_pa(modulus_pa: float, poisson: float, other_pa: float = math.inf, other: float = 0.0) -> float:
+    """E* in Pa of a foam on an obstacle, rigid by default: 1/E* = (1 - nu^2)/E + (1 - nu'^2)/E' (paper, III)."""
+    compliance = (1 - _poisson(poisson) ** 2) / positive("modulus_pa", modulus_pa, "Pa")
+    if other_pa != math.inf:
+        compliance += (1 - _poisson(other) ** 2) / positive("other_pa", other_pa, "Pa")
+    return 1 / compliance
+
+
+def young_pa(effective_pa: float, poisson: float) -> float:
+    """E in Pa of a foam that has the effective modulus E* on a rigid obstacle: E* (1 - nu^2)."""
+    return positive("effective_pa", effective_pa, "Pa") * (1 - _poisson(poisson) ** 2)
+
+
+def effective_radius_m(radius_m: float, other_m: float = math.inf) -> float:
+    """R* in m of two convex bodies, the other one flat by default: 1/R* = 1/R + 1/R' (paper, III)."""
+    curvature = 1 / positive("radius_m", radius_m, "m")
+    return 1 / (curvature + (0.0 if other_m == math.inf else 1 / positive("other_m", other_m, "m")))
+
+
+def stiffness(ball: Ball) -> float:
+    """K_s in N/m^1.5, by which F = K_s delta^1.5: 4/3 E* sqrt(R*) (paper, III.A)."""
+    return 4 / 3 * ball.modulus_pa * math.sqrt(ball.radius_m)
+
+
+def ball_of(stiffness: float, radius_m: float) -> Ball:
+    """The contact on R* in m that has the stiffness K_s in N/m^1.5; inverse of :func:`stiffness`."""
+    return Ball(radius_m, 0.75 * positive("stiffness", stiffness, "N/m^1.5") / math.sqrt(positive("R*", radius_m, "m")))
+
+
+def yield_indentation_m(ball: Ball, yield_pa: float, ratio: float = BETWEEN_SPHERES) -> float:
+    """The indentation in m at which the foam first yields, (7): delta_Y = R* (3 pi/4)^2 (nu_Y Y/E*)^2."""
+    share = positive("ratio", ratio, "") * positive("yield_pa", yield_pa, "Pa") / ball.modulus_pa
+    return ball.radius_m * (0.75 * math.pi * share) ** 2
+
+
+def mean_pressure_pa(ball: Ball, indentation_m: float) -> float:
+    """F/(pi a^2) in Pa, which (6) sets equal to nu_Y Y: 4 E*/(3 pi) sqrt(delta/R*)."""
+    return 4 * ball.modulus_pa / (3 * math.pi) * math.sqrt(indentation_m / ball.radius_m)
+
+
+def resilience(yield_pa: float, modulus_pa: float) -> float:
+    """U_r in J/m^3, the energy that a volume takes elastically: Y^2/(2 E) (paper, III.C)."""
+    return positive("yield_pa", yield_pa, "Pa") ** 2 / (2 * positive("modulus_pa", modulus_pa, "Pa"))
+
+
+def thickness_m(
+    ball: Ball, mass_kg: float, speed_m_s: float, resilience: float, time_share: float = 1.0, rule: str = "printed"
+) -> float:
+    """The thickness in m that takes the energy, (8): m^(3/5) v0^(6/5) (t0/t_c) / (84 U_r (R*^2/E*)^(2/5)).
+
+    ``resilience``: U_r in J/m^3; ``time_share``: t0/t_c; ``rule``: one of :data:`THICKNESS_RULES`, in place of the 84.
+    """
+    if rule not in THICKNESS_RULES:
+        raise CoverError(f"rule is {rule!r}; it must be one of {', '.join(THICKNESS_RULES)}")
+    positive("resilience", resilience, "J/m3")
+    energy: float = positive("mass_kg", mass_kg, "kg") ** 0.6 * positive("speed_m_s", speed_m_s, "m/s") ** 1.2
+    below: float = THICKNESS_RULES[rule] * resilience * (ball.radius_m**2 / ball.modulus_pa) ** 0.4
+    return energy * positive("time_share", time_share, "") / below
+
+
+def _poisson(value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -1 < value <= 0.5:
+        raise CoverError(f"poisson is {value!r}; it must lie above -1 and not above 0.5")
+    return value

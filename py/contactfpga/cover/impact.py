@@ -1,0 +1,327 @@
+"""An arm runs into an obstacle: how far the foam is pressed, for how long, and how hard.
+
+One joint, constant motor torque u, gravity if wanted, the foam a spring F = K_s delta^1.5 (Hertz). With
+theta - theta0 = delta/d, delta(0) = 0 and +v0 at the touch, (3) as corrected is an energy balance,
+
+    J/(2 d^2) (v^2 - v0^2) = u delta/d - M g l [cos theta0 - cos(theta0 + delta/d)] - 2/5 K_s delta^(5/2).
+
+The paper prints -v0 and drops cos theta0. Compression ends where v = 0: :func:`compression_m` is (5),
+:func:`time_s` is (4).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from contactfpga.cover.answer import CoverError, NoSolution, not_negative, positive
+from contactfpga.cover.solve import Floats, integral, root
+
+GRAVITY = 9.81
+"""g in m/s2, the paper's."""
+
+COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0.9)
+"""t_c v0/delta_c without torque and gravity: (2/5) B(2/5, 1/2) = 1.471637592."""
+
+METHODS = ("auto", "closed", "quadrature", "ode")
+"""``auto``: the closed form where there is one, else quadrature."""
+
+WIDE_ANGLE = 0.1
+"""delta/d in rad from which on theta - theta0 = delta/d is said to be rough."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Arm:
+    """A link that turns about one joint, and what drives it."""
+
+    inertia_kgm2: float
+    """J about the joint, in kg m2."""
+    lever_m: float
+    """d, from the joint to the contact, in m."""
+    torque_nm: float = 0.0
+    """u, the motor's constant torque in Nm; positive presses into the obstacle."""
+    weight_nm: float = 0.0
+    """M g l in Nm; 0 leaves gravity out."""
+    angle_rad: float = 0.0
+    """theta0, the joint's angle at the touch, from hanging down towards the obstacle, in rad."""
+
+    def __post_init__(self) -> None:
+        positive("inertia_kgm2", self.inertia_kgm2, "kg m2")
+        positive("lever_m", self.lever_m, "m")
+        not_negative("weight_nm", self.weight_nm, "Nm")
+        for name in ("torque_nm", "angle_rad"):
+            if not math.isfinite(getattr(self, name)):
+                raise CoverError(f"{name} is {getattr(self, name)!r}; it must be finite")
+
+    @classmethod
+    def link(
+        cls,
+        mass_kg: float,
+        radius_m: float,
+        com_m: float,
+        lever_m: float,
+        *,
+        length_m: float | None = None,
+        tube: bool = False,
+        torque_nm: float = 0.0,
+        gravity: bool = False,
+        angle_rad: float = 0.0,
+    ) -> Arm:
+        """A cylinder of that radius and length whose centre of mass is ``com_m`` from the joint.
+
+        J = m/12 (3 R^2 + L^2) + m l^2, a thin tube 6 R^2; without ``length_m`` L is the lever, as printed.
+        """
+        positive("mass_kg", mass_kg, "kg")
+        positive("lever_m", lever_m, "m")
+        not_negative("radius_m", radius_m, "m")
+        not_negative("com_m", com_m, "m")
+        length = positive("length_m", lever_m if length_m is None else length_m, "m")
+        inertia = mass_kg / 12 * ((6 if tube else 3) * radius_m**2 + length**2) + mass_kg * com_m**2
+        weight = mass_kg * GRAVITY * com_m if gravity else 0.0
+        return cls(inertia, lever_m, torque_nm, weight, angle_rad)
+
+    @property
+    def mass_kg(self) -> float:
+        """J/d^2, the mass that the contact feels, in kg."""
+        return self.inertia_kgm2 / self.lever_m**2
+
+    @property
+    def free(self) -> bool:
+        """Neither torque nor gravity, so that there is a closed form."""
+        return self.torque_nm == 0 and self.weight_nm == 0
+
+    def push_n(self, indentation_m: float) -> float:
+        """What motor and gravity press with at the contact, in N."""
+        angle = self.angle_rad + indentation_m / self.lever_m
+        return (self.torque_nm - self.weight_nm * math.sin(angle)) / self.lever_m
+
+    def work_j(self, indentation_m: Floats | float) -> Floats:
+        """What motor and gravity have done since the touch, in J."""
+        half = np.asarray(indentation_m, float) / (2 * self.lever_m)
+        lifted = 2 * self.weight_nm * np.sin(self.angle_rad + half) * np.sin(half)
+        return np.asarray(2 * self.torque_nm * half - lifted)
+
+
+@dataclasses.dataclass(frozen=True)
+class Impact:
+    """The end of a compression."""
+
+    compression_m: float
+    """delta_c in m."""
+    time_s: float
+    """t_c, from the touch to the end of the compression, in s."""
+    force_n: float
+    """Peak force in N, at that moment."""
+    stiffness: float
+    """K_s in N/m^1.5."""
+    energy_j: float
+    """What the foam then holds, in J."""
+    method: str
+    """``closed``, ``quadrature`` or ``ode``."""
+    notes: tuple[str, ...] = ()
+    """Where the model is rough."""
+
+
+def strike(
+    arm: Arm,
+    speed_m_s: float,
+    stiffness: float,
+    *,
+    method: str = "auto",
+    thickness_m: float | None = None,
+    yield_m: float | None = None,
+) -> Impact | NoSolution:
+    """The compression after a touch at ``speed_m_s`` by a contact of ``stiffness`` K_s in N/m^1.5.
+
+    There is no solution where the foam, ``thickness_m`` thick, is pressed flat, where it yields (``yield_m``: the
+    indentation at which it does), where nothing presses, and where the arm would turn further than its own lever.
+    """
+    not_negative("speed_m_s", speed_m_s, "m/s")
+    positive("stiffness", stiffness, "N/m^1.5")
+    if method not in METHODS:
+        raise CoverError(f"method is {method!r}; it must be one of {', '.join(METHODS)}")
+    if method == "auto":
+        method = "closed" if arm.free else "quadrature"
+    if method == "closed" and not arm.free:
+        raise CoverError("method is 'closed'; with torque or gravity there is no closed form, take 'quadrature'")
+    if speed_m_s == 0 and arm.push_n(0.0) <= 0:
+        return NoSolution("the arm touches at 0 m/s and neither torque nor gravity presses it on")
+    depth = compression_m(arm, speed_m_s, stiffness)
+    refused = refusal(arm, stiffness, depth, thickness_m, yield_m)
+    if refused:
+        return refused
+    if method == "closed":
+        seconds: float | None = COMPRESSION_TIME * depth / speed_m_s
+    elif method == "quadrature":
+        seconds = time_s(arm, speed_m_s, stiffness, depth)
+    else:
+        from contactfpga.cover import motion  # which uses Arm
+
+        depth, seconds = motion.compress(arm, speed_m_s, stiffness)
+    if seconds is None:
+        return NoSolution(f"the arm all but stops on the way to {1e3 * depth:.4g} mm: its time is not determined")
+    return _impact(arm, stiffness, depth, seconds, method)
+
+
+def stiffness_for(
+    arm: Arm, speed_m_s: float, seconds: float, *, thickness_m: float | None = None
+) -> Impact | NoSolution:
+    """The inverse: the stiffness at which the compression takes ``seconds``.
+
+    A deeper compression takes longer, so the search is over delta_c, for which (5) gives K_s at once. There is no
+    solution where torque and gravity stop the arm sooner whatever the foam, or where it would have to give in by
+    more than the lever or by ``thickness_m``.
+    """
+    positive("speed_m_s", speed_m_s, "m/s")
+    positive("seconds", seconds, "s")
+    if arm.free:
+        depth = seconds * speed_m_s / COMPRESSION_TIME
+        stiff = 1.25 * arm.mass_kg * speed_m_s**2 / depth**2.5
+        return refusal(arm, stiff, depth, thickness_m, None) or _impact(arm, stiff, depth, seconds, "closed")
+    limit, reason = _deepest(arm, speed_m_s, thickness_m)
+    longest = _time_to(arm, speed_m_s, limit)
+    if longest is not None and seconds >= longest:
+        return NoSolution(f"a compression of {1e3 * seconds:.4g} ms: {reason.format(1e3 * longest)}")
+    low = min(limit, seconds * speed_m_s)
+    while (_time_to(arm, speed_m_s, low) or math.inf) > seconds:
+        low /= 2
+
+    def excess(depth: float) -> float:
+        found = _time_to(arm, speed_m_s, depth)
+        return (math.inf if found is None else found) - seconds
+
+    depth = root(excess, low, limit)
+    stiff = _stiffness_at(arm, speed_m_s, depth)
+    return _impact(arm, stiff, depth, seconds, "quadrature")
+
+
+def speed2(arm: Arm, speed_m_s: float, stiffness: float, indentation_m: Floats | float) -> Floats:
+    """v^2 in m2/s2 at an indentation, (3) solved for it; negative where the arm does not come."""
+    gained = arm.work_j(indentation_m) - 0.4 * stiffness * np.asarray(indentation_m, float) ** 2.5
+    return np.asarray(speed_m_s**2 + 2 / arm.mass_kg * gained)
+
+
+def compression_m(arm: Arm, speed_m_s: float, stiffness: float) -> float:
+    """delta_c in m, (5): the first indentation at which v is 0.
+
+    Without gravity the balance is concave and has one root. With it, each step goes to the root of a concave curve
+    that lies below the balance, so that none is jumped over.
+    """
+    if arm.free:
+        return float((1.25 * arm.mass_kg * speed_m_s**2 / stiffness) ** 0.4)
+    depth, curve, spring = 0.0, arm.weight_nm / (2 * arm.lever_m**2), 0.4 * stiffness
+    for _ in range(1000):
+        left = arm.mass_kg / 2 * float(speed2(arm, speed_m_s, stiffness, depth))
+        push = arm.push_n(depth)
+        if left <= 0 and depth > 0:
+            break
+
+        def below(step: float, at: float = depth, left: float = left, push: float = push) -> float:
+            taken: float = spring * ((at + step) ** 2.5 - at**2.5)
+            return left + step * (push - curve * step) - taken
+
+        high = (left / spring) ** 0.4 + 1e-300
+        if push > 0:
+            high += (push / spring) ** (2 / 3)
+        low = high
+        while low > 0 and below(low) <= 0:
+            low /= 2
+        if not depth + low > depth:
+            break
+        while below(high) > 0:
+            high *= 2
+        step = root(below, low, high)
+        if not depth + step > depth * (1 + 1e-16):
+            break
+        depth += step
+        if arm.weight_nm == 0:
+            break
+    return depth
+
+
+def time_s(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float) -> float | None:
+    """t_c in s, (4), to about 1e-13 of it: with delta = delta_c sin^2(phi) both ends are smooth. None: not finite.
+
+    In the upper half v^2 is taken as its difference from that at delta_c, 0, with cos^2(phi) divided out by hand, so
+    that nothing cancels and an error of delta_c is passed on once, not as its square root.
+    """
+    return integral(lambda phi: slowness(arm, speed_m_s, stiffness, depth_m, phi), 0.0, math.pi / 2)
+
+
+def slowness(arm: Arm, speed_m_s: float, stiffness: float, depth_m: float, phi: Floats) -> Floats:
+    """dt/dphi in s at delta = ``depth_m`` sin^2(phi); ``phi`` in rad, below pi/2."""
+    s = np.sin(phi)
+    share = s * s
+    rest = np.cos(phi) ** 2
+    spring = 0.4 * stiffness * depth_m**2.5
+    half = depth_m / (2 * arm.lever_m)
+    ending = spring * (1 + s + share + share * s + share * share) / (1 + s) - 2 * arm.torque_nm * half
+    if arm.weight_nm:
+        ending = ending + 2 * arm.weight_nm * np.sin(arm.angle_rad + half * (1 + share)) * half * np.sinc(
+            half * rest / math.pi
+        )
+    starting = speed2(arm, speed_m_s, stiffness, depth_m * share) / rest
+    square = np.where(share < 0.5, starting, 2 / arm.mass_kg * ending)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(square > 0, 2 * depth_m * s / np.sqrt(np.where(square > 0, square, 1.0)), np.inf)
+
+
+def _impact(arm: Arm, stiffness: float, depth: float, seconds: float, method: str) -> Impact:
+    notes = []
+    if depth / arm.lever_m > WIDE_ANGLE:
+        notes.append(f"the arm turns by {depth / arm.lever_m:.2g} rad: theta - theta0 = delta/d is rough")
+    force, energy = stiffness * depth**1.5, 0.4 * stiffness * depth**2.5
+    return Impact(depth, seconds, force, stiffness, energy, method, tuple(notes))
+
+
+def refusal(
+    arm: Arm, stiffness: float, depth: float, thickness_m: float | None, yield_m: float | None
+) -> NoSolution | None:
+    """Why a compression to ``depth`` in m cannot be, as :func:`strike` says; None if it can."""
+    limit, what = arm.lever_m, "the lever's length"
+    if thickness_m is not None:
+        limit, what = positive("thickness_m", thickness_m, "m"), "the foam's thickness"
+    if depth >= limit:
+        held = max(0.0, arm.push_n(0.0) / stiffness) ** (2 / 3)
+        if held >= limit:
+            return NoSolution(
+                f"the torque wins: without any speed it presses the foam in by {1e3 * held:.4g} mm, {what} is "
+                f"{1e3 * limit:.4g} mm"
+            )
+        if thickness_m is None:
+            return NoSolution(
+                f"the foam is too soft: it would be pressed in by {1e3 * depth:.4g} mm, {what} is {1e3 * limit:.4g} mm"
+            )
+        return NoSolution(f"the foam bottoms out: pressed in by {1e3 * depth:.4g} mm, it is {1e3 * limit:.4g} mm thick")
+    if yield_m is not None and depth > positive("yield_m", yield_m, "m"):
+        return NoSolution(
+            f"outside the elastic range: pressed in by {1e3 * depth:.4g} mm, the foam yields from "
+            f"{1e3 * yield_m:.4g} mm on"
+        )
+    return None
+
+
+def _stiffness_at(arm: Arm, speed_m_s: float, depth: float) -> float:
+    """K_s at which the compression ends at ``depth``, (5); negative where the arm does not come that far."""
+    energy = arm.mass_kg * speed_m_s**2 / 2 + float(arm.work_j(depth))
+    return float(energy / (0.4 * depth**2.5))
+
+
+def _time_to(arm: Arm, speed_m_s: float, depth: float) -> float | None:
+    return time_s(arm, speed_m_s, max(0.0, _stiffness_at(arm, speed_m_s, depth)), depth)
+
+
+def _deepest(arm: Arm, speed_m_s: float, thickness_m: float | None) -> tuple[float, str]:
+    """The deepest compression that any foam can end with, and what is said of a longer one."""
+    limit = arm.lever_m if thickness_m is None else positive("thickness_m", thickness_m, "m")
+    energy = arm.mass_kg * speed_m_s**2 / 2
+    grid = np.linspace(0, limit, 257)
+    stopped = np.flatnonzero(energy + arm.work_j(grid) <= 0)
+    if len(stopped):
+        low, high = float(grid[stopped[0] - 1]), float(grid[stopped[0]])
+        limit = root(lambda depth: energy + float(arm.work_j(depth)), low, high)
+        return limit, "torque and gravity stop the arm within {:.4g} ms whatever the foam"
+    what = "the lever's length" if thickness_m is None else "the foam's thickness"
+    return limit, f"the foam would be pressed in by more than {what}, {1e3 * limit:.4g} mm; that takes {{:.4g}} ms"

@@ -1,0 +1,58 @@
+"""The line of the paper's Fig. 9 through measured forces and deformations."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.cover.answer import CoverError
+from contactfpga.cover.solve import Floats
+
+
+class Line(NamedTuple):
+    """deformation = offset + force / stiffness, by least squares."""
+
+    stiffness_n_m: float
+    """In N/m."""
+    offset_m: float
+    """Deformation at no force, in m."""
+    correlation: float
+    """Of force and deformation, -1 to 1."""
+
+
+def read(path: str | Path) -> tuple[Floats, Floats]:
+    """Forces in N and deformations in m from a file with two columns, by comma; names may stand above them."""
+    rows: list[list[float]] = []
+    for number, text in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+        cells = [cell.strip() for cell in text.split(",")]
+        if not text.strip() or text.startswith("#"):
+            continue
+        try:
+            row = [float(cell) for cell in cells]
+        except ValueError:
+            if not rows and number == 1:
+                continue
+            raise CoverError(
+                f"{path}, line {number}: {text!r} is not two numbers, force in N and deformation in m"
+            ) from None
+        if len(row) != 2 or not all(map(math.isfinite, row)):
+            raise CoverError(f"{path}, line {number}: {text!r} is not two numbers, force in N and deformation in m")
+        rows.append(row)
+    if len(rows) < 3:
+        raise CoverError(f"{path}: {len(rows)} points; a line with a correlation needs 3")
+    force, deformation = np.array(rows).T
+    return force, deformation
+
+
+def fit(force_n: Floats, deformation_m: Floats) -> Line:
+    """The line through them; raises :class:`CoverError` if they do not vary."""
+    force, depth = force_n - force_n.mean(), deformation_m - deformation_m.mean()
+    across = float(force @ depth)
+    if across == 0:
+        raise CoverError("force and deformation do not vary together; there is no line")
+    slope = across / float(force @ force)
+    offset = float(deformation_m.mean() - slope * force_n.mean())
+    return Line(1 / slope, offset, across / math.sqrt(float(force @ force) * float(depth @ depth)))

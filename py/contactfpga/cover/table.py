@@ -1,0 +1,40 @@
+"""The `[cover]` part of a Skin's file."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+from contactfpga.cover.answer import CoverError
+from contactfpga.cover.press import Cover
+from contactfpga.cover.switch import Switch
+
+
+def read(values: Any) -> Cover:
+    """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with a table ``switch``."""
+    given = dict(_known("cover", values, Cover))
+    if "switch" in given:
+        given["switch"] = Switch(**_known("cover.switch", given["switch"], Switch))
+    return Cover(**given)
+
+
+def write(cover: Cover) -> str:
+    """The TOML tables that :func:`read` reads back."""
+    values = dataclasses.asdict(cover)
+    switch = values.pop("switch")
+    return "\n[cover]\n" + _lines(values) + "\n[cover.switch]\n" + _lines(switch)
+
+
+def _lines(values: dict[str, Any]) -> str:
+    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in values.items() if value is not None)
+
+
+def _known(name: str, values: Any, kind: type) -> dict[str, Any]:
+    if not isinstance(values, dict):
+        raise CoverError(f"{name} is {values!r}; it must be a part, [{name}]")
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in values:
+        if key not in known:
+            raise CoverError(f"unknown key {key!r} in [{name}]; known are {', '.join(known)}")
+    return values

@@ -1,0 +1,221 @@
+"""What a cover is designed for, read from a TOML file: the arm, the impact, the switch, and limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from contactfpga.cover.answer import CoverError, not_negative, positive
+from contactfpga.cover.elastic import THICKNESS_RULES
+from contactfpga.cover.foams import FOAMS, Foam, find
+from contactfpga.cover.impact import Arm
+from contactfpga.cover.medium import MEDIA
+from contactfpga.cover.sense import CONTACTS, TOLERANCE, Model
+from contactfpga.cover.switch import Switch
+from contactfpga.skin import Skin
+
+_NEEDED = object()
+
+_KEYS: dict[str, dict[str, Any]] = {
+    "arm": {
+        "mass_kg": _NEEDED,
+        "radius_m": _NEEDED,
+        "com_m": _NEEDED,
+        "lever_m": _NEEDED,
+        "length_m": None,
+        "tube": False,
+        "torque_nm": 0.0,
+        "gravity": False,
+        "angle_rad": 0.0,
+    },
+    "impact": {
+        "speed_m_s": _NEEDED,
+        "effective_radius_m": _NEEDED,
+        "poisson": 0.5,
+        "time_s": _NEEDED,
+        "latency_s": _NEEDED,
+    },
+    "reaction": {"skin": None, "other_s": 0.0, "brake_nm": 0.0},
+    "switch": {"force_n": 1.0, "area_m2": 12.6e-6},
+    "limits": {
+        "pitch_m": _NEEDED,
+        "force_n": _NEEDED,
+        "thickness_m": _NEEDED,
+        "pitch_min_m": None,
+        "peak_n": None,
+        "mass_kg_m2": None,
+    },
+    "cover": {"foams": None, "free": True, "plates_m": None, "rule": "hertz", "strain": None},
+    "sensitivity": {"model": None, "contact": "point", "tolerance": TOLERANCE},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """What a cover is designed for."""
+
+    arm: Arm
+    mass_kg: float
+    """Of the link, which (8) as printed takes for the mass that strikes, in kg."""
+    speed_m_s: float
+    """Of the contact point at the touch."""
+    radius_m: float
+    """Effective radius R* in m."""
+    poisson: float
+    time_s: float
+    """tau: how long the compression has to last, in s."""
+    latency_s: float
+    """t0: from the touch to the reaction, in s."""
+    switch: Switch
+    pitch_m: float
+    """The pitch at most, in m."""
+    force_n: float
+    """The force that must be felt everywhere on the sheet, in N."""
+    thickness_m: float
+    """The thickness at most, in m."""
+    pitch_min_m: float | None = None
+    """The pitch at least, in m."""
+    peak_n: float | None = None
+    """The impact's peak force at most, in N."""
+    mass_kg_m2: float | None = None
+    """The cover's mass per area at most, in kg/m2; a foam of unknown density is not held to it."""
+    foams: tuple[Foam, ...] = FOAMS
+    free: bool = True
+    """Whether the modulus that gives exactly ``time_s`` is a candidate, too."""
+    plates_m: tuple[float, ...] = ()
+    """Thicknesses that can be had, in m; none: any."""
+    rule: str = "hertz"
+    """One of :data:`contactfpga.cover.elastic.THICKNESS_RULES`."""
+    strain: float | None = None
+    """How far every foam may be pressed in, as a part of its thickness; None: as each foam says."""
+    model: Model | None = None
+    """None: the simplest within ``tolerance``."""
+    contact: str = "point"
+    """``patch``: the sheet has to feel the impact's own contact; ``point``: anything."""
+    tolerance: float = TOLERANCE
+    skin: Skin = dataclasses.field(default_factory=Skin)
+    """The sheet whose latency the cover is compared for."""
+    other_s: float = 0.0
+    """What host, controller and motor add to it, in s."""
+    brake_nm: float = 0.0
+    """The motor's torque against the motion once it reacts, in Nm."""
+
+    def __post_init__(self) -> None:
+        for name, unit in (("mass_kg", "kg"), ("speed_m_s", "m/s"), ("radius_m", "m"), ("time_s", "s")):
+            positive(name, getattr(self, name), unit)
+        for name, unit in (("latency_s", "s"), ("pitch_m", "m"), ("force_n", "N"), ("thickness_m", "m")):
+            positive(name, getattr(self, name), unit)
+        for name, unit in (("pitch_min_m", "m"), ("peak_n", "N"), ("mass_kg_m2", "kg/m2"), ("strain", "")):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name), unit)
+        for plate in self.plates_m:
+            positive("plates_m", plate, "m")
+        not_negative("other_s", self.other_s, "s")
+        not_negative("brake_nm", self.brake_nm, "Nm")
+        if self.strain is not None and self.strain > 1:
+            raise CoverError(f"strain is {self.strain}; it must not be above 1")
+        if self.pitch_min_m is not None and self.pitch_min_m > self.pitch_m:
+            raise CoverError(f"pitch_min_m is {self.pitch_min_m}; it must not be above pitch_m, {self.pitch_m}")
+        if not self.foams and not self.free:
+            raise CoverError("foams is empty and free is false; there is nothing to choose from")
+        for name, value, known in (
+            ("rule", self.rule, tuple(THICKNESS_RULES)),
+            ("contact", self.contact, CONTACTS),
+            ("model", self.model.within if self.model else "bonded", MEDIA),
+        ):
+            if value not in known:
+                raise CoverError(f"{name} is {value!r}; it must be one of {', '.join(known)}")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Task:
+        """Read a task from a TOML file; ``[[foam]]`` adds foams, ``[reaction] skin`` is a path beside the file."""
+        with open(path, "rb") as file:
+            try:
+                given = tomllib.load(file)
+            except tomllib.TOMLDecodeError as error:
+                raise CoverError(f"{path}: not a TOML file: {error}") from None
+        own = tuple(_foam(path, one) for one in given.pop("foam", []))
+        part = _read(path, given)
+        foams = FOAMS + own
+        if part["cover"]["foams"] is not None:
+            foams = tuple(find(name, foams) for name in part["cover"]["foams"])
+        arm, impact, limits, cover, sensitivity = (
+            part[name] for name in ("arm", "impact", "limits", "cover", "sensitivity")
+        )
+        model, skin = sensitivity["model"], part["reaction"]["skin"]
+        return cls(
+            arm=Arm.link(**arm),
+            mass_kg=arm["mass_kg"],
+            speed_m_s=impact["speed_m_s"],
+            radius_m=impact["effective_radius_m"],
+            poisson=impact["poisson"],
+            time_s=impact["time_s"],
+            latency_s=impact["latency_s"],
+            switch=Switch(**part["switch"]),
+            **limits,
+            foams=foams,
+            free=cover["free"],
+            plates_m=tuple(sorted(cover["plates_m"] or ())),
+            rule=cover["rule"],
+            strain=cover["strain"],
+            model=None if model is None else Model(model, sensitivity["contact"]),
+            contact=sensitivity["contact"],
+            tolerance=sensitivity["tolerance"],
+            skin=Skin() if skin is None else Skin.load(Path(path).parent / skin),
+            other_s=part["reaction"]["other_s"],
+            brake_nm=part["reaction"]["brake_nm"],
+        )
+
+
+def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    known = [*_KEYS, "foam"]
+    for name in given:
+        if name not in _KEYS:
+            raise CoverError(f"{path}: unknown part {name!r}; known are {', '.join(known)}")
+    part = {}
+    for name, keys in _KEYS.items():
+        values = given.get(name, {})
+        if not isinstance(values, dict):
+            raise CoverError(f"{path}: {name} is {values!r}; it must be a part, [{name}]")
+        for key in values:
+            if key not in keys:
+                raise CoverError(f"{path}: unknown key {key!r} in [{name}]; known are {', '.join(keys)}")
+        part[name] = {key: values.get(key, default) for key, default in keys.items()}
+        for key, value in part[name].items():
+            if value is _NEEDED:
+                raise CoverError(f"{path}: {key} is missing in [{name}]")
+            _fits(path, name, key, value, keys[key])
+    return part
+
+
+def _fits(path: str | Path, name: str, key: str, value: Any, default: Any) -> None:
+    lists: dict[str, tuple[type, ...]] = {"foams": (str,), "plates_m": (int, float)}
+    words = ("skin", "model", "rule", "contact")
+    if value is None:
+        return
+    if key in lists:
+        right = isinstance(value, list) and all(isinstance(one, lists[key]) for one in value)
+        wanted = "a list"
+    elif key in words:
+        right, wanted = isinstance(value, str), "a text"
+    elif isinstance(default, bool):
+        right, wanted = isinstance(value, bool), "true or false"
+    else:
+        right = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        wanted = "a finite number"
+    if not right:
+        raise CoverError(f"{path}: {key} in [{name}] is {value!r}; it must be {wanted}")
+
+
+def _foam(path: str | Path, values: dict[str, Any]) -> Foam:
+    known = [field.name for field in dataclasses.fields(Foam)]
+    for key in values:
+        if key not in known:
+            raise CoverError(f"{path}: unknown key {key!r} in [[foam]]; known are {', '.join(known)}")
+    for key in ("name", "modulus_pa", "source"):
+        if key not in values:
+            raise CoverError(f"{path}: {key} is missing in [[foam]]")
+    return Foam(**values)
