@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes formal campaign mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart formal campaign mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -72,6 +72,9 @@ figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (a quarter of an hour)
 	$(PY) -m contactfpga_sim.size_tables README.md docs/boards.md
+
+chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
+	$(VENV)/bin/contactfpga chart $(ARGS)
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
@@ -131,6 +134,9 @@ $(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compile
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml constraints.txt
 	$(call install,boards,downloads about 145 MB unless installed or cached)
+
+$(VENV)/.stamp-chart: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+	$(call install,chart,downloads about 190 MB unless installed or cached)
 
 $(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
 	$(call install,sim$(,)test,downloads about 180 MB unless installed or cached)

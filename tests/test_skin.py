@@ -102,11 +102,13 @@ REFUSED = [
     ),
     (
         {"scan": "adaptive", "settle_us": 2.0},
-        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones a frame need 43 clocks (3.58333 us)",
+        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones a frame need 43 clocks (3.58333 us) "
+        "with labeller = 'run'",
     ),
     (
         {"scan": "adaptive", "rows": 64, "columns": 64},
-        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones a frame need 185 clocks (15.4167 us)",
+        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones a frame need 185 clocks (15.4167 us) "
+        "with labeller = 'run'",
     ),
     (
         {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.1},

@@ -24,7 +24,14 @@ AXES = {
 FLOOR = {"miscounted": 3e-4, "missed": 3e-4, "barycenter_mm": 1e-2, "area": 1e-2}
 """Errors below are drawn here, as there is no 0 on an axis of powers of ten."""
 
-COLOURS = {"run": "#00798c", "serial": "#d1495b", "projection": "#edae49", "single": "#66a182", "cells": "#8d6a9f"}
+COLOURS = {
+    "adaptive": "#2e4057",
+    "run": "#00798c",
+    "serial": "#d1495b",
+    "projection": "#edae49",
+    "single": "#66a182",
+    "cells": "#8d6a9f",
+}
 MARKERS = {5.0: "s", 10.0: "o", 20.0: "^"}
 
 
@@ -78,7 +85,8 @@ def _label(point: Point) -> str:
 
 def _colour(point: Point) -> str:
     skin = point.task.skin
-    return COLOURS["cells" if skin.report == "cells" else skin.labeller]
+    kind = "cells" if skin.report == "cells" else "adaptive" if skin.scan == "adaptive" else skin.labeller
+    return COLOURS[kind]
 
 
 def _legend(points: Sequence[Point]):

@@ -22,6 +22,9 @@ def _methods() -> dict[str, Skin]:
         for labeller in ("run", "serial", "projection", "single"):
             methods[f"{labeller}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
         methods[f"cells, {pitch:g} mm"] = sheet(pitch, report="cells")
+    for pitch in (10.0, 20.0):
+        methods[f"adaptive, {pitch:g} mm"] = sheet(pitch, scan="adaptive")
+    methods["adaptive, 5 mm, 24 MHz"] = sheet(5.0, scan="adaptive", clock_hz=24_000_000)
     methods["run, 10 mm, 4-connected"] = sheet(10.0, connectivity=4)
     methods["run, 10 mm, 1 Mbaud"] = sheet(10.0, baud=1_000_000)
     methods["run, 10 mm, debounced 0.5 ms"] = sheet(
