@@ -65,6 +65,17 @@ def test_the_half_space_is_left_for_the_layer_where_it_fails():
     assert "'halfspace, point' is off by -81 % from 'bonded, point'" in named.notes
 
 
+def test_a_named_model_is_refused_beyond_a_tolerance_that_is_asked_for():
+    sheet = Sheet(SWITCH, 5e-3)
+    assert sheet.detects(WORST, HALFSPACE, 0.05).value == NoSolution(
+        "'halfspace, point' is off by -81 %, 5 % are asked for; take 'bonded, point'"
+    )
+    assert sheet.detects(WORST, HALFSPACE, 0.9).value == sheet.detects(WORST, HALFSPACE).value
+    assert sheet.reaches(15.0, HALFSPACE, 0.05).value == sheet.reaches(15.0, HALFSPACE).value
+    beyond = sheet.detects(1.68 * 5e-3, HALFSPACE, 0.9).value
+    assert "'halfspace, point' has an answer, 90 % are asked for; no solution: a switch 8.4 mm" in beyond.reason
+
+
 def test_no_model_is_larger_than_needed():
     # where the layer's and the half-space's stress happen to be alike, the closed form will do
     found = Sheet(SWITCH, 5e-3).detects(0.83 * 5e-3)

@@ -57,7 +57,9 @@ def _sense(parser: argparse.ArgumentParser) -> None:
     model = parser.add_argument_group("model (default: the simplest within the tolerance)")
     model.add_argument("--model", choices=("halfspace", "bonded", "frictionless"), help="what the cover lies on")
     model.add_argument("--contact", choices=("point", "patch"), help="with --model (default: point)")
-    model.add_argument("--tolerance", type=float, default=0.05, help="share by which the answer may be off (0.05)")
+    model.add_argument(
+        "--tolerance", type=float, help="share by which the answer may be off (0.05); refuse --model beyond it"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object, SI units")
 
 

@@ -198,7 +198,7 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> Candidate:
 def _sensed(task: Task, sofar: Candidate, sheet: Sheet, ball: Ball) -> Candidate:
     """The force and the pitch, and the limits on them."""
     checks = list(sofar.checks)
-    least = sheet.detects(0.0, task.model, task.tolerance)
+    least = sheet.detects(0.0, task.model, _tolerance(task))
     notes = [*sofar.notes, *(sofar.hit.notes if sofar.hit else ()), *least.notes]
     if sofar.hit and ball.patch_m(sofar.hit.force_n) > sheet.thickness_m:
         notes.append("Hertz stops holding in the impact: its patch is wider than the foam is thick")
@@ -209,12 +209,12 @@ def _sensed(task: Task, sofar: Candidate, sheet: Sheet, ball: Ball) -> Candidate
         Check("force", least.value, task.force_n, True, f"force_n at least {least.value:.4g} N, or a thinner cover")
     )
     if least.value <= task.force_n:
-        reach = sheet.reaches(task.force_n, task.model, task.tolerance)
+        reach = sheet.reaches(task.force_n, task.model, _tolerance(task))
         if not isinstance(reach.value, NoSolution):
             pitch = min(task.pitch_m, sense.pitch_m(reach.value))
-            sure = sheet.detects(sense.worst_offset_m(pitch), task.model, task.tolerance) if pitch > 0 else None
+            sure = sheet.detects(sense.worst_offset_m(pitch), task.model, _tolerance(task)) if pitch > 0 else None
     if task.pitch_min_m is not None and pitch is not None:
-        wanted = sheet.detects(sense.worst_offset_m(task.pitch_min_m), task.model, task.tolerance).value
+        wanted = sheet.detects(sense.worst_offset_m(task.pitch_min_m), task.model, _tolerance(task)).value
         force = "no force does" if isinstance(wanted, NoSolution) else f"force_n at least {wanted:.4g} N"
         checks.append(Check("pitch", pitch, task.pitch_min_m, False, f"pitch_min_m at most {pitch:.4g} m, or {force}"))
     return dataclasses.replace(
@@ -270,6 +270,11 @@ def _stopped_m(task: Task, hit: Impact, pressed_m: float) -> float:
     braking = dataclasses.replace(task.arm, torque_nm=-task.brake_nm)
     kept = 2 * (task.arm.torque_nm + task.brake_nm) * pressed_m / task.arm.lever_m / task.arm.mass_kg
     return impact.compression_m(braking, math.sqrt(task.speed_m_s**2 + kept), hit.stiffness)
+
+
+def _tolerance(task: Task) -> float | None:
+    """A model that the task names is taken as it is, with a note of its error."""
+    return task.tolerance if task.model is None else None
 
 
 def _ball(task: Task, foam: Foam) -> Ball:

@@ -103,14 +103,18 @@ class Sheet:
             return point.reach_m(self.switch, force_n, self.thickness_m, model.within)
         return hertz_layer.reach_m(self._ball(model), self.switch, force_n, self.thickness_m, model.within)
 
-    def detects(self, offset_m: float, model: Model | None = None, tolerance: float = TOLERANCE) -> Sense:
-        """:meth:`force_n` by a model, or by the simplest one whose force is within ``tolerance`` of the reference's."""
+    def detects(self, offset_m: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
+        """:meth:`force_n` by a model, or by the simplest one whose force is within ``tolerance`` of the reference's.
+
+        Without ``tolerance`` that is :data:`TOLERANCE`, and a model that is named answers whatever its error, which is
+        noted; with it a model that is named and is off by more is refused.
+        """
         found = self._judge(lambda one: self.force_n(one, offset_m), model, tolerance)
         force = found.reference if isinstance(found.value, NoSolution) else found.value
         return self._noted(found, None if isinstance(force, NoSolution) else force)
 
-    def reaches(self, force_n: float, model: Model | None = None, tolerance: float = TOLERANCE) -> Sense:
-        """:meth:`reach_m` by a model, or by the simplest one whose reach is within ``tolerance`` of the reference's."""
+    def reaches(self, force_n: float, model: Model | None = None, tolerance: float | None = None) -> Sense:
+        """:meth:`reach_m` by a model, or by the simplest one that will do, as :meth:`detects` says."""
         return self._noted(self._judge(lambda one: self.reach_m(one, force_n), model, tolerance), force_n)
 
     def _ball(self, model: Model) -> Ball:
@@ -118,18 +122,20 @@ class Sheet:
             raise CoverError(f"model is '{model}'; a patch needs the radius R* and the modulus E* of the contact")
         return self.ball
 
-    def _judge(self, ask: Callable[[Model], float | NoSolution], model: Model | None, tolerance: float) -> Sense:
-        positive("tolerance", tolerance, "")
+    def _judge(self, ask: Callable[[Model], float | NoSolution], model: Model | None, tolerance: float | None) -> Sense:
+        if tolerance is not None:
+            positive("tolerance", tolerance, "")
         reference = ask(self.reference)
         if model is not None:
-            return self._sense(ask(model), model, reference)
+            found = self._sense(ask(model), model, reference)
+            return found if tolerance is None else self._refused(found, tolerance)
         for one in LADDER:
             if one == self.reference:
                 break
             if one.contact == "patch" and self.ball is None:
                 continue
             found = self._sense(ask(one), one, reference)
-            if found.error is not None and abs(found.error) <= tolerance:
+            if found.error is not None and abs(found.error) <= (tolerance or TOLERANCE):
                 return found
         return self._sense(reference, self.reference, reference)
 
@@ -143,6 +149,14 @@ class Sheet:
         if model.contact == "point" and self.ball is not None:
             dropped.append("the width of the contact")
         return Sense(value, model, reference, error, tuple(dropped), ())
+
+    def _refused(self, found: Sense, tolerance: float) -> Sense:
+        if isinstance(found.value, NoSolution) or (found.error is not None and abs(found.error) <= tolerance):
+            return found
+        off = "has an answer" if found.error is None else f"is off by {100 * found.error:+.0f} %"
+        other = found.reference if isinstance(found.reference, NoSolution) else f"take '{self.reference}'"
+        reason = f"'{found.model}' {off}, {100 * tolerance:g} % are asked for; {other}"
+        return dataclasses.replace(found, value=NoSolution(reason))
 
     def _noted(self, found: Sense, force_n: float | None) -> Sense:
         notes = []
