@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from cobs import cobs
+from shadows import zones_by_image_tools
 
 from contactfpga import protocol
 from contactfpga.derived import Derived
@@ -245,7 +246,8 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
     """Whether a frame tells of these cells what it should."""
     if skin.report == "cells":
         return np.array_equal(frame.bitmap, cells)
-    zones = golden.zones(cells, skin.connectivity)
+    exact = skin.labeller in ("run", "serial")
+    zones = golden.zones(cells, skin.connectivity) if exact else sorted(zones_by_image_tools(cells, skin.labeller))
     carried = sorted(map(tuple, frame.moments.tolist()))
     if (frame.cells, frame.zones) != (cells.sum(), len(zones)):
         return False

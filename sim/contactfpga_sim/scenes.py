@@ -49,11 +49,11 @@ class Scene:
         return truth_of(parts, Box() if skin is None else sheet(skin))
 
     def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed at that time; no cover given: those that lie under a
-        contact. ``skin.mask`` plays no part, it is the gateware's."""
+        """(rows, columns) bool: the switches that are closed at that time. ``cover``: in the place of the Skin's; where
+        there is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
         x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
         y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
-        return (cover or Cover()).closed(self.loads(seconds), x, y[:, None])
+        return (cover or skin.cover or Cover()).closed(self.loads(seconds), x, y[:, None])
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
         """:meth:`pressed` on this sheet as a function of time."""
