@@ -85,6 +85,33 @@ def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property,
     record_property("cases", 10 * cycles)
 
 
+def crowds(skin: Skin, cycles: int, seed: int) -> Timeline:
+    """As many zones as a row can hold in every other row, in some rows or none: what is packed and kept the longest."""
+    rng = np.random.default_rng([seed, 17])
+    dots = np.zeros((skin.rows, skin.columns), bool)
+    dots[::2, ::2] = True
+    pieces, start = [], 0
+    while start < cycles:
+        some = dots & (rng.random((skin.rows, 1)) < rng.random())
+        noise = rng.random(dots.shape) < 0.5
+        pieces.append((start, (dots, np.roll(dots, 1, 0), np.zeros_like(dots), some, noise)[rng.integers(5)], None))
+        start += int(facts(skin).row_clocks * (rng.choice([1, 3, skin.rows // 2, 2 * skin.rows]) + rng.random())) + 1
+    return Timeline(pieces)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"rows": 16, "columns": 16, "connectivity": 4}, {"rows": 20, "columns": 24, "report": "cells"}],
+    ids=lambda fields: f"{fields['rows']}x{fields['columns']}",
+)
+def test_the_shortest_row_time_that_is_accepted_is_enough(fields):
+    needed = Derived(Skin(scan="adaptive", settle_us=200.0, **fields)).min_row_clocks
+    skin = Skin(scan="adaptive", settle_us=(needed - 12) / 12, **fields)
+    assert Derived(skin).row_clocks == needed
+    with Board(skin, (*BOUNDARIES, "driven")) as board:
+        assert sum(play(board, crowds(skin, 40_000, seed), 40_000) for seed in range(6)) > 30_000
+
+
 # ---- how many row times a frame takes
 
 

@@ -16,8 +16,6 @@ from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
 from contactfpga_hdl.timed_debounce import TimedDebounce
 
-SCANNERS = {"raster": Scanner, "adaptive": AdaptiveScanner}
-
 
 class Top(wiring.Component):
     """Row and column pins, UART and ``contact`` pin.
@@ -57,7 +55,7 @@ class Top(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         bit_clocks = Derived(self.skin).bit_clocks
-        m.submodules.scan = scan = SCANNERS[self.skin.scan](self.skin)
+        m.submodules.scan = scan = Scanner(self.skin) if self.skin.scan == "raster" else AdaptiveScanner(self.skin)
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
