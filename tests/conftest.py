@@ -26,7 +26,7 @@ class Source:
         self._not_before = not_before
         self._offering = False
 
-    def drive(self, cycle):
+    def drive(self, cycle, _ctx):
         index = len(self.transfers)
         if not self._offering and index < len(self.items):
             early = self._not_before is not None and cycle < self._not_before[index]
@@ -55,7 +55,7 @@ class Sink:
         self._takes = False
         self._waiting = None
 
-    def drive(self, cycle):
+    def drive(self, cycle, _ctx):
         self._takes = bool(self._ready(cycle))
         return (int(self._takes),)
 
@@ -71,14 +71,14 @@ class Sink:
 
 
 class Drive:
-    """Sets a value to ``schedule(cycle)``."""
+    """Sets a value to ``schedule(cycle)``, or to ``schedule(cycle, seen)`` with what a register holds in that cycle."""
 
-    def __init__(self, target, schedule: Callable[[int], int]):
+    def __init__(self, target, schedule: Callable[..., int], seen=None):
         self.targets, self.watched = [Value.cast(target)], []
-        self._schedule = schedule
+        self._schedule, self._seen = schedule, None if seen is None else Value.cast(seen)
 
-    def drive(self, cycle):
-        return (self._schedule(cycle),)
+    def drive(self, cycle, ctx):
+        return (self._schedule(cycle) if self._seen is None else self._schedule(cycle, ctx.get(self._seen)),)
 
     def note(self, cycle):
         pass
@@ -91,7 +91,7 @@ class Watch:
         self.targets, self.watched = [], [Value.cast(value)]
         self.values = []
 
-    def drive(self, _cycle):
+    def drive(self, _cycle, _ctx):
         return ()
 
     def note(self, _cycle, value):
@@ -141,7 +141,7 @@ class Bench:
         return part
 
     def _drive(self, ctx, cycle):
-        values = [value for part in self._parts for value in part.drive(cycle)]
+        values = [value for part in self._parts for value in part.drive(cycle, ctx)]
         if values != self._driven:
             self._driven = values
             word, offset = 0, 0

@@ -249,7 +249,7 @@ def test_the_slowest_clock_against_its_constraint_counts(tmp_path):
 
 
 def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
-    def tools(folder, board):
+    def tools(folder, board, seed):
         (folder / "contactfpga.bit").write_bytes(b"bits")
         (folder / "report.json").write_text(
             '{"fmax": {"a": {"achieved": 20.0, "constraint": 25.0}}, "utilization": {"TRELLIS_COMB": {"used": 7,'

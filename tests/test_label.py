@@ -12,7 +12,7 @@ from contactfpga.derived import Derived
 from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.label.steps import place_of
 
-pytestmark = pytest.mark.parametrize("labeller", LABELLERS)
+pytestmark = pytest.mark.parametrize("labeller", ["run", "serial"])  # the exact ones
 
 SHAPES = {
     "nested U": "#.#.#.# #.#.#.# #.#.#.# #.###.# #.....# #######",
