@@ -38,6 +38,7 @@ COCOTB = {
     ),
     "serial": Skin(labeller="serial", settle_us=2.5),
 }
+MARKS = {"serial": pytest.mark.campaign}  # what it adds is in the covering set, too
 SIMULATORS = [
     "verilator",
     pytest.param(
@@ -161,7 +162,7 @@ def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
 
 
 @pytest.mark.parametrize("simulator", SIMULATORS)
-@pytest.mark.parametrize("name", COCOTB)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in COCOTB])
 def test_top_through_cocotb(name, simulator):
     skin = COCOTB[name]
     cycles = 30_000
