@@ -51,10 +51,8 @@ def _failed(error: Exception) -> int:
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
-    if (error.name or "").split(".")[0] == "rich":
-        extra = "cli"
-    else:
-        extra = {"build": "boards", "chart": "chart"}.get(command, "sim")
+    by_command = {"build": "boards", "chart": "chart"}.get(command, "sim")
+    extra = {"rich": "cli", "distributed": "cluster"}.get((error.name or "").split(".")[0], by_command)
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
