@@ -13,7 +13,7 @@ from contactfpga_sim.truth import TOUCH_M, Box, truth_of
 CM = 0.01
 
 
-def close(truth, *expected):
+def assert_contacts(truth, *expected):
     """Contacts as (area in mm2, x and y in mm), in their order, to 1e-7 of the area and of 1 mm."""
     assert truth.count == len(expected)
     for contact, (area, x, y) in zip(truth.contacts, expected):
@@ -22,10 +22,10 @@ def close(truth, *expected):
 
 
 def test_one_part_is_its_own_closed_form():
-    close(truth_of([Ellipse(CM, CM)]), (100 * math.pi, 0, 0))
-    close(truth_of([Ellipse(0.02, 0.005, 0.03, -0.01, 0.7)]), (100 * math.pi, 30, -10))
-    close(truth_of([Rectangle(0.02, 0.005, 0.03, -0.01, 0.7)]), (400, 30, -10))
-    close(truth_of([]))
+    assert_contacts(truth_of([Ellipse(CM, CM)]), (100 * math.pi, 0, 0))
+    assert_contacts(truth_of([Ellipse(0.02, 0.005, 0.03, -0.01, 0.7)]), (100 * math.pi, 30, -10))
+    assert_contacts(truth_of([Rectangle(0.02, 0.005, 0.03, -0.01, 0.7)]), (400, 30, -10))
+    assert_contacts(truth_of([]))
 
 
 @pytest.mark.parametrize("make", [Ellipse, Rectangle])
@@ -35,7 +35,7 @@ def test_the_same_part_twice_is_measured_like_one(make, angle):
     part = make(0.02, 0.005, 0.03, -0.01, angle)
     inner = make(0.01, 0.004, 0.03, -0.01, angle)
     for parts in ([part, part], [part, inner], [inner, part]):
-        close(truth_of(parts), (part.area_m2 * 1e6, 30, -10))
+        assert_contacts(truth_of(parts), (part.area_m2 * 1e6, 30, -10))
 
 
 def lens(radius, apart):
@@ -49,7 +49,7 @@ def test_two_discs_that_overlap_are_one(angle, apart):
     x, y = apart * math.cos(angle), apart * math.sin(angle)
     two = [Ellipse(CM, CM), Ellipse(CM, CM, x * 1e-3, y * 1e-3)]
     area = 200 * math.pi - lens(10, apart)
-    close(truth_of(two), (area, x / 2, y / 2))
+    assert_contacts(truth_of(two), (area, x / 2, y / 2))
 
 
 @pytest.mark.parametrize("angle", np.linspace(0, math.pi, 13))
@@ -65,7 +65,7 @@ def test_parts_are_joined_through_others_in_any_order():
     expected = truth_of(chain)
     assert [round(contact.x_mm, 6) for contact in expected.contacts] == [22.5, 200]
     for order in itertools.permutations(chain):
-        close(truth_of(order), *expected.contacts)
+        assert_contacts(truth_of(order), *expected.contacts)
 
 
 def test_contacts_come_by_y_then_x():
@@ -77,21 +77,21 @@ def test_contacts_come_by_y_then_x():
 
 def test_a_ring_has_its_hole():
     bars = [(0.03, 0.005, 0, 0.025), (0.03, 0.005, 0, -0.025), (0.005, 0.03, 0.025, 0), (0.005, 0.03, -0.025, 0)]
-    close(truth_of([Rectangle(*bar) for bar in bars]), (60 * 60 - 40 * 40, 0, 0))
-    close(truth_of([Rectangle(*bar).placed(0.1, 0.2, 0.6) for bar in bars]), (2000, 100, 200))
+    assert_contacts(truth_of([Rectangle(*bar) for bar in bars]), (60 * 60 - 40 * 40, 0, 0))
+    assert_contacts(truth_of([Rectangle(*bar).placed(0.1, 0.2, 0.6) for bar in bars]), (2000, 100, 200))
 
 
 def test_what_lies_beside_the_sheet_does_not_count():
     box = Box(0.0, 0.1, 0.0, 0.1)
     third = 4 * 10 / (3 * math.pi)
-    close(truth_of([Ellipse(CM, CM, 0.0, 0.05)], box), (50 * math.pi, third, 50))
-    close(truth_of([Ellipse(CM, CM, 0.1, 0.1)], box), (25 * math.pi, 100 - third, 100 - third))
-    close(truth_of([Ellipse(CM, CM, -0.02, 0.05), Ellipse(CM, CM, 0.111, 0.05)], box))
-    close(truth_of([Rectangle(0.5, 0.01, 0.05, 0.05)], box), (2000, 50, 50))
+    assert_contacts(truth_of([Ellipse(CM, CM, 0.0, 0.05)], box), (50 * math.pi, third, 50))
+    assert_contacts(truth_of([Ellipse(CM, CM, 0.1, 0.1)], box), (25 * math.pi, 100 - third, 100 - third))
+    assert_contacts(truth_of([Ellipse(CM, CM, -0.02, 0.05), Ellipse(CM, CM, 0.111, 0.05)], box))
+    assert_contacts(truth_of([Rectangle(0.5, 0.01, 0.05, 0.05)], box), (2000, 50, 50))
     # Joined outside of the sheet only: on it they are two.
     fork = [Rectangle(0.02, 0.002, 0.0, 0.04), Rectangle(0.02, 0.002, 0.0, 0.06), Rectangle(0.002, 0.02, -0.01, 0.05)]
     assert truth_of(fork).count == 1
-    close(truth_of(fork, box), (80, 10, 40), (80, 10, 60))
+    assert_contacts(truth_of(fork, box), (80, 10, 40), (80, 10, 60))
 
 
 def random_parts(rng):

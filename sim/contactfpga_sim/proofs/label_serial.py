@@ -11,7 +11,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.label import rows_into
 from contactfpga_sim.proofs.proof import Inside, Proof
-from contactfpga_sim.proofs.zones import OpenRow, next_row
+from contactfpga_sim.proofs.zones import OpenRow, next_row, open_rows_agree
 
 
 def _skin(rows: int, columns: int, connectivity: int) -> Skin:
@@ -97,7 +97,7 @@ def _labeller(proof: Proof, columns: int, connectivity: int, rows: int, claim) -
         claim(ends_now == expected_end)
         _at_rest(proof, dut, inside, open_row)
         proof.lemma(Mux(dut._last, 0, dut._y + 1)[: len(y)] == y)
-    _open_rows(proof, open_row)
+    open_rows_agree(proof, open_row)
     for place in range(dut.derived.open_zones, 2 << len(dut._place)):
         proof.lemma((place < 1 << len(dut._place)) | (inside.word("groups", place) == 0))
     return dut, open_row
@@ -124,21 +124,6 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
     proof.lemma(dut._whole & ~dut._has_run & (dut._group.as_value() == 0))
     started = proof.before(Const(1))  # at power-up it is not known what the memory reads
     proof.lemma(~started | (dut._found.as_value() == 0))
-
-
-def _open_rows(proof: Proof, open_row: OpenRow) -> None:
-    """What the specification's own registers can hold."""
-    columns = range(len(open_row.cells))
-    for x in columns:
-        reach, moments = open_row.reach[x], open_row.moments[x].as_value()
-        proof.lemma((reach & ~open_row.cells) == 0)
-        proof.lemma(reach[x] == open_row.cells[x])
-        proof.lemma(open_row.cells[x] | (reach == 0) & (moments == 0))
-        for j in columns[x + 1 :]:
-            same = (reach == open_row.reach[j]) & (moments == open_row.moments[j].as_value())
-            proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
-        if x:
-            proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:

@@ -15,7 +15,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.label import mask_of_first_cluster, rows_into, skin_of
 from contactfpga_sim.proofs.proof import Inside, Proof
-from contactfpga_sim.proofs.zones import OpenRow, flood_fill, next_row
+from contactfpga_sim.proofs.zones import OpenRow, flood_fill, next_row, open_rows_agree
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
@@ -96,16 +96,7 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
     proof.lemma(mask_of_first_cluster(inside.part("walk")))
     with m.If(~inside.part("walk")._inside[0]):
         proof.lemma(inside["walk.opens"])
-    for x in columns:
-        reach, moments = open_row.reach[x], open_row.moments[x].as_value()
-        proof.lemma((reach & ~open_row.cells) == 0)
-        proof.lemma(reach[x] == open_row.cells[x])
-        proof.lemma(open_row.cells[x] | (reach == 0) & (moments == 0))
-        for j in columns[x + 1 :]:
-            same = (reach == open_row.reach[j]) & (moments == open_row.moments[j].as_value())
-            proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
-        if x:
-            proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
+    open_rows_agree(proof, open_row)
 
 
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:

@@ -8,6 +8,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 
 from contactfpga.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
+from contactfpga_sim.proofs.proof import Proof
 
 FIELDS = ("area", "sum_x", "sum_y")
 
@@ -106,3 +107,18 @@ def flood_fill(m: Module, derived: Derived, frame, wanted):
         first = frame[i] & ~zone[:i].any() if i else frame[i]
         count += first & (moments.as_value() == wanted.as_value())
     return count
+
+
+def open_rows_agree(proof: Proof, open_row: OpenRow) -> None:
+    """Lemmas: what the registers of an :class:`OpenRow` can hold."""
+    columns = range(len(open_row.cells))
+    for x in columns:
+        reach, moments = open_row.reach[x], open_row.moments[x].as_value()
+        proof.lemma((reach & ~open_row.cells) == 0)
+        proof.lemma(reach[x] == open_row.cells[x])
+        proof.lemma(open_row.cells[x] | (reach == 0) & (moments == 0))
+        for j in columns[x + 1 :]:
+            same = (reach == open_row.reach[j]) & (moments == open_row.moments[j].as_value())
+            proof.lemma((reach[j] == open_row.reach[j][x]) & (~reach[j] | same))
+        if x:
+            proof.lemma(~(open_row.cells[x] & open_row.cells[x - 1]) | reach[x - 1])
