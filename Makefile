@@ -70,8 +70,8 @@ constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
 	$(PY) -m contactfpga_sim.figures README.md docs/use.md
 
-sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (a quarter of an hour)
-	$(PY) -m contactfpga_sim.size_tables docs/boards.md
+sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
+	$(PY) -m contactfpga_sim.size_tables README.md docs/boards.md
 
 chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
 	$(VENV)/bin/contactfpga chart $(ARGS)

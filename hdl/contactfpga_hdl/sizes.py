@@ -58,7 +58,7 @@ DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
     "labeller `run`": RunLabeller,
     "labeller `serial`": SerialLabeller,
 }
-SEEDS = 3
+SEEDS = 5
 LIMIT_S = 200
 """For some seeds the router goes on for ever: they are passed over. Runs that end take up to a minute of the
 processor's time, which is what counts where the system can limit it: a busy machine passes over the same seeds."""

@@ -1,6 +1,6 @@
 """Measures by place and route what README and boards page state of size and clock, and writes it there.
 
-`make sizes` runs it: some fifty runs of place and route, a quarter of an hour.
+`make sizes` runs it: some 160 runs of place and route, an hour and more of one core unless they are kept from before.
 """
 
 from __future__ import annotations
