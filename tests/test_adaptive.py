@@ -15,8 +15,8 @@ from contactfpga_sim import bench_amaranth, bench_native
 from contactfpga_sim.board import Board
 from contactfpga_sim.compare import compare
 from contactfpga_sim.covering import ADAPTIVE, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import BOUNDARIES, Timeline, predict, seek
-from contactfpga_sim.golden.adaptive import Scanner, driven
+from contactfpga_sim.golden import BOUNDARIES, Timeline, driven, predict, seek
+from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
 
 COVERING = pairwise(ADAPTIVE)
@@ -44,10 +44,7 @@ def play(board: Board, timeline: Timeline, cycles: int) -> int:
     bench_native.play(board, timeline, cycles)
     events = {name: board.take(name) for name in (*BOUNDARIES, "driven")}
     count = compare(predict(board.skin, timeline, cycles), bench_native.trace(events, cycles))
-    scanner = Scanner(facts(board.skin), timeline, [])
-    while not scanner.slots or scanner.slots[-1].end < cycles:
-        scanner.frame()
-    wanted = [change for change in driven(facts(board.skin), scanner.slots) if change[0] < cycles]
+    wanted = driven(board.skin, timeline, cycles)
     assert list(zip(events["driven"]["cycle"].tolist(), events["driven"]["data"].tolist())) == wanted
     return count + len(wanted)
 

@@ -37,6 +37,19 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     return trace.until(cycles)
 
 
+def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
+    """(cycle, rows) of every change of the rows that are driven in cycles 0 to ``cycles`` - 1; bit r is row r."""
+    known = facts(skin)
+    if known.adaptive:
+        scanner = adaptive.Scanner(known, timeline, [])
+        while not scanner.slots or scanner.slots[-1].end < cycles:
+            scanner.frame()
+        changes = adaptive.driven(known, scanner.slots)
+    else:
+        changes = scan.driven(known, cycles)
+    return [change for change in changes if change[0] < cycles]
+
+
 Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
 """Frames, their cells as they count once debounced, and changes of the contact pin."""
 
