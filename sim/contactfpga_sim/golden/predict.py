@@ -50,6 +50,18 @@ def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]
     return [change for change in changes if change[0] < cycles]
 
 
+def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
+    """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
+    known = facts(skin)
+    if not known.adaptive:
+        return [known.row_shift + number * known.scan_clocks for number in range(cycles // known.scan_clocks + 2)]
+    scanner, found = adaptive.Scanner(known, timeline, []), [0]
+    while found[-1] <= cycles:
+        scanner.frame()
+        found.append(scanner.slots[-1].end)
+    return found
+
+
 Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
 """Frames, their cells as they count once debounced, and changes of the contact pin."""
 
