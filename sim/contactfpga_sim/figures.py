@@ -155,12 +155,21 @@ def labeller_row(labeller: str, size: int, connectivity: int) -> str:
     """One row of :func:`labeller_table`."""
     skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
     touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
-    shapes = np.stack([cells for _, cells in variants(size, size)])
-    with LabelBench(skin) as bench:
-        clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
+    clocks = [last_record_clocks(skin, touches), worst_last_record_clocks(skin)]
     more = math.ceil(size / 2) if connectivity == 8 else size
     bound = more + 4 if labeller == "run" else size + more + 1
     return f"| `{labeller}` | {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |"
+
+
+def worst_last_record_clocks(skin: Skin) -> int:
+    """Clocks from the last row to the last record, at most, over the shapes that break labellers."""
+    return last_record_clocks(skin, np.stack([cells for _, cells in variants(skin.rows, skin.columns)]))
+
+
+def last_record_clocks(skin: Skin, frames: np.ndarray) -> int:
+    """The same over (n, R, C) bool frames."""
+    with LabelBench(skin) as bench:
+        return int(bench.run(frames).last_record_clocks.max())
 
 
 def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
