@@ -93,12 +93,9 @@ REFUSED = [
     # adaptive scan
     ({"scan": "adaptive", "rows": 1}, "rows is 1; it must lie between 2 and 64 with scan = 'adaptive'"),
     (
-        {"scan": "adaptive", "row_drive": "74hc595"},
-        "row_drive is '74hc595'; scan = 'adaptive' needs row_drive = 'direct'",
-    ),
-    (
         {"scan": "adaptive", "column_read": "74hc165"},
-        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct'",
+        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct', as it looks at the columns of an "
+        "untouched sheet in each clock",
     ),
     (
         {"scan": "adaptive", "settle_us": 2.0},

@@ -46,9 +46,11 @@ class Derived:
 
     @property
     def release_clocks(self) -> int:
-        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched or chosen."""
+        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched, or chosen and
+        then shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
-        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks, self.choice_clocks)
+        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
+        return max(self.clocks(self.skin.release_us), column, row)
 
     @property
     def row_clocks(self) -> int:

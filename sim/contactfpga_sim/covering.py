@@ -35,11 +35,9 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("adaptive",),
     "sheet": ((2, 1), (2, 9), (9, 1), (5, 7), (12, 4), (16, 16), (33, 3)),
-    "row_chains": (0,),
     "column_chains": (0,),
-    "shift_hz": (8_000_000,),
 }
-"""The same for the adaptive scan, which takes rows and columns on pins of their own only."""
+"""The same for the adaptive scan, which takes columns on pins of their own only."""
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:

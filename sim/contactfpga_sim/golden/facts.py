@@ -109,7 +109,8 @@ class Facts:
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
-        return max(asked, self.load + self.column_shift, latch, self.choice)
+        chosen = self.choice + self.row_shift if self.adaptive else 0
+        return max(asked, self.load + self.column_shift, latch, chosen)
 
     @functools.cached_property
     def settle(self) -> int:

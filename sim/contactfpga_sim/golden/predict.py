@@ -55,7 +55,7 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
     known = facts(skin)
     if not known.adaptive:
         return [known.row_shift + number * known.scan_clocks for number in range(cycles // known.scan_clocks + 2)]
-    scanner, found = adaptive.Scanner(known, timeline, []), [0]
+    scanner, found = adaptive.Scanner(known, timeline, []), [known.row_shift]
     while found[-1] <= cycles:
         scanner.frame()
         found.append(scanner.slots[-1].end)
