@@ -189,7 +189,7 @@ class _Collector:
                 continue
             plain = protocol.unseal(bytes(self._packet))
             self._packet.clear()
-            if protocol.kind_of(plain) == protocol.KIND_ZONES:
+            if protocol.kind_of(plain) != protocol.KIND_HELLO:
                 yield from self._place(protocol.decode_frame(plain, self._derived), cycle)
 
     def _note_times(self, events: _Events) -> None:

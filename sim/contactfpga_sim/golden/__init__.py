@@ -5,7 +5,7 @@ declared fields of a Skin.
 """
 
 from contactfpga_sim.golden.predict import predict
-from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
+from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
 from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
 from contactfpga_sim.golden.zones import zones
 
@@ -15,6 +15,7 @@ __all__ = [
     "Timeline",
     "Trace",
     "all_departures",
+    "boundaries",
     "last_record_clocks",
     "predict",
     "row_clocks",
