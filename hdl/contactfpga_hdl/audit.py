@@ -6,7 +6,14 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_hdl.payloads import item_layout, moments_layout, passed_layout, record_layout, row_layout, summary_layout
+from contactfpga_hdl.payloads import (
+    item_layout,
+    moments_layout,
+    passed_layout,
+    record_layout,
+    row_layout,
+    summary_layout,
+)
 from contactfpga_hdl.tally import Change, Tally
 
 

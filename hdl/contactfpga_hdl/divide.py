@@ -1,9 +1,12 @@
 """Barycenters: each zone's sums divided by its area, while later rows arrive and bytes are sent.
 
-x = floor(sum_x 2^k / area + 1/2), k being the Skin's ``barycenter_bits``, and y likewise: the nearest step of 1/2^k of a
-cell. One bit more than that is worked out by restoring division (the school method: shift, subtract where it fits), x
+x = floor(sum_x 2^k / area + 1/2), k being the Skin's ``barycenter_bits``, and y likewise: the nearest step of 1/2^k of
+a cell. One bit more than that is worked out by restoring division (the school method: shift, subtract where it fits), x
 and y side by side; rounding is then adding that bit. A barycenter lies on the sheet, so that all bits of a sum but as
 many as a row or column number has are less than the area, and the division can begin with them as its remainder.
+
+One divider for x and y in turn takes 15 LUT4 less on an iCE40UP5K with 16x16 cells and 4 fraction bits (72, not 87),
+19 with 64x64 (92, not 111), and twice the clocks, in which a dense frame's zones would not be done before the next.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal
@@ -76,8 +79,9 @@ class Divider(wiring.Component):
         quotients = data.StructLayout({"x": bits, "y": bits})
         found = Signal(quotients)  # with the bit that is worked out in this clock
         left = Signal(range(bits + 1))  # bits to come, 0 while no zone is divided
-        area, waiting = Signal(barycenter_layout(self.derived)["area"].shape), Signal(quotients)
-        waits = Signal()
+        waits = Signal()  # an item does, that of these
+        area = Signal(barycenter_layout(self.derived)["area"].shape)
+        waiting = Signal(quotients)
         begins = self.records.valid & ~end & (left == 0)
         free = ~waits | self.items.ready
         last = left == 1
@@ -89,7 +93,9 @@ class Divider(wiring.Component):
         with m.If(steps):
             m.d.sync += left.eq(left - 1)
         with m.If(free):
-            m.d.sync += [waits.eq(last), area.eq(zone.area), waiting.eq(found)]
+            m.d.sync += waits.eq(last)
+        with m.If(last & free):
+            m.d.sync += [area.eq(zone.area), waiting.eq(found)]
         m.d.comb += [
             self.records.ready.eq(Mux(end, ~waits & self.items.ready, last & free)),
             self.items.valid.eq(waits | self.records.valid & end),
@@ -104,12 +110,13 @@ class Divider(wiring.Component):
         # Kept inverted, so that adding the area subtracts it and no carry is left where it fits.
         remainder = Signal(self.derived.area_bits, name=f"{name}_remainder")
         bits = Signal(self.derived.quotient_bits, name=f"{name}_bits")  # of the sum, and from below of the quotient
+        begun = Signal.like(remainder, name=f"{name}_begun")  # as wide as that, before it is inverted
         shifted = Cat(~bits[-1], remainder)
         less = Signal(len(shifted) + 1, name=f"{name}_less")
         fits = ~less[-1]
-        m.d.comb += less.eq(shifted + area)
+        m.d.comb += [begun.eq(total >> whole), less.eq(shifted + area)]
         with m.If(begins):
-            m.d.sync += [remainder.eq(~(total >> whole)), bits.eq(total[:whole] << len(bits) - whole)]
+            m.d.sync += [remainder.eq(~begun), bits.eq(total[:whole] << len(bits) - whole)]
         with m.If(steps):
             m.d.sync += [remainder.eq(Mux(fits, less, shifted)), bits.eq(Cat(fits, bits))]
         return Cat(fits, bits)

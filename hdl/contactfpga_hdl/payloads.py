@@ -11,7 +11,7 @@ def row_layout(derived: Derived) -> data.StructLayout:
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:
-    """Exact moments of a set of cells; with ``report = "moments"`` these bits, lowest first, are a record on the wire."""
+    """Exact moments of a set of cells; with ``report = "moments"`` as bits, lowest first, a zone record on the wire."""
     return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
 
 

@@ -295,9 +295,7 @@ def _check_sums(frame: Frame, derived: Derived) -> None:
             inside = all(x <= most_x << bits and y <= most_y << bits for x, y in zip(x, y))
         carried = sum(area)
         possible = (
-            all(area)
-            and inside
-            and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
+            all(area) and inside and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
         )
     if not possible or frame.cells > derived.cells:
         raise PacketError("content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be")

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     import argparse
 
 BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact", "driven", "received")
-"""What a board notes: transfers of rows, zone records, what these become when they are divided, and bytes, changes of the transmit and of the contact pin and
-of the rows that are driven, and bytes decoded from the line. The order is that of the driver."""
+"""What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
+the transmit and of the contact pin and of the rows that are driven, and bytes decoded from the line. The order is that
+of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
