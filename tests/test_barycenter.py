@@ -17,8 +17,11 @@ from contactfpga import Skin, cli
 from contactfpga.derived import Derived
 from contactfpga.zone import Zones
 from contactfpga_hdl.top import Top
-from contactfpga_sim import replay
+from contactfpga_sim import bench_native, replay
 from contactfpga_sim.chart import errors, speed
+from contactfpga_sim.compare import compare
+from contactfpga_sim.covering import stimulus
+from contactfpga_sim.golden import Timeline, predict
 from contactfpga_sim.shapes import variants
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
@@ -120,6 +123,14 @@ def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
         assert abs(zone.y_mm - y * 5.0) <= zones.rounding_mm[1] + 1e-9
 
 
+def test_the_compiled_board_is_the_golden_models_in_every_clock():
+    cycles = 40 * SHEET.rows * Derived(SHEET).row_clocks
+    timeline = stimulus(SHEET, cycles, seed=6)
+    expected = predict(SHEET, timeline, cycles)
+    assert len(expected.items) > 100
+    assert compare(expected, bench_native.run(SHEET, timeline, cycles)) > 1_000
+
+
 def test_a_skin_with_other_fraction_bits_is_another_one(scene):
     skin, frames, _ = scene
     port = f"sim://?scene={frames}&skin={skin}"
@@ -214,8 +225,6 @@ def test_the_clocks_that_division_adds_to_the_last_byte(row, added):
 
 
 def test_an_untouched_sheets_frames_are_not_later():
-    from contactfpga_sim.golden import Timeline, predict
-
     byte_cycles = [
         [cycle for cycle, value in predict(Skin(report=report), Timeline([]), 12_000).bytes if value == 0]
         for report in ("moments", "barycenter")

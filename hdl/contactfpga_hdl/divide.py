@@ -5,8 +5,8 @@ a cell. One bit more than that is worked out by restoring division (the school m
 and y side by side; rounding is then adding that bit. A barycenter lies on the sheet, so that all bits of a sum but as
 many as a row or column number has are less than the area, and the division can begin with them as its remainder.
 
-One divider for x and y in turn takes 15 LUT4 less on an iCE40UP5K with 16x16 cells and 4 fraction bits (72, not 87),
-19 with 64x64 (92, not 111), and twice the clocks, in which a dense frame's zones would not be done before the next.
+One divider for x and y in turn takes 18 LUT4 less on an iCE40UP5K with 16x16 cells and 4 fraction bits (71, not 89),
+22 with 64x64 (91, not 113), and twice the clocks, in which a dense frame's zones would not be done before the next.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal
