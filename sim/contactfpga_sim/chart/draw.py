@@ -28,6 +28,7 @@ COLOURS = {
     "projection": "#edae49",
     "single": "#66a182",
     "cells": "#8d6a9f",
+    "barycenter": "#5c4033",
 }
 MARKERS = {5.0: "s", 10.0: "o", 20.0: "^"}
 
@@ -96,7 +97,9 @@ def _label(point: Point) -> str:
 
 def _colour(point: Point) -> str:
     skin = point.task.skin
-    kind = "cells" if skin.report == "cells" else "adaptive" if skin.scan == "adaptive" else skin.labeller
+    if skin.report != "moments":
+        return COLOURS[skin.report]
+    kind = "adaptive" if skin.scan == "adaptive" else skin.labeller
     return COLOURS[kind]
 
 

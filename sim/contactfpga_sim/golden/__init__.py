@@ -5,7 +5,7 @@ declared fields of a Skin.
 """
 
 from contactfpga_sim.golden.predict import beginnings, driven, predict
-from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
+from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
 from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
 from contactfpga_sim.golden.zones import zones
 
@@ -16,6 +16,7 @@ __all__ = [
     "Trace",
     "all_departures",
     "beginnings",
+    "boundaries",
     "driven",
     "last_record_clocks",
     "predict",

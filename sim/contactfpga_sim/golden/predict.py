@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import adaptive, debounce, label, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, divide, label, scan, serial
 from contactfpga_sim.golden.facts import Facts, facts
-from contactfpga_sim.golden.frame import Items, Packer, hello, join
+from contactfpga_sim.golden.frame import Items, Packer, Queue, hello, join
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
 
@@ -26,7 +26,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     link = Link(hello(known), known.bit_clocks)
     for cycle in (0, *(cycle + 1 for cycle in received)):
         link.want_hello(cycle)
-    packer = Packer(known, link)
+    packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
     handed = Labeller(known, trace)
     for one, cells in zip(scanned, counted, strict=True):
         packer.take(handed.take(one, cells))
@@ -104,9 +104,9 @@ class Labeller:
             self._handed = cycle
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
-            if facts.moments:
+            if facts.zones:
                 self._free = cycle + work.busy[row]
-        if facts.moments:
+        if facts.zones:
             records = [(handed[zone.row] + zone.clock, self._record(zone)) for zone in work.departures]
             end = handed[-1] + work.end
         else:
