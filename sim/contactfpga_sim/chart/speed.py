@@ -35,6 +35,8 @@ class Speed:
     worst_us: float
     bound_us: float
     """Median of what no scan that looks at each touched row alone can beat: (A + 1) row times, and the frame's bits."""
+    bytes: float
+    """Median of the frame's bytes on the wire."""
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
@@ -86,10 +88,11 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6
-    found, bounds = [], []
+    found, bounds, sizes = [], [], []
     for number, cells in enumerate(frames):
         clocks, size = touch(skin, cells, number * GOLDEN % 1, check=number < checked)
         rows = int(cells.any(axis=1).sum()) + 1
         found.append(clocks / us)
+        sizes.append(size)
         bounds.append((rows * derived.row_clocks + size * 10 * derived.bit_clocks) / us)
-    return Speed(statistics.median(found), max(found), statistics.median(bounds))
+    return Speed(statistics.median(found), max(found), statistics.median(bounds), statistics.median(sizes))

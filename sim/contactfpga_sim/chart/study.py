@@ -50,6 +50,9 @@ of these pieces against the contacts."""
 Found = dict[str, dict[str, list[float]]]
 """By kind and metric, a value a scene."""
 
+Look = tuple[np.ndarray, list[errors.Blob]]
+"""(R, C) bool, the pressed cells, and what there is to be found."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Point:
@@ -91,7 +94,7 @@ def study(
     return [
         Point(
             task,
-            _intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
+            intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
             Speed(**time.result()),
             sizes_by_skin[task.skin].luts if with_size else None,
             sizes_by_skin[task.skin].fmax_mhz if with_size else None,
@@ -100,7 +103,8 @@ def study(
     ]
 
 
-def _intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+    """By kind and metric, over all pieces."""
     return {
         kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
@@ -110,21 +114,32 @@ def _intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 def accuracy(task: Task, first: int) -> Found:
     """Errors of one piece of a task's placements, by kind and metric."""
 
-    def new() -> dict:
-        found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
+    def new() -> Found:
         last = min(first + PIECE, task.count)
-        for scene in placements(task.family, last - first, task.seed, task.skin, first=first):
-            for kind, values in zip(KINDS, _scene_errors(scene, task.skin), strict=True):
-                for name in METRICS:
-                    found[kind][name].append(float(getattr(values, name)))
-        return found
+        scenes = placements(task.family, last - first, task.seed, task.skin, first=first)
+        return compared((look(scene, 0.0, task.skin) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
 
 
-def _scene_errors(scene: Scene, skin: Skin) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
-    cells = scene.pressed(0.0, skin)
-    there = errors.contacts(scene.truth(0.0, skin))
+def look(scene: Scene, seconds: float, skin: Skin) -> Look:
+    """A scene at an instant."""
+    return scene.pressed(seconds, skin), errors.contacts(scene.truth(seconds, skin))
+
+
+def compared(looks: Iterable[Look], skin: Skin) -> Found:
+    """Errors of a Skin's zones."""
+    found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
+    for cells, there in looks:
+        for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
+            for name in METRICS:
+                found[kind][name].append(float(getattr(values, name)))
+    return found
+
+
+def _scene_errors(
+    cells: np.ndarray, there: list[errors.Blob], skin: Skin
+) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
     exact, found = errors.exact_zones(cells, skin), errors.method_zones(cells, skin)
     return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
 
