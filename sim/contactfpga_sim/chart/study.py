@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from typing import Any
@@ -72,7 +73,7 @@ def study(
     with_size: bool = True,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> list[Point]:
-    """Work out all tasks; ``step(name, number of all)`` is called after each piece.
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece.
 
     What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
     any other with the same interface, a Dask cluster's for instance.
@@ -87,9 +88,10 @@ def study(
         **dict.fromkeys(times, "times"),
         **dict.fromkeys(places, "place and route"),
     }
+    of = Counter(names.values())
     for future in as_completed(names):
         future.result()
-        step(names[future], len(names))
+        step(names[future], of[names[future]])
     sizes_by_skin = {skin: future.result() for skin, future in zip(skins, places, strict=True)}
     return [
         Point(
