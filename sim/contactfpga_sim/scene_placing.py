@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -96,9 +95,8 @@ def distance_mm(one: Shape, other: Shape) -> float:
     return float((-ahead[:, None] - back[None]).max(axis=2).min()) / M
 
 
-@functools.lru_cache(maxsize=256)
 def _reach(shape: Shape) -> np.ndarray:
     """(parts, directions): how far each part reaches from the origin, in m."""
     angles = np.arange(DIRECTIONS) * (2 * math.pi / DIRECTIONS)
-    turned = [[part.placed(0.0, 0.0, -float(angle)) for angle in angles] for part in shape]
-    return np.array([[part.x_m + part.half_box_m[0] for part in row] for row in turned])
+    along = np.cos(angles), np.sin(angles)
+    return np.array([part.x_m * along[0] + part.y_m * along[1] + part.reach_m(angles) for part in shape])

@@ -29,6 +29,6 @@ def progress() -> Iterator[Callable[[str, int], None]]:
         def step(name: str, of: int) -> None:
             if name not in bars:
                 bars[name] = shown.add_task(name, total=of)
-            shown.advance(bars[name])
+            shown.update(bars[name], advance=1, total=of)
 
         yield step

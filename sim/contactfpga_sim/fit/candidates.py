@@ -27,6 +27,10 @@ SCANS = ("raster", "adaptive")
 PITCHES_MM = (5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
 
 
+SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
+"""Settings of the sheet itself."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Candidate:
     """A Skin to try, or why there is none."""

@@ -21,8 +21,9 @@ from contactfpga_sim.chart import pool
 from contactfpga_sim.fit import show
 from contactfpga_sim.fit.candidates import METHODS, SCANS, Candidate, candidates, pitches_for, size_for
 from contactfpga_sim.fit.goals import Goals
-from contactfpga_sim.fit.search import Fit, Task, fit
+from contactfpga_sim.fit.search import fit
 from contactfpga_sim.fit.sources import default_count, source
+from contactfpga_sim.fit.trial import Fit, Task
 
 
 def main(args: argparse.Namespace) -> int:

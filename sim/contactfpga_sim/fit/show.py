@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from contactfpga_sim.chart.errors import METRICS, Interval
+from contactfpga_sim.fit.cost import DEVICE
 from contactfpga_sim.fit.goals import Measured
-from contactfpga_sim.fit.search import DEVICE, Fit, Trial
 from contactfpga_sim.fit.sources import Recorded
+from contactfpga_sim.fit.trial import Fit, Trial
 
 HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
 """Baud is left out where all have the same."""

@@ -53,6 +53,11 @@ class Source:
         """The scenes with these numbers, below twice ``count``, on a sheet; ``base``: the Skin asked for."""
         return [look(*self.at(skin, base, number), skin) for number in numbers]
 
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+        """(R, C) bool of the same, without what there is to be found."""
+        drawn = (self.at(skin, base, number) for number in numbers)
+        return [scene.pressed(seconds, skin) for scene, seconds in drawn]
+
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
         """A scene, and the instant in s at which it is looked at."""
         raise NotImplementedError
@@ -138,14 +143,13 @@ class Recorded(Source):
         return min(count, len(self.recording.pressed) // 2)
 
     def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
+        judge = skin.replace(connectivity=base.connectivity)
+        return [(cells, errors.exact_zones(cells, judge)) for cells in self.cells(skin, base, numbers, count)]
+
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
         frames = self.recording.pressed
         half = len(frames) // 2
-        found = []
-        for number in numbers:
-            second, index = divmod(number, count)
-            cells = frames[second * half + index * half // count]
-            found.append((cells, errors.exact_zones(cells, skin.replace(connectivity=base.connectivity))))
-        return found
+        return [frames[number // count * half + number % count * half // count] for number in numbers]
 
 
 @functools.lru_cache(maxsize=4)
