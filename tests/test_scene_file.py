@@ -125,7 +125,7 @@ def test_contacts_keep_their_distance(load):
 
 def test_contacts_that_cannot_keep_their_distance_are_refused(load):
     file = load("gap_mm = 300\n" + DISC + "number = 2\n")
-    message = r"contact 1 \(disc\) found no place gap_mm = 300 from the others in 200 tries on a sheet of 200 x 200 mm"
+    message = r"gap_mm is 300; contacts found no places so far apart in 200 tries on a sheet of 200 x 200 mm"
     with pytest.raises(SceneFileError, match=message):
         scene_of(file, 0, SHEETS[0])
 

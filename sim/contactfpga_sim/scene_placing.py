@@ -15,6 +15,9 @@ from contactfpga_sim.scenes import Scene, sheet
 DIRECTIONS = 128
 """In which the distance of two shapes is looked for; it is told short by 0.03 % of their size at most."""
 
+PLACES = 10
+"""Places that are tried for a contact beside others, before the scene is drawn anew."""
+
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     """Scene ``number`` of a file on a sheet, and the instant in s at which it is looked at.
@@ -23,27 +26,31 @@ def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:
     cannot be as far apart as the file asks.
     """
     rng = np.random.default_rng([file.seed, number])
-    placed: list[tuple[Shape, Contact]] = []
-    for index, kind in enumerate(file.kinds, 1):
-        for _ in range(int(rng.integers(kind.number[0], kind.number[1] + 1))):
-            placed.append(_placed(rng, file, kind, skin, placed, f"contact {index} ({kind.shape})"))
-    return Scene(tuple(contact for _, contact in placed)), float(rng.uniform(0, file.seconds))
-
-
-def _placed(
-    rng: Random, file: SceneFile, kind: Kind, skin: Skin, others: list[tuple[Shape, Contact]], name: str
-) -> tuple[Shape, Contact]:
-    """One contact with a distance from the others, and its parts when the scene begins."""
     for _ in range(TRIES):
-        contact = _drawn(rng, file, kind, skin)
-        begin = _start(contact)
-        if file.gap_mm is None or all(distance_mm(begin, other) >= file.gap_mm for other, _ in others):
-            return begin, contact
+        if (contacts := _apart(rng, file, skin)) is not None:
+            return Scene(contacts), float(rng.uniform(0, file.seconds))
     left, right, top, bottom = (end / M for end in sheet(skin))
+    assert file.gap_mm is not None
     raise SceneFileError(
-        f"{name} found no place gap_mm = {file.gap_mm:g} from the others in {TRIES} tries on a sheet of "
+        f"gap_mm is {file.gap_mm:g}; contacts found no places so far apart in {TRIES} tries on a sheet of "
         f"{right - left:g} x {bottom - top:g} mm"
     )
+
+
+def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | None:
+    """All contacts of a scene; None where one was not as far as asked from the others in some tries."""
+    placed: list[tuple[Shape, Contact]] = []
+    for kind in file.kinds:
+        for _ in range(int(rng.integers(kind.number[0], kind.number[1] + 1))):
+            for _ in range(PLACES):
+                contact = _drawn(rng, file, kind, skin)
+                begin = _start(contact)
+                if file.gap_mm is None or all(distance_mm(begin, other) >= file.gap_mm for other, _ in placed):
+                    placed.append((begin, contact))
+                    break
+            else:
+                return None
+    return tuple(contact for _, contact in placed)
 
 
 def _start(contact: Contact) -> Shape:

@@ -105,6 +105,9 @@ def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
 def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[float] | None) -> list[Size]:
     """Pitches (x, y) in mm to try: those asked for, else usual ones with that of the Skin asked for; of a recording
     only its own."""
+    for pitch in asked or ():
+        if not 0 < pitch < math.inf:
+            raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")
     recorded = [one.recording for one in sources if isinstance(one, Recorded)]
     if recorded:
         pitch = recorded[0].pitch_mm or Skin().pitch_x_mm

@@ -31,7 +31,7 @@ def fit(task: Task, tried: Iterable[Candidate], executor: Executor, step: Step =
         return _none(task, sorted(trials, key=lambda one: one.excess), impossible, executor, step)
     passed = cheapest("synthesis", [one for one in trials if not one.refusals], second, executor, step)
     answer, runner_up = passed[0], passed[1] if len(passed) > 1 else None
-    reported = _reported(task, passed[:2], executor, step)
+    reported = _reported(task, passed[:2], executor, step, CHECKED)
     refused = [] if task.quick else [one for one in trials if one.refusals]
     sized = cheapest("synthesis of the refused", refused, lambda _: answer.cost[0], executor, step)
     cheaper = tuple(one for one in sized if one.cost <= answer.cost)
@@ -115,7 +115,7 @@ def _with_host(task: Task, skin: Skin | None, found: Measured) -> Measured:
 
 
 def _reported(
-    task: Task, trials: Sequence[Trial], executor: Executor, step: Step, checked: int = CHECKED
+    task: Task, trials: Sequence[Trial], executor: Executor, step: Step, checked: int
 ) -> tuple[tuple[Measured, ...], ...]:
     """Measured on the other scenes; touches of the first one are checked against the gateware."""
     jobs: dict[Hashable, tuple[Any, ...]] = {}

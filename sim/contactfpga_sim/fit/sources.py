@@ -85,8 +85,8 @@ class BuiltIn(Source):
         rng = np.random.default_rng([self.seed, number])
         by_x, by_y = rng.uniform(-SHIFT_MM, SHIFT_MM, 2)
         # Both sheets begin half a pitch before their first switch.
-        by_x += (base.pitch_x_mm - skin.pitch_x_mm) / -2
-        by_y += (base.pitch_y_mm - skin.pitch_y_mm) / -2
+        by_x += (base.pitch_x_mm - skin.pitch_x_mm) / 2
+        by_y += (base.pitch_y_mm - skin.pitch_y_mm) / 2
         moved = (_moved(contact, float(by_x), float(by_y)) for contact in CONTACTS[self.scene](base).contacts)
         return Scene(tuple(moved)), float(rng.uniform(0, SECONDS))
 
