@@ -442,7 +442,7 @@ def test_the_command_fails_where_nothing_meets_the_limits(file, tmp_path, shortc
     arguments = ["fit", file(BUMPER), "--pitch-mm", "20", "--barycenter-mm", "0.1", "--output", str(output)]
     assert cli.main(arguments) == UNSOLVED
     said = " ".join(capsys.readouterr().out.split())
-    assert "no Skin that was tried meets the limits. The nearest is" in said
+    assert "No Skin that was tried meets the limits. The nearest is" in said
     assert "it misses: barycenter off by" in said
     assert not output.exists()
     assert cli.main([*arguments, "--json"]) == UNSOLVED

@@ -18,15 +18,16 @@ HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "byte
 METRIC_HEADS = ("scenes miscounted", "contacts missed", "barycenter", "area")
 
 
-def rows(fit: Fit) -> list[list[str]]:
+def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
     """The head, and a line for each Skin that is cheaper than the answer, the answer and the runner-up; without an
-    answer for each Skin, the nearest one first."""
+    answer for each Skin, the nearest one first. ``impossible``: at the end those for which there is no Skin."""
     lines = [_row(one, "; ".join(one.refusals)) for one in fit.cheaper]
     if fit.answer:
         lines.append(_row(fit.answer, "the answer"))
     if fit.runner_up:
         lines.append(_row(fit.runner_up, "runner-up"))
-    lines += [_row_of(dict(one.candidate.settings), one.refusals[0]) for one in fit.impossible]
+    if impossible:
+        lines += [_row_of(dict(one.candidate.settings), one.refusals[0]) for one in fit.impossible]
     table = [list(HEADS), *lines]
     place = HEADS.index("baud")
     if len({line[place] for line in lines}) == 1:
@@ -89,16 +90,17 @@ def notes(fit: Fit) -> list[str]:
     """What has to be said of the answer, or of there being none."""
     lines = []
     if fit.answer is None:
-        lines.append("no Skin that was tried meets the limits.")
+        lines.append("No Skin that was tried meets the limits.")
         if fit.cheaper:
             lines.append(f"The nearest is {name(fit.cheaper[0])}; it misses: {'; '.join(fit.cheaper[0].refusals)}")
     if fit.broken:
         lines.append(f"On scenes not used to choose the answer misses its limits: {'; '.join(fit.broken)}")
     elif fit.answer:
         lines.append("On scenes not used to choose the answer meets all limits.")
-    if fit.answer:
-        refused = "left out, as --quick says" if fit.task.quick else f"{len(fit.cheaper)} cheaper ones are refused"
-        lines.append(f"{refused}; {fit.dearer} others cost more.")
+    if fit.answer and fit.task.quick:
+        lines.append(f"{fit.dearer} others were tried; which of the refused ones are cheaper was not looked at.")
+    elif fit.answer:
+        lines.append(f"{len(fit.cheaper)} cheaper ones are refused; {fit.dearer} others cost more.")
     if any(isinstance(source, Recorded) for source in fit.task.sources):
         lines.append(
             "Of a recording nobody knows what touched: its errors are against the connected pieces of its pressed "
