@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga.commands import cover_flags
+from contactfpga.commands import cover_flags, fit_flags
 from contactfpga.errors import ContactFPGAError, MissingExtra
 
 _COMMANDS = {
@@ -22,6 +22,7 @@ _COMMANDS = {
     "replay": "contactfpga_sim.replay",
     "cover": "contactfpga.commands.cover",
     "chart": "contactfpga_sim.chart.command",
+    "fit": "contactfpga_sim.fit.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -51,7 +52,7 @@ def _failed(error: Exception) -> int:
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
-    by_command = {"build": "boards", "chart": "chart"}.get(command, "sim")
+    by_command = {"build": "boards", "chart": "chart", "fit": "chart"}.get(command, "sim")
     extra = {"rich": "cli", "distributed": "cluster"}.get((error.name or "").split(".")[0], by_command)
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
     cover_flags.add(commands.add_parser("cover", help="compute the soft cover: impact, sensitivity, design"))
     _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
+    fit_flags.add(commands.add_parser("fit", help="find the cheapest Skin that is good enough for given scenes"))
     return parser
 
 

@@ -67,7 +67,7 @@ def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scen
         force = rng.uniform(2, 20)
         turned = tuple(part.placed(0.0, 0.0, math.radians(angle)) for part in shape)
         for _ in range(TRIES):
-            x, y = _place(rng, skin, turned)
+            x, y = place(rng, skin, turned)
             if all(math.hypot(x - other_x, y - other_y) >= long + reach + gap_mm for other_x, other_y, reach in placed):
                 placed.append((x, y, long))
                 found.append(Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle, force_n=force))
@@ -79,7 +79,7 @@ def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGE
     """Two round fingers ``gap_mm`` apart between their rims, their line at any angle; 5 to 20 N each."""
     angle = rng.uniform(0, 180)
     loads = (contact.load(0.0) for contact in contacts.pair(gap_mm, radius_mm, 0.0, 0.0, angle))
-    x, y = _place(rng, skin, tuple(part for load in loads if load for part in load.parts))
+    x, y = place(rng, skin, tuple(part for load in loads if load for part in load.parts))
     return Scene(contacts.pair(gap_mm, radius_mm, x, y, angle, force_n=rng.uniform(5, 20)))
 
 
@@ -109,7 +109,7 @@ def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
     radius = rng.uniform(min(10.0, most / 2), most)
     speed = math.exp(rng.uniform(math.log(50), math.log(1000)))
     hertz = (speed if speed_mm_s is None else speed_mm_s) / (2 * math.pi * radius)
-    x, y = _place(rng, skin, contacts.disc(radius + finger))
+    x, y = place(rng, skin, contacts.disc(radius + finger))
     phase = rng.uniform(0, 2 * math.pi)
     around_x, around_y = Swing(x, radius, hertz, phase), Swing(y, radius, hertz, phase - math.pi / 2)
     return Scene((Contact(shape=contacts.disc(finger), x_mm=around_x, y_mm=around_y, force_n=rng.uniform(5, 20)),))
@@ -123,11 +123,11 @@ FAMILIES: dict[str, Callable[..., Scene]] = {
 
 def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values: Any) -> Contact:
     """A contact of this shape, turned, anywhere on the sheet."""
-    x, y = _place(rng, skin, tuple(part.placed(0.0, 0.0, math.radians(angle_deg)) for part in shape))
+    x, y = place(rng, skin, tuple(part.placed(0.0, 0.0, math.radians(angle_deg)) for part in shape))
     return Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle_deg, **values)
 
 
-def _place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
+def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
     """Where in mm the shape's origin lies when the shape is anywhere on the sheet."""
     left, right, top, bottom = sheet(skin)
     boxes = [(part.x_m, part.y_m, *part.half_box_m) for part in shape]

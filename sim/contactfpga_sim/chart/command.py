@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 
-from contactfpga_sim.chart import draw, host, numbers
+from contactfpga_sim.chart import draw, host, numbers, pool
 from contactfpga_sim.chart.methods import METHODS
-from contactfpga_sim.chart.study import Point, Task, study
+from contactfpga_sim.chart.study import Task, study
 from contactfpga_sim.families import FAMILIES
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
@@ -26,8 +25,8 @@ def main(args: argparse.Namespace) -> int:
         for family in args.family or FAMILIES_DRAWN
         for method in args.method or METHODS
     ]
-    with _executor(args) as executor:
-        points = [host.timed(point) for point in _with_progress(tasks, executor, not args.no_size)]
+    with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+        points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step)]
     folder = Path(args.output)
     folder.mkdir(parents=True, exist_ok=True)
     numbers.write(points, folder / "chart.csv")
@@ -41,24 +40,3 @@ def _known(option: str, names: Iterable[str] | None, known: Iterable[str]) -> No
     for name in names or ():
         if name not in known:
             raise ValueError(f"{option} {name!r} is not known; take one of: {'; '.join(known)}")
-
-
-def _executor(args: argparse.Namespace) -> Executor:
-    if args.dask is None:
-        return ProcessPoolExecutor(args.jobs)
-    from distributed import Client
-
-    return Client(args.dask).get_executor()
-
-
-def _with_progress(tasks: list[Task], executor: Executor, with_size: bool) -> list[Point]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns) as progress:
-        bar = progress.add_task("placements")
-
-        def step(name: str, of: int) -> None:
-            progress.update(bar, advance=1, total=of, description=name)
-
-        return study(tasks, executor, with_size, step)

@@ -37,6 +37,8 @@ class Speed:
     worst_us: float
     bound_us: float
     """Median of what no scan that looks at each touched row alone can beat: (A + 1) row times, and the frame's bits."""
+    bytes: float
+    """Median of the frame's bytes on the wire."""
     frame_us: float
     """Once the scene stays as it is, from a frame's first row time to its last byte: median."""
     frames_per_s: float
@@ -85,13 +87,18 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6
-    found, bounds, whole, rates = [], [], [], []
+    found: list[float] = []
+    bounds: list[float] = []
+    sizes: list[float] = []
+    whole: list[float] = []
+    rates: list[float] = []
     for number, cells in enumerate(frames):
         clocks, size = touch(skin, cells, number * GOLDEN % 1, check=number < checked)
         rows = int(cells.any(axis=1).sum()) + 1
         found.append(clocks / us)
+        sizes.append(size)
         bounds.append((rows * derived.row_clocks + size * 10 * derived.bit_clocks) / us)
         if number < STEADY:
             whole.append(steady.frame_clocks(skin, cells, size) / us)
             rates.append(steady.frames_per_second(skin, cells, size))
-    return Speed(statistics.median(found), max(found), *map(statistics.median, (bounds, whole, rates)))
+    return Speed(statistics.median(found), max(found), *map(statistics.median, (bounds, sizes, whole, rates)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from typing import Any
@@ -50,6 +51,9 @@ of these pieces against the contacts."""
 Found = dict[str, dict[str, list[float]]]
 """By kind and metric, a value a scene."""
 
+Look = tuple[np.ndarray, list[errors.Blob]]
+"""(R, C) bool, the pressed cells, and what there is to be found."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Point:
@@ -71,7 +75,7 @@ def study(
     with_size: bool = True,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> list[Point]:
-    """Work out all tasks; ``step(name, number of all)`` is called after each piece.
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece.
 
     What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
     any other with the same interface, a Dask cluster's for instance.
@@ -86,14 +90,15 @@ def study(
         **dict.fromkeys(times, "times"),
         **dict.fromkeys(places, "place and route"),
     }
+    of = Counter(names.values())
     for future in as_completed(names):
         future.result()
-        step(names[future], len(names))
+        step(names[future], of[names[future]])
     sizes_by_skin = {skin: future.result() for skin, future in zip(skins, places, strict=True)}
     return [
         Point(
             task,
-            _intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
+            intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
             Speed(**time.result()),
             sizes_by_skin[task.skin].luts if with_size else None,
             sizes_by_skin[task.skin].fmax_mhz if with_size else None,
@@ -102,7 +107,8 @@ def study(
     ]
 
 
-def _intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+    """By kind and metric, over all pieces."""
     return {
         kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
         for kind in KINDS
@@ -112,21 +118,32 @@ def _intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
 def accuracy(task: Task, first: int) -> Found:
     """Errors of one piece of a task's placements, by kind and metric."""
 
-    def new() -> dict:
-        found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
+    def new() -> Found:
         last = min(first + PIECE, task.count)
-        for scene in placements(task.family, last - first, task.seed, task.skin, first=first):
-            for kind, values in zip(KINDS, _scene_errors(scene, task.skin), strict=True):
-                for name in METRICS:
-                    found[kind][name].append(float(getattr(values, name)))
-        return found
+        scenes = placements(task.family, last - first, task.seed, task.skin, first=first)
+        return compared((look(scene, 0.0, task.skin) for scene in scenes), task.skin)
 
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
 
 
-def _scene_errors(scene: Scene, skin: Skin) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
-    cells = scene.pressed(0.0, skin)
-    there = errors.contacts(scene.truth(0.0, skin))
+def look(scene: Scene, seconds: float, skin: Skin) -> Look:
+    """A scene at an instant."""
+    return scene.pressed(seconds, skin), errors.contacts(scene.truth(seconds, skin))
+
+
+def compared(looks: Iterable[Look], skin: Skin) -> Found:
+    """Errors of a Skin's zones."""
+    found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
+    for cells, there in looks:
+        for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
+            for name in METRICS:
+                found[kind][name].append(float(getattr(values, name)))
+    return found
+
+
+def _scene_errors(
+    cells: np.ndarray, there: list[errors.Blob], skin: Skin
+) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
     exact, found = errors.exact_zones(cells, skin), errors.method_zones(cells, skin)
     return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
 
