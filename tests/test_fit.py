@@ -19,7 +19,7 @@ from contactfpga_hdl import packed, sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim import figures, kept, size
 from contactfpga_sim.chart import pool, speed
-from contactfpga_sim.chart.errors import Interval
+from contactfpga_sim.chart.errors import Interval, interval
 from contactfpga_sim.chart.speed import Speed
 from contactfpga_sim.fit import cost, page, search, sources
 from contactfpga_sim.fit.candidates import METHODS, candidates, pitches_for, size_for
@@ -293,6 +293,13 @@ def test_what_was_never_found_meets_no_limit():
     nothing = Interval(math.nan, math.nan, math.nan, 0)
     assert list(Goals().misses(measured(barycenter_mm=nothing))) == [(math.inf, "finds no contact")]
     assert list(Goals(barycenter_mm=None).misses(measured(barycenter_mm=nothing))) == []
+
+
+def test_a_single_value_tells_nothing_of_the_mean():
+    one = interval([2.5])
+    assert (one.mean, one.low, one.high, one.count) == (2.5, -math.inf, math.inf, 1)
+    words = [words for _, words in Goals().misses(measured(barycenter_mm=one))]
+    assert words == ["barycenter off by 2.5 mm (0 to inf), limit 5 mm: too few scenes to tell"]
 
 
 def test_a_share_that_so_few_scenes_cannot_show_is_refused():

@@ -13,6 +13,7 @@ from typing import Any
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from contactfpga.commands.cover import UNSOLVED
@@ -94,9 +95,9 @@ def _print(found: Fit, output: str | None) -> None:
     console.print(_table(show.rows(found), bold="the answer"))
     console.print(_table(show.reported(found)))
     for line in show.notes(found):
-        console.print(line, highlight=False)
+        console.print(line, highlight=False, markup=False)
     if output and found.answer:
-        console.print(f"Skin: {output}", highlight=False)
+        console.print(f"Skin: {output}", highlight=False, markup=False)
 
 
 def _table(rows: Iterable[Sequence[str]], bold: str | None = None) -> Table:
@@ -106,5 +107,5 @@ def _table(rows: Iterable[Sequence[str]], bold: str | None = None) -> Table:
         last = index == len(head) - 1
         table.add_column(name, justify="left" if index < 2 or last else "right", overflow="fold")
     for line in lines:
-        table.add_row(*line, style="bold" if line[-1] == bold else None)
+        table.add_row(*map(escape, line), style="bold" if line[-1] == bold else None)
     return table
