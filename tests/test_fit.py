@@ -68,7 +68,7 @@ class Shortcuts:
         self.checked.append((skin, checked))
         size = 12 + skin.rows * math.ceil(skin.columns / 8) if skin.report == "cells" else 17
         scan = 6.0 * skin.rows * (0.5 if skin.scan == "adaptive" else 1)
-        return Speed(1.5 * scan + 10 * size / 3, 2 * scan + 10 * size / 3, scan, size)
+        return Speed(1.5 * scan + 10 * size / 3, 2 * scan + 10 * size / 3, scan, size, scan, 1e6 / scan)
 
 
 MEASURE = speed.measure
