@@ -275,7 +275,7 @@ def test_nothing_that_meets_the_limits_gives_the_nearest(file, shortcuts):
 
 def measured(**errors):
     usual = {name: Interval(0.0, 0.0, 0.0, 100) for name in ("miscounted", "missed", "barycenter_mm", "area")}
-    return Measured(usual | errors, Speed(100.0, 200.0, 50.0, 17.0))
+    return Measured(usual | errors, Speed(100.0, 200.0, 50.0, 17.0, 60.0, 1e4))
 
 
 def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_mean():
