@@ -38,6 +38,7 @@ SHEETS = {
     "2x3, cells": {"rows": 2, "columns": 3, "report": "cells"},
     "3x64, cells": {"rows": 3, "columns": 64, "report": "cells"},
 }
+MARKS = dict.fromkeys(("9x9, divided", "16x16, divided"), pytest.mark.campaign)
 
 
 class Chain(wiring.Component):
@@ -107,7 +108,7 @@ def patterns(rng, rows, columns, capacity):
 
 
 @pytest.mark.parametrize("labeller", LABELLERS)
-@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in SHEETS])
 def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name, labeller):
     skin, clocks = shortest({**SHEETS[name], "labeller": labeller})
     frames = patterns(rng, skin.rows, skin.columns, skin.zone_capacity)

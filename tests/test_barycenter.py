@@ -1,5 +1,6 @@
 """Barycenters from the sheet to the host, through the gateware: rounded exactly, and never later than exact moments."""
 
+import contextlib
 import itertools
 import json
 import math
@@ -17,11 +18,12 @@ from contactfpga import Skin, cli
 from contactfpga.derived import Derived
 from contactfpga.zone import Zones
 from contactfpga_hdl.top import Top
-from contactfpga_sim import bench_native, replay
+from contactfpga_sim import bench_amaranth, bench_native, replay
 from contactfpga_sim.chart import errors, speed
 from contactfpga_sim.compare import compare
 from contactfpga_sim.covering import stimulus
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, predict, zones
+from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.shapes import variants
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
@@ -129,6 +131,30 @@ def test_the_compiled_board_is_the_golden_models_in_every_clock():
     expected = predict(SHEET, timeline, cycles)
     assert len(expected.items) > 100
     assert compare(expected, bench_native.run(SHEET, timeline, cycles)) > 1_000
+
+
+@pytest.mark.parametrize(("rows", "columns", "connectivity", "bits"), [(4, 12, 4, 8), (9, 8, 8, 5), (2, 16, 8, 0)])
+@pytest.mark.parametrize("debounce", ["none", "sym_defer_pk"])
+def test_a_frame_full_of_zones_keeps_its_own_time_at_the_shortest_row_time(rows, columns, connectivity, bits, debounce):
+    """Division ends so late that the next frame is nearly over; each trailer must still be its own frame's."""
+    fields = {"rows": rows, "columns": columns, "connectivity": connectivity, "debounce": debounce}
+    fields |= {"report": "barycenter", "barycenter_bits": bits, "debounce_press_us": 0, "debounce_release_us": 0}
+    skin = next(skin for clocks in range(5, 400) if (skin := skin_with_rows_of(clocks, fields)))
+    y, x = np.indices((rows, columns))
+    most = (x % 2 == 0) & (y % 2 == 0) if connectivity == 8 else (x + y) % 2 == 0
+    late, early = most.copy(), most.copy()
+    late[: rows // 2] = early[rows // 2 :] = False
+    frames = [most, late, early, most, ~most, late, late, early, np.zeros_like(most)] * 2
+    cycles = len(frames) * facts(skin).scan_clocks
+    timeline = Timeline.frames(skin, frames)
+    expected = predict(skin, timeline, cycles)
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 300
+    assert len(expected.items) > 6 * len(zones(most, connectivity))
+
+
+def skin_with_rows_of(clocks, fields):
+    with contextlib.suppress(contactfpga.SkinError):
+        return Skin(settle_us=(clocks - 1) / 12, release_us=1 / 12, baud=6_000_000, **fields)
 
 
 def test_a_skin_with_other_fraction_bits_is_another_one(scene):

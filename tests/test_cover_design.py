@@ -155,6 +155,9 @@ def test_latency_of_the_sheet():
     assert latency_s(Skin(baud=1_000_000)) == pytest.approx(192e-6 + 170e-6 + 3e-6, rel=1e-12)
     debounced = Skin(debounce="sym_defer_pk", debounce_press_us=1000.0)
     assert latency_s(debounced) - latency_s(Skin()) == pytest.approx(11 * 96e-6)
+    divided = latency_s(Skin(report="barycenter"))
+    assert divided == pytest.approx(192e-6 + 160 / 3e6 + 10 / 12e6 + 3e-6, rel=1e-12)
+    assert 241.0e-6 < divided < latency_s(Skin())
 
 
 def test_latency_counts_an_adaptive_scan_at_its_longest_and_a_labeller_that_takes_its_time():

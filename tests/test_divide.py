@@ -186,3 +186,15 @@ def test_a_queue_and_a_division_take_their_clocks_before_a_packer_of_any_speed(b
     for begins, ends in zip(offered, taken):
         assert not shown[begins - 1] or takes[begins - 1]
         assert all(shown[begins : ends + 1])
+
+
+def test_an_area_of_0_which_only_a_faulty_labeller_lets_out_takes_the_same_clocks(bench):
+    """The frame says `mismatch`; whatever is sent for its barycenter, the zones behind it are right."""
+    oracle = Oracle(4, 5, 2)
+    dut = Divider(skin_of(4, 5, 2))
+    sim = bench(dut)
+    source = sim.source(dut.records, [oracle.record(0, 3, 2), oracle.record(3, 4, 5), oracle.end])
+    sink = sim.sink(dut.items)
+    sim.run(100, until=lambda: len(sink.transfers) == 3)
+    assert source.transfers[:2] == [oracle.clocks, 2 * oracle.clocks + 1]
+    assert sink.transfers[1][1] == oracle.item(3, 4, 5)[0]

@@ -12,11 +12,11 @@ AROUND_S = 3e-6
 def latency_s(skin: Skin) -> float:
     """A bound in s for one zone: two scans, as a touch may just have missed its row, the bytes, and 3 us.
 
-    An adaptive scan counts at its longest. Debounce adds the time that a press must last, and the serial labeller its
-    clocks after the last row.
+    An adaptive scan counts at its longest. Debounce adds the time that a press must last, the serial labeller its
+    clocks after the last row, and a board that divides those of a division.
     """
     derived = Derived(skin)
-    items = 1 if skin.report == "moments" else derived.max_items
+    items = derived.max_items if skin.report == "cells" else 1
     plain = items * derived.item_bytes + derived.trailer_bytes
     packet = plain + -(-plain // 254) + CHECK_BYTES + 1
     clocks = 2 * derived.max_frame_slots * derived.row_clocks + packet * 10 * derived.bit_clocks
@@ -24,4 +24,6 @@ def latency_s(skin: Skin) -> float:
         clocks += derived.press_scans * derived.frame_clocks
     if skin.labeller == "serial":
         clocks += derived.label_clocks
+    if skin.report == "barycenter":
+        clocks += derived.item_clocks
     return clocks / skin.clock_hz + AROUND_S

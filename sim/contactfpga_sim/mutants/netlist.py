@@ -18,7 +18,7 @@ STAGES = {
     "label": "label",
     "audit": "report",
     "bitmap": "report",
-    "divide": "divide",
+    "divide": "report",
     "link.packer": "pack",
     "link": "link",
     "transmitter": "serial",
