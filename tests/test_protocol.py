@@ -223,7 +223,7 @@ def test_another_version_says_which(version):
     [
         (WIRE.plain_hello()[1:], "length"),
         (WIRE.plain_hello() + last_byte(HELLO), "length"),
-        (WIRE.plain_hello()[:2] + b"\x08" + WIRE.plain_hello()[3:], "content"),
+        (WIRE.plain_hello()[:2] + b"\x10" + WIRE.plain_hello()[3:], "content"),
     ],
 )
 def test_hellos_that_cannot_be(plain, reason):

@@ -26,7 +26,12 @@ FLAG_BITS = len(FLAGS)
 KIND_BITS = 2
 
 _HELLO = struct.Struct("<BBBHfff8s")
-_OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
+_OPTIONS: dict[str, tuple[Any, ...]] = {
+    "connectivity": (8, 4),
+    "report": ("moments", "cells"),
+    "send": ("always", "on_change"),
+    "ghosts": (False, True),
+}
 
 
 class PacketError(ValueError):
@@ -66,6 +71,8 @@ class Hello:
     pitch_y_mm: float
     radius_mm: float | None
     fingerprint: bytes
+    ghosts: bool = False
+    """The sheet has no diodes."""
 
     @classmethod
     def of(cls, skin: Skin) -> Hello:
@@ -82,6 +89,7 @@ class Hello:
         return Skin(
             **{name: getattr(self, name) for name in _FACTS},
             surface="plane" if self.radius_mm is None else "cylinder",
+            diodes="none" if self.ghosts else "col2row",
             **slow,
         )
 

@@ -137,10 +137,11 @@ class Receiver:
                 self.stats.foreign_skin += 1
             return None
         frame = protocol.decode_frame(plain, self._derived)
+        before = self._last
         self._count(frame, self._derived)
         self._time_us = self._unwrap(frame.time_us, now)
         self._last, self._now, self._counting = frame, now, True
-        return Zones(frame, self.skin, self._time_us)
+        return Zones(frame, self.skin, self._time_us, before)
 
     def _foreign(self, error: PacketError) -> VersionMismatch | None:
         self.stats.foreign_version += 1

@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import ghosts
 from contactfpga.protocol import Frame
 from contactfpga.skin import Skin
 
@@ -25,6 +26,7 @@ DTYPE = np.dtype(
         ("y_mm", np.float64),
         ("point_mm", np.float64, 3),
         ("normal", np.float64, 3),
+        ("ghost", np.bool_),
     ]
 )
 """Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
@@ -50,12 +52,14 @@ class Zone:
     """Barycenter in the link's frame in mm; it lies on the surface."""
     normal: Vector
     """Outward unit normal at that point."""
+    ghost: bool = False
+    """On a sheet without diodes: other pressed switches may have made all of it, with nothing pressed here."""
 
 
 class Zones(Sequence[Zone]):
     """The zones of one frame, sorted by y, x and area; not to be changed."""
 
-    def __init__(self, frame: Frame, skin: Skin, time_us: int | None = None):
+    def __init__(self, frame: Frame, skin: Skin, time_us: int | None = None, before: Frame | None = None):
         self.frame = frame
         """The frame as it came over the wire."""
         self.skin = skin
@@ -63,7 +67,11 @@ class Zones(Sequence[Zone]):
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, without the wire's wrap at 2^24 us."""
         self.flags: frozenset[str] = frame.flags
-        """Names from :data:`contactfpga.protocol.FLAGS`."""
+        """Names from :data:`contactfpga.protocol.FLAGS`; and `ghost` where a sheet without diodes may show contacts
+        that are none."""
+        self._before = before
+        if skin.ghosts and (any(self._suspects) if frame.bitmap is None else self._ghost_cells.any()):
+            self.flags |= {"ghost"}
 
     @property
     def sequence(self) -> int:
@@ -95,6 +103,24 @@ class Zones(Sequence[Zone]):
         """(rows, columns) bool with ``report = "cells"``, else None: then the board sends zones only."""
         return self.frame.bitmap
 
+    @property
+    def ghost_cells(self) -> np.ndarray | None:
+        """(rows, columns) bool with ``report = "cells"``, else None: cells that other pressed ones may have made, which
+        takes a sheet without diodes (:mod:`contactfpga.ghosts`)."""
+        return None if self.frame.bitmap is None else self._ghost_cells
+
+    @functools.cached_property
+    def _ghost_cells(self) -> np.ndarray:
+        if not self.skin.ghosts:
+            return np.zeros_like(self.frame.bitmap)
+        return ghosts.cells(self.frame, self._before)
+
+    @functools.cached_property
+    def _suspects(self) -> list[bool]:
+        if not self.skin.ghosts:
+            return [False] * len(self.frame.moments)
+        return ghosts.zones(self.frame, self._before)
+
     @functools.cached_property
     def array(self) -> np.ndarray:
         """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones."""
@@ -105,18 +131,19 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def _zones(self) -> tuple[Zone, ...]:
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
-        zones = [self._zone(*moments) for moments in self.frame.moments.tolist()]
+        both = zip(self.frame.moments.tolist(), self._suspects)
+        zones = [self._zone(area, sum_x, sum_y, ghost) for (area, sum_x, sum_y), ghost in both]
         zones.sort(key=lambda zone: (zone.y_mm, zone.x_mm, zone.area_cells))
         return tuple(zones)
 
-    def _zone(self, area: int, sum_x: int, sum_y: int) -> Zone:
+    def _zone(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
         skin = self.skin
         # Only a frame that is flagged `mismatch` may hold an area of 0.
         x_mm = sum_x / area * skin.pitch_x_mm if area else math.nan
         y_mm = sum_y / area * skin.pitch_y_mm if area else math.nan
         area_mm2 = area * (skin.pitch_x_mm * skin.pitch_y_mm)
         point_mm, normal = on_surface(x_mm, y_mm, skin.radius_mm)
-        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal)
+        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -155,6 +182,8 @@ class Zones(Sequence[Zone]):
         values["zones"] = [dataclasses.asdict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]
+            if self.skin.ghosts:
+                values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
         return values
 
 

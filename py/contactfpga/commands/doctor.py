@@ -133,4 +133,7 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     if zones.stuck:
         yield "fault", f"{zones.stuck} columns read pressed while no row is driven; look for a short circuit there"
     for flag in sorted(zones.flags - {"requested"}):
-        yield "fault", f"the last frame is flagged {flag!r}"
+        if flag == "ghost":
+            yield "note", "the last frame has zones that may be ghosts: the sheet has no diodes"
+        else:
+            yield "fault", f"the last frame is flagged {flag!r}"
