@@ -11,7 +11,11 @@ pressed cannot be told: it may be any of its crossings that join it. So
   if the block has another run of rows and another run of columns. Zones of one run of rows have the same y, others
   never do, as two runs with one middle would overlap; likewise columns and x.
 
-Both hold exactly, in both directions. If a switch changes during the scan, the rows before it do not show it yet, and
+Both hold exactly, in both directions. Zones of one block may also have grown, or have been joined, by ghosts; they are
+found by their common x or y. What cannot be told is a block that is one zone: contacts may hide in it whose rows and
+columns, taken together, have no gap.
+
+If a switch changes during the scan, the rows before it do not show it yet, and
 corners may be hidden in that frame. A row itself is read at once, so that a ghost's own row shows another cell. So in a
 frame that differs from the one received before it all is suspect that may have a neighbour in its row: no ghost is
 missed as long as no switch changes twice between two frames.
@@ -51,8 +55,22 @@ def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
         return [True] * len(moments)
     if before is None or sorted(before.moments.tolist()) != sorted(moments):
         return [len(moments) > 1] * len(moments)
-    xs, ys = (Counter(_reduced(sums[axis], sums[0]) for sums in moments) for axis in (1, 2))
+    xs, ys = _middles(moments)
     return [ys[_reduced(y, area)] > 1 and xs[_reduced(x, area)] > 1 for area, x, y in moments]
+
+
+def spread(frame: Frame, before: Frame | None = None) -> bool:
+    """Whether some zones of such a frame may hold ghosts that pressed switches elsewhere made."""
+    suspects = zones(frame, before)
+    return any(suspects) or (
+        len(suspects) > 1
+        and any(number > 1 for middles in _middles(frame.moments.tolist()) for number in middles.values())
+    )
+
+
+def _middles(moments: list[list[int]]) -> list[Counter[tuple[int, int]]]:
+    """How many zones have each x, and each y."""
+    return [Counter(_reduced(sums[axis], sums[0]) for sums in moments) for axis in (1, 2)]
 
 
 def _reduced(total: int, area: int) -> tuple[int, int]:

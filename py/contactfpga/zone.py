@@ -67,10 +67,10 @@ class Zones(Sequence[Zone]):
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, without the wire's wrap at 2^24 us."""
         self.flags: frozenset[str] = frame.flags
-        """Names from :data:`contactfpga.protocol.FLAGS`; and `ghost` where a sheet without diodes may show contacts
-        that are none."""
+        """Names from :data:`contactfpga.protocol.FLAGS`; and `ghost` where a sheet without diodes may show pressed
+        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to."""
         self._before = before
-        if skin.ghosts and (any(self._suspects) if frame.bitmap is None else self._ghost_cells.any()):
+        if skin.ghosts and (self._ghost_cells.any() if frame.bitmap is not None else ghosts.spread(frame, before)):
             self.flags |= {"ghost"}
 
     @property
