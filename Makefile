@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart formal campaign mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart failures formal campaign mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -75,6 +75,9 @@ sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and c
 
 chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
 	$(VENV)/bin/contactfpga chart $(ARGS)
+
+failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
+	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

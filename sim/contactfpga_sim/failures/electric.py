@@ -53,7 +53,6 @@ SETTLE = Study(
     values=tuple(np.geomspace(10, 10_000, 61).round().tolist()),
     runs={f"pull-up of {ohm / 1000:g} kΩ": functools.partial(_slow, ohm) for ohm in (4700.0, 40_000.0)},
     helps="a smaller pull-up, a longer `release_us` until nothing is stuck; `contactfpga doctor` says it",
-    logarithmic=True,
 )
 
 
@@ -151,14 +150,14 @@ def _scattered(count: float) -> Outcome:
 def _scattered_cells(count: float) -> Outcome:
     """Cells that are read wrong; it is told if each of them is marked."""
     cells = [finger(BARE, *spots) for spots in scattered(int(count))]
-    frames = [(zones.cells, zones.ghost_cells) for zones in _frames(BARE_CELLS, cells)]
-    wrong = [index for index, (read, _) in enumerate(frames) if (read != cells[index]).any()]
-    missed = [index for index in wrong if (frames[index][0] & ~cells[index] & ~frames[index][1]).any()]
+    frames = _frames(BARE_CELLS, cells)
+    read, marked = (np.array([getattr(zones, name) for zones in frames]) for name in ("cells", "ghost_cells"))
+    wrong = np.flatnonzero((read != cells).any(axis=(1, 2)))
+    missed = np.flatnonzero((read & ~np.array(cells) & ~marked).any(axis=(1, 2)))
     shares = [100 * len(some) / len(frames) for some in (wrong, missed)]
     what = f"ghosts at {shares[0]:.0f} % of places, unmarked at {shares[1]:.0f} %"
-    told = () if missed else ("ghost",) * bool(wrong)
-    shown = wrong[0] if wrong else 0
-    return Outcome(not wrong, told, what, len(wrong) / len(frames), cells[shown])
+    told = ("ghost",) if len(wrong) and not len(missed) else ()
+    return Outcome(not len(wrong), told, what, len(wrong) / len(frames), read[wrong[0] if len(wrong) else 0])
 
 
 GHOSTS = Study(

@@ -51,10 +51,8 @@ class Study:
     """What comes out at a value, for each method or setting that is compared."""
     helps: str
     """What to do about it."""
-    format: str = "{:g}"
+    format: str = "{:,g}"
     """How a value is written."""
-    logarithmic: bool = False
-    """How the picture's axis goes."""
 
     def turn(self) -> dict[str, Turned]:
         """Every value, for every method."""

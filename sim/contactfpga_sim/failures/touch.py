@@ -115,7 +115,6 @@ MOVING = Study(
         "`adaptive`": functools.partial(_moving, adaptive_skin(16, 16)),
     },
     helps="1 pitch a scan is 104 m/s on the reference sheet; a shorter row time, `adaptive`",
-    logarithmic=True,
 )
 
 DEBOUNCE_SCANS = 4

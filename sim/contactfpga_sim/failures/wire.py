@@ -10,7 +10,6 @@ import numpy as np
 from contactfpga.commands import doctor
 from contactfpga.derived import Derived
 from contactfpga.driver import Board as Driver
-from contactfpga.errors import ContactFPGAError
 from contactfpga_sim.board import VirtualBoard
 from contactfpga_sim.failures.rig import REFERENCE, Rig, hello_clocks
 from contactfpga_sim.failures.study import Outcome, Study
@@ -67,7 +66,7 @@ BAUD = Study(
     title="Baud rates that differ",
     knob="difference, %",
     amount="share lost",
-    values=tuple(np.arange(0, 8.01, 0.25).round(2).tolist()),
+    values=tuple(np.arange(0, 12.01, 0.25).round(2).tolist()),
     runs={
         "host faster, frames": functools.partial(_baud, 1),
         "host slower, frames": functools.partial(_baud, -1),
@@ -91,7 +90,6 @@ NOISE = Study(
     values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": _noise},
     helps="a shorter cable, a slower `baud`",
-    format="{:,g}",
 )
 
 
@@ -119,7 +117,6 @@ CLOCK = Study(
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
     runs={"board with `clock_hz` off": _clock},
     helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
-    logarithmic=True,
 )
 
 
@@ -173,21 +170,13 @@ def _slow_host(milliseconds: float) -> Outcome:
     transport = SlowHost()
     with Driver(transport) as board:
         board.greet(1.0)
-        sequences: list[int] = []
-        first = board.next().sequence
         times = []
         for _ in range(TURNS):
             transport.work(milliseconds / 1000)
             until = transport.clock() + 0.002
-            try:
-                while transport.clock() < until:
-                    zones = board.next()
-                    times.append(zones.time_us)
-                    sequences.append(zones.sequence)
-            except ContactFPGAError:
-                break
+            while transport.clock() < until:
+                times.append(board.next().time_us)
         stats = board.stats
-    assert first >= 0
     scan_us = Derived(SKIN).frame_clocks / Derived(SKIN).clocks_per_us
     missing = round((times[-1] - times[0]) / scan_us) + 1 - len(times) - stats.overwritten
     told = tuple(name for name in ("lost", "gaps") if getattr(stats, name))
