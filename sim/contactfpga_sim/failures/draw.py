@@ -10,9 +10,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from contactfpga_sim.failures.rig import plural
 from contactfpga_sim.failures.study import Outcome, Study, Turned
 
-COLOURS = {"right": "#4f9d69", "told": "#edae49", "silent": "#d1495b"}
+COLOURS = {"right": "#4f9d69", "warned": "#a9cf6b", "told": "#edae49", "silent": "#d1495b"}
+LEGEND = {
+    "right": "right",
+    "warned": "right, with a warning",
+    "told": "wrong, and the system says so",
+    "silent": "wrong, not noticed",
+}
 LINES = ("#2e4057", "#00798c", "#8d6a9f", "#a05a2c")
 SHEET, PRESSED, CROSS, GREY = "#eef0f3", "#8fbcd4", "#2e4057", "#555b63"
 
@@ -27,7 +34,7 @@ SIDE = 120
 def svg(study: Study, methods: Mapping[str, Turned]) -> str:
     """The whole picture."""
     sheets = _sheets(study, methods)
-    width = LEFT + WIDE + 30 + (len(sheets) and len(sheets) * (SIDE + 20))
+    width = LEFT + WIDE + 60 + (len(sheets) and len(sheets) * (SIDE + 20))
     height = 40 + HIGH + 2 * STRIP + 2 * STRIP * len(methods) + 34
     top = 36
     parts = [
@@ -80,10 +87,10 @@ def _strips(study: Study, methods: Mapping[str, Turned], top: float) -> list[str
     for number, (colour, (method, turned)) in enumerate(zip(LINES, methods.items(), strict=False)):
         y = top + number * 2 * STRIP
         parts.append(_text(LEFT, y + 8, method, f'fill="{colour}"'))
-        for index, verdict in enumerate(turned.verdicts):
+        for index, kind in enumerate(map(_kind, turned.outcomes)):
             parts.append(
-                f'<rect class="{verdict}" x="{LEFT + index * step:.1f}" y="{y + 12}" width="{max(1.0, step - 1):.1f}" '
-                f'height="{STRIP - 8}" fill="{COLOURS[verdict]}"/>'
+                f'<rect class="{kind}" x="{LEFT + index * step:.1f}" y="{y + 12}" width="{max(1.0, step - 1):.1f}" '
+                f'height="{STRIP - 8}" fill="{COLOURS[kind]}"/>'
             )
     y = top + len(methods) * 2 * STRIP
     every = max(1, -(-len(study.values) // 9))
@@ -95,15 +102,13 @@ def _strips(study: Study, methods: Mapping[str, Turned], top: float) -> list[str
 
 def _legend(y: float) -> list[str]:
     parts = []
-    for number, (verdict, words) in enumerate(
-        {"right": "right", "told": "wrong, and the system says so", "silent": "wrong, not noticed"}.items()
-    ):
-        x = LEFT + (0, 60, 250)[number]
-        parts += [
-            f'<rect x="{x}" y="{y - 9}" width="10" height="10" fill="{COLOURS[verdict]}"/>',
-            _text(x + 14, y, words),
-        ]
+    for x, (kind, words) in zip((LEFT, LEFT + 55, LEFT + 190, LEFT + 370), LEGEND.items(), strict=True):
+        parts += [f'<rect x="{x}" y="{y - 9}" width="10" height="10" fill="{COLOURS[kind]}"/>', _text(x + 14, y, words)]
     return parts
+
+
+def _kind(outcome: Outcome) -> str:
+    return "warned" if outcome.right and outcome.told else outcome.verdict
 
 
 def _sheets(study: Study, methods: Mapping[str, Turned]) -> list[tuple[str, Outcome]]:
@@ -135,10 +140,11 @@ def _sheet(left: float, top: float, caption: str, outcome: Outcome) -> list[str]
         f'<rect x="{left}" y="{top}" width="{columns * cell:.1f}" height="{rows * cell:.1f}" fill="{SHEET}"/>',
         f'<path d="{squares}" fill="{PRESSED}"/>',
         f'<path d="{crosses}" stroke="{CROSS}" stroke-width="1.6" fill="none"/>',
-        f'<circle cx="{left + 5}" cy="{top + SIDE + 12}" r="4" fill="{COLOURS[outcome.verdict]}"/>',
-        _text(left + 13, top + SIDE + 16, _short(outcome.what)),
+        f'<circle cx="{left + 5}" cy="{top + SIDE + 12}" r="4" fill="{COLOURS[_kind(outcome)]}"/>',
+        _text(left + 13, top + SIDE + 16, _found(outcome)),
     ]
 
 
-def _short(words: str) -> str:
-    return words if len(words) <= 24 else words[:23] + "…"
+def _found(outcome: Outcome) -> str:
+    assert outcome.cells is not None
+    return plural(len(outcome.zones), "zone") if outcome.zones else plural(int(outcome.cells.sum()), "cell")

@@ -33,13 +33,14 @@ def _judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: s
 
 # ---- settle time
 
+LAZY = REFERENCE.replace(release_us=40.0)
 
-def _slow(pull_ohm: float, picofarad: float) -> Outcome:
-    skin = REFERENCE
+
+def _slow(skin: Skin, pull_ohm: float, path_ohm: float, picofarad: float) -> Outcome:
     spots = [(3, 4), (9, 10)]
     cells = finger(skin, *spots)
     with Rig(skin) as rig:
-        rig.board.settle(Line(picofarad * 1e-12, pull_ohm))
+        rig.board.settle(Line(picofarad * 1e-12, pull_ohm, path_ohm))
         rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
         zones = rig.frames()[-1]
     return _judged(zones, cells, [finger(skin, spot) for spot in spots])
@@ -47,12 +48,16 @@ def _slow(pull_ohm: float, picofarad: float) -> Outcome:
 
 SETTLE = Study(
     name="settle",
-    title="Columns slower than `settle_us = 5.0` and `release_us = 1.0`",
+    title="Columns slower than `settle_us = 5`",
     knob="capacitance of a column, pF",
     amount="cells that read pressed",
     values=tuple(np.geomspace(10, 10_000, 61).round().tolist()),
-    runs={f"pull-up of {ohm / 1000:g} kΩ": functools.partial(_slow, ohm) for ohm in (4700.0, 40_000.0)},
-    helps="a smaller pull-up, a longer `release_us` until nothing is stuck; `contactfpga doctor` says it",
+    runs={
+        "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, 4700.0, 50.0),
+        "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, 40_000.0, 50.0),
+        "4.7 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(_slow, LAZY, 4700.0, 2000.0),
+    },
+    helps="smaller resistances; a `release_us` and `settle_us` twice what makes `stuck` go",
 )
 
 

@@ -46,7 +46,8 @@ def says(study: Study, turned: Turned) -> str:
     parts = [", ".join(f"`{word}`" for word in told) if told else "**not noticed**"]
     if turned.warns_at is not None:
         words = ", ".join(f"`{word}`" for word in turned.outcomes[turned.values.index(turned.warns_at)].told)
-        parts.append(f"{words} from {study.format.format(turned.warns_at)} on")
+        since = f"from {study.format.format(turned.warns_at)} on"
+        parts = [f"{parts[0]}, {since}"] if words == parts[0] else [*parts, f"{words} {since}"]
     if told and turned.silent_at is not None:
         parts.append(f"**not noticed** at {study.format.format(turned.silent_at)}")
     if not told and (later := [value for value, one in zip(turned.values, turned.outcomes) if one.verdict == "told"]):
@@ -58,5 +59,5 @@ def says(study: Study, turned: Turned) -> str:
 def pictures() -> str:
     """A heading and a picture for each study."""
     return "\n".join(
-        f"({study.name})=\n![{study.title}](images/failures/{study.name}.svg)\n" for study in STUDIES.values()
+        f"({study.name})=\n\n![{study.title}](images/failures/{study.name}.svg)\n" for study in STUDIES.values()
     )

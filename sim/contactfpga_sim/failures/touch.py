@@ -41,7 +41,7 @@ def _closing(skin: Skin, pitch_mm: float, gap_mm: float) -> Outcome:
     return Outcome(
         right=not wrong,
         told=tuple({fault for index in wrong for fault in faults(frames[index])}),
-        what=f"one zone of two contacts at {len(wrong)} of {PLACES} places",
+        what=f"1 zone of 2 contacts at {len(wrong)} of {PLACES} places",
         amount=1 - len(wrong) / PLACES,
         cells=cells[shown],
         zones=places(frames[shown]),
