@@ -213,6 +213,15 @@ def test_three_corners_make_four_zones_all_of_them_suspect(turned):
     assert counts == [(4, ()), (8, ("ghost",)), (16, ("ghost",)), (16, ("ghost",))]
 
 
+def test_zones_of_a_sheet_without_diodes_pass_unflagged_as_rarely_as_the_page_says(turned):
+    """One placement of 60, with eight fingers."""
+    shares = [outcome.what.rpartition("at ")[2] for outcome in turned["ghosts"]["zones, random places"].outcomes]
+    assert shares == ["0 %"] * 7 + ["2 %"]
+    assert len(electric.scattered(8)) == 60
+    marked = [outcome.what.rpartition("at ")[2] for outcome in turned["ghosts"]["cells, random places"].outcomes]
+    assert set(marked) == {"0 %"}
+
+
 def test_moving_fingers_are_off_by_what_they_move_until_their_row_is_read(turned):
     """A zone is off by at most one scan's motion and what a disc of this size is off at rest."""
     for values in turned["moving"].values():
