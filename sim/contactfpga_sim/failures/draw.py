@@ -33,8 +33,8 @@ SIDE = 120
 
 def svg(study: Study, methods: Mapping[str, Turned]) -> str:
     """The whole picture."""
-    sheets = _sheets(study, methods)
-    width = LEFT + WIDE + 60 + (len(sheets) and len(sheets) * (SIDE + 20))
+    method, sheets = _sheets(study, methods)
+    width = LEFT + WIDE + 60 + max(50, len(sheets) * (SIDE + 20))
     height = 40 + HIGH + 2 * STRIP + 2 * STRIP * len(methods) + 34
     top = 36
     parts = [
@@ -47,8 +47,9 @@ def svg(study: Study, methods: Mapping[str, Turned]) -> str:
         _text(LEFT, height - 26, f"turned: {study.knob}", f'fill="{GREY}"'),
         *_legend(height - 8),
     ]
+    parts.append(_text(LEFT + WIDE + 30, top - 4, method))
     for number, (caption, outcome) in enumerate(sheets):
-        parts += _sheet(LEFT + WIDE + 30 + number * (SIDE + 20), top + 10, caption, outcome)
+        parts += _sheet(LEFT + WIDE + 30 + number * (SIDE + 20), top + 14, caption, outcome)
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
@@ -67,7 +68,7 @@ def _chart(study: Study, methods: Mapping[str, Turned], top: float) -> list[str]
     parts = [
         f'<rect x="{LEFT}" y="{top}" width="{WIDE}" height="{HIGH}" fill="none" stroke="#c9ced6"/>',
         _text(LEFT + 4, top + 12, study.amount, f'fill="{GREY}"'),
-        _text(LEFT - 4, top + 8, f"{high:.3g}", f'fill="{GREY}" text-anchor="end"'),
+        _text(LEFT - 4, top + 8, f"{high:,.4g}", f'fill="{GREY}" text-anchor="end"'),
         _text(LEFT - 4, top + HIGH, "0", f'fill="{GREY}" text-anchor="end"'),
     ]
     for colour, turned in zip(LINES, methods.values(), strict=False):
@@ -111,17 +112,14 @@ def _kind(outcome: Outcome) -> str:
     return "warned" if outcome.right and outcome.told else outcome.verdict
 
 
-def _sheets(study: Study, methods: Mapping[str, Turned]) -> list[tuple[str, Outcome]]:
-    """The last value that is right and the first that is not, of the first method that gets from one to the other."""
+def _sheets(study: Study, methods: Mapping[str, Turned]) -> tuple[str, list[tuple[str, Outcome]]]:
+    """The first method that gets from right to wrong, and what came out at the two values between which it does."""
     for method, turned in methods.items():
         if turned.broken is None or not turned.broken or turned.outcomes[turned.broken].cells is None:
             continue
-        name = f"{method}: " if len(methods) > 1 else ""
-        return [
-            (name + study.format.format(turned.values[index]), turned.outcomes[index])
-            for index in (turned.broken - 1, turned.broken)
-        ]
-    return []
+        values = (turned.broken - 1, turned.broken)
+        return method, [(study.format.format(turned.values[index]), turned.outcomes[index]) for index in values]
+    return "", []
 
 
 def _sheet(left: float, top: float, caption: str, outcome: Outcome) -> list[str]:

@@ -78,7 +78,7 @@ def _bare(skin: Skin, count: float) -> Outcome:
     contacts = [finger(skin, spot) for spot in spots]
     right = all(reported(zones) == sorted(map(moments, contacts)) for zones in frames)
     told = faults(frames[0]) if faults(frames[0]) and faults(frames[1]) else ()
-    what = f"{int(undefined.sum())} of {plural(int(cells.sum()), 'pressed cell')} undefined, row pins short-circuited"
+    what = f"{int((undefined & cells).sum())} of {plural(int(cells.sum()), 'pressed cell')} undefined, row pins short-circuited"
     return Outcome(right, told, what, worst.pressed, cells, places(worst))
 
 
@@ -240,7 +240,7 @@ def _stuck_columns(count: float) -> Outcome:
 STUCK = Study(
     name="stuck",
     title="Switches that are stuck closed, beside a finger",
-    knob="of them",
+    knob="how many are stuck",
     amount="cells that read pressed",
     values=(0, 1, 2, 3, 4, 5, 6),
     runs={
