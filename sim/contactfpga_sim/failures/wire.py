@@ -162,7 +162,7 @@ class SlowHost:
         self._board.close()
 
 
-TURNS = 6
+TURNS = 3
 
 
 def _slow_host(milliseconds: float) -> Outcome:
