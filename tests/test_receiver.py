@@ -1,12 +1,14 @@
 """Bytes in, zones out: chunks, counters and the device time."""
 
 import random
+from types import SimpleNamespace
 
 import pytest
 from wire import Wire, last_byte, seal
 
 import contactfpga
-from contactfpga.receiver import Receiver
+from contactfpga.commands.zones import status
+from contactfpga.receiver import Receiver, Stats
 
 SKIN = contactfpga.Skin()
 
@@ -115,3 +117,10 @@ def test_bytes_thrown_away_are_no_gap():
     receiver.discard(wire.zones([], sequence=3, time=300))
     receiver.feed(wire.zones([], sequence=40, time=900_000), 0.9)
     assert receiver.stats.gaps == 0
+
+
+@pytest.mark.parametrize(("gaps", "told"), [(0, "3 lost"), (1, "3 or more lost")])
+def test_the_line_below_a_frame_says_that_more_may_be_lost(gaps, told):
+    receiver, wire = Receiver("x"), Wire(SKIN)
+    *_, zones = receiver.feed(wire.hello() + wire.zones([]), 0.0)
+    assert f"frames, {told}, " in status(SimpleNamespace(port="x", stats=Stats(lost=3, gaps=gaps)), zones)

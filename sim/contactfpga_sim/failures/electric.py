@@ -78,7 +78,8 @@ def _bare(skin: Skin, count: float) -> Outcome:
     contacts = [finger(skin, spot) for spot in spots]
     right = all(reported(zones) == sorted(map(moments, contacts)) for zones in frames)
     told = faults(frames[0]) if faults(frames[0]) and faults(frames[1]) else ()
-    what = f"{int((undefined & cells).sum())} of {plural(int(cells.sum()), 'pressed cell')} undefined, row pins short-circuited"
+    lost, of = int((undefined & cells).sum()), int(cells.sum())
+    what = f"{lost} of {of} pressed cells undefined, row pins short-circuited"
     return Outcome(right, told, what, worst.pressed, cells, places(worst))
 
 
