@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
 from contactfpga_hdl.audit import Audit, Bitmap
+from contactfpga_hdl.divide import Divide
 from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
 
@@ -21,6 +22,16 @@ SHEETS = {
     "12x30, few zones": {"rows": 12, "columns": 30, "connectivity": 4, "zone_capacity": 20},
     "24x40, 8": {"rows": 24, "columns": 40, "connectivity": 8, "zone_capacity": 110},
     "24x40, 4": {"rows": 24, "columns": 40, "connectivity": 4, "zone_capacity": 110},
+    "1x64, divided": {"rows": 1, "columns": 64, "report": "barycenter", "barycenter_bits": 0},
+    "9x9, divided": {"rows": 9, "columns": 9, "report": "barycenter"},
+    "16x16, divided": {"rows": 16, "columns": 16, "report": "barycenter", "barycenter_bits": 8},
+    "12x30, divided, few zones": {
+        "rows": 12,
+        "columns": 30,
+        "connectivity": 4,
+        "report": "barycenter",
+        "zone_capacity": 20,
+    },
     "1x1, cells": {"rows": 1, "columns": 1, "report": "cells"},
     "1x7, cells": {"rows": 1, "columns": 7, "report": "cells"},
     "1x9, cells": {"rows": 1, "columns": 9, "report": "cells"},
@@ -30,12 +41,13 @@ SHEETS = {
 
 
 class Chain(wiring.Component):
-    """Labeller, audit and link as the top joins them, or bitmap and link, with a wire that takes everything."""
+    """Labeller, audit, divider and link as the top joins them, or bitmap and link; the wire takes everything."""
 
     def __init__(self, skin):
         self.link = Link(skin)
-        self.audit = Audit(skin) if skin.report == "moments" else Bitmap(skin)
-        self.front = LABELLERS[skin.labeller](skin) if skin.report == "moments" else self.audit
+        self.divide = Divide(skin) if skin.report == "barycenter" else None
+        self.audit = Bitmap(skin) if skin.report == "cells" else Audit(skin)
+        self.front = self.audit if skin.report == "cells" else LABELLERS[skin.labeller](skin)
         super().__init__(
             {"rows": In(self.front.rows.signature.flip()), "ends": Out(1), "stalled": Out(1), "packed": Out(1)}
         )
@@ -48,12 +60,17 @@ class Chain(wiring.Component):
             m.submodules += self.front
             wiring.connect(m, self.front.records, self.audit.records)
             m.d.comb += [self.audit.taken.eq(self.rows.valid & self.rows.ready), self.audit.row.eq(self.rows.payload)]
-        wiring.connect(m, self.audit.items, self.link.items)
+        behind = self.link.items
+        if self.divide:
+            m.submodules += self.divide
+            wiring.connect(m, self.divide.items, self.link.items)
+            behind = self.divide.records
+        wiring.connect(m, self.audit.items, behind)
         m.d.comb += [
             self.link.summary.eq(self.audit.summary),
             self.link.bytes.ready.eq(1),
             self.ends.eq(self.audit.items.valid & self.audit.items.ready & self.audit.items.payload.end),
-            self.stalled.eq(~self.link.items.ready),
+            self.stalled.eq(~behind.ready),
             self.packed.eq(self.link.packer.decide),
         ]
         return m

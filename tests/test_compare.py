@@ -7,10 +7,11 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga_sim.compare import Mismatch, compare
-from contactfpga_sim.golden import BOUNDARIES, Timeline, Trace, predict
+from contactfpga_sim.golden import Timeline, Trace, boundaries, predict
 from contactfpga_sim.matrix import Matrix
 
-SKIN = Skin(rows=4, columns=6)
+SKIN = Skin(rows=4, columns=6, report="barycenter")
+BOUNDARIES = boundaries(SKIN)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_error_of_one_bit_is_named(predicted, boundary, bit):
     assert (fault.expected, fault.got) == ((value, *rest), (wrong, *rest))
 
 
-@pytest.mark.parametrize("boundary", ["rows", "records"])
+@pytest.mark.parametrize("boundary", ["rows", "records", "items"])
 def test_wrong_mark_of_the_last_item_is_named(predicted, boundary):
     cycle, value, mark = predicted.events(boundary)[2]
     with pytest.raises(Mismatch) as found:

@@ -12,7 +12,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim import bench_amaranth, bench_cocotb
 from contactfpga_sim.compare import Mismatch, compare
 from contactfpga_sim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import BOUNDARIES, Timeline, Trace, predict
+from contactfpga_sim.golden import Timeline, Trace, boundaries, predict
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.record import OutOfTime
 
@@ -37,8 +37,9 @@ COCOTB = {
         column_chains=2,
     ),
     "serial": Skin(labeller="serial", settle_us=2.5),
+    "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
 }
-MARKS = {"serial": pytest.mark.campaign}  # what it adds is in the covering set, too
+MARKS = dict.fromkeys(("serial", "barycenter"), pytest.mark.campaign)  # what they add is in the covering set, too
 SIMULATORS = [
     "verilator",
     pytest.param(
@@ -105,7 +106,7 @@ def test_covering_set_in_amaranths_simulator(number):
     cycles = cycles_for(skin)
     timeline = stimulus(skin, cycles, seed=number)
     expected = predict(skin, timeline, cycles)
-    assert all(expected.events(boundary) for boundary in BOUNDARIES)
+    assert all(expected.events(boundary) for boundary in boundaries(skin))
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 300
 
 
@@ -145,7 +146,7 @@ def test_sequence_counts_past_255_frames():
     compare(expected, bench_amaranth.run(skin, timeline, cycles))
 
 
-@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("boundary", boundaries(Skin()))
 @pytest.mark.parametrize("fault", ["delay", "bit"])
 def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
     expected, got = reference_run()
@@ -170,7 +171,7 @@ def test_top_through_cocotb(name, simulator):
     expected = predict(skin, timeline, cycles)
     got = bench_cocotb.run(skin, timeline, cycles, simulator)
     assert compare(expected, got) > 3_000
-    for boundary in BOUNDARIES:
+    for boundary in boundaries(skin):
         check_that_faults_are_named(expected, got, boundary)
 
 

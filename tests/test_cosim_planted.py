@@ -18,6 +18,7 @@ CYCLES = 4 * 72 * 8
 STAGES = {
     "rows": ("Scanner", "rows"),
     "records": ("labeller", "records"),
+    "items": ("Divide", "items"),
     "bytes": ("Link", "bytes"),
     "line": ("Transmitter", "pin"),
 }
@@ -80,7 +81,7 @@ def one_bit_wrong(m, inside, outside):
 @pytest.mark.parametrize("fault", [a_clock_late, one_bit_wrong])
 @pytest.mark.parametrize(("boundary", "labeller"), [*((boundary, "run") for boundary in STAGES), ("records", "serial")])
 def test_a_fault_in_the_gateware_is_named(monkeypatch, record_property, boundary, labeller, fault):
-    skin = SKIN.replace(labeller=labeller)
+    skin = SKIN.replace(labeller=labeller, report="barycenter" if boundary == "items" else "moments")
     rng = np.random.default_rng(3)
     timeline = Timeline.frames(skin, rng.random((8, 4, 6)) < 0.4)
     expected = predict(skin, timeline, CYCLES)

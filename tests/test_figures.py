@@ -16,6 +16,12 @@ def test_the_reference_skins_row_is_up_to_date(page):
     assert figures.reference_row("reference", Skin()) in (ROOT / page).read_text().splitlines()
 
 
+@pytest.mark.parametrize("report", figures.REPORTS)
+def test_the_reference_skins_reports_are_up_to_date(report):
+    row = figures.report_row("reference", Skin(report=report))
+    assert row in (ROOT / "docs/use.md").read_text().splitlines()
+
+
 def test_the_reference_skin_keeps_the_promised_latency():
     """Two scans, the wire and 3 us."""
     skin = Skin()

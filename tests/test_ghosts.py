@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from scipy import ndimage
-from wire import Wire
+from wire import Wire, seal
 
 from contactfpga import Skin, protocol
 from contactfpga.receiver import Receiver
@@ -143,6 +143,16 @@ def test_the_hello_tells_that_there_are_no_diodes():
         assert packet == Wire(skin).hello()
         hello = protocol.decode_hello(protocol.unseal(packet[:-1]))
         assert hello.skin().ghosts == hello.ghosts == (skin.diodes == "none")
+
+
+def test_a_hello_without_diodes_that_cannot_be_is_refused():
+    """With 8-connectivity, or with barycenters that the board divides."""
+    hello = bytearray(Wire(skin_of(4, 5)).plain_hello())
+    for options in (0x80, 0x81 | 0x18):
+        hello[2] = options
+        receiver = Receiver("x")
+        assert receiver.feed(seal(bytes(hello)) * 2, 0.0) == []
+        assert receiver.stats.damaged == {"content": 1}  # the first piece is never damage
 
 
 def test_json_tells_ghosts():

@@ -1,7 +1,9 @@
 """The golden model of the whole chain: rules of docs/timing.md worked by hand, and packets read back."""
 
+import math
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -248,12 +250,32 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
         return np.array_equal(frame.bitmap, cells)
     exact = skin.labeller in ("run", "serial")
     zones = golden.zones(cells, skin.connectivity) if exact else sorted(zones_by_image_tools(cells, skin.labeller))
-    carried = sorted(map(tuple, frame.moments.tolist()))
+    records = frame.moments
+    if skin.report == "barycenter":
+        records, zones = frame.barycenters, sorted(rounded(zone, skin.barycenter_bits) for zone in zones)
+    carried = sorted(map(tuple, records.tolist()))
     if (frame.cells, frame.zones) != (cells.sum(), len(zones)):
         return False
     if "overflow" in frame.flags:
         return len(zones) > len(carried) == skin.zone_capacity and set(carried) <= set(zones)
     return carried == zones
+
+
+def rounded(zone: tuple[int, int, int], bits: int) -> tuple[int, int, int]:
+    """Area, and both sums over it, to the nearest step of 1/2^bits, half a step upwards."""
+    area, *sums = zone
+    x, y = (math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2)) for total in sums)
+    return area, x, y
+
+
+def test_widths_of_barycenters_agree_with_the_gatewares_table_for_every_sheet():
+    for rows in range(1, 65):
+        for columns in (1, 2, 3, rows, 31, 64):
+            for bits in (0, 4, 8):
+                skin = Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=bits, settle_us=500.0)
+                mine, theirs = facts(skin), Derived(skin)
+                assert mine.barycenter_bits == theirs.record_bits, (rows, columns, bits)
+                assert (mine.division, mine.item_bytes) == (theirs.quotient_bits, theirs.item_bytes)
 
 
 def test_widths_agree_with_the_gatewares_table_for_every_sheet():

@@ -15,6 +15,7 @@ REFERENCE = Skin()
 SKINS = {
     "zones": REFERENCE,
     "zones of 32x32": Skin(rows=32, columns=32, settle_us=50.0),
+    "barycenters": Skin(report="barycenter"),
     "cells": Skin(rows=12, columns=16, report="cells", settle_us=10.0),
 }
 HIT = 2

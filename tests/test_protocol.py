@@ -82,6 +82,23 @@ def test_zones_arrive_exactly(data, skin, trailer):
     assert frame.bitmap is None
 
 
+@given(st.data(), skins(report="barycenter"), st.integers(0, 8), TRAILERS)
+@settings(max_examples=200, deadline=None)
+def test_barycenters_arrive_exactly(data, skin, fraction_bits, trailer):
+    skin = skin.replace(barycenter_bits=fraction_bits)
+    x, y = (st.integers(0, (lines - 1) * 2**fraction_bits) for lines in (skin.columns, skin.rows))
+    most = min(20, skin.zone_capacity)
+    area = st.integers(1, max(1, skin.rows * skin.columns // 20))
+    rows = data.draw(st.lists(st.tuples(area, x, y), max_size=most))
+    if sum(row[0] for row in rows) > skin.rows * skin.columns:
+        rows = [(skin.rows * skin.columns, *rows[0][1:])]
+    frame = decoded(Wire(skin).zones(rows, **trailer), skin)
+    assert frame.barycenters.tolist() == [list(row) for row in rows]
+    assert fields(frame) == trailer
+    assert (frame.zones, frame.cells) == (len(rows), sum(row[0] for row in rows))
+    assert (frame.bitmap, len(frame.moments)) == (None, 0)
+
+
 @given(st.data(), skins(report="cells"), TRAILERS)
 @settings(max_examples=100, deadline=None)
 def test_bitmaps_arrive_exactly(data, skin, trailer):
@@ -94,7 +111,11 @@ def test_bitmaps_arrive_exactly(data, skin, trailer):
     assert len(frame.moments) == 0
 
 
-@given(skins(), st.sampled_from(["always", "on_change"]), st.floats(0.015625, 1000.0, width=32))
+@given(
+    skins() | skins(report="barycenter", barycenter_bits=0) | skins(report="barycenter", barycenter_bits=7),
+    st.sampled_from(["always", "on_change"]),
+    st.floats(0.015625, 1000.0, width=32),
+)
 @settings(max_examples=100, deadline=None)
 def test_hellos_arrive(skin, send, pitch_y_mm):
     skin = skin.replace(pitch_y_mm=pitch_y_mm)
@@ -106,7 +127,8 @@ def test_hellos_arrive(skin, send, pitch_y_mm):
     hello = protocol.decode_hello(protocol.unseal(packet[:-1]))
     assert hello.fingerprint == skin.fingerprint
     told = hello.skin()
-    for name in ("rows", "columns", "connectivity", "report", "zone_capacity", "pitch_x_mm", "radius_mm"):
+    told_exactly = ("rows", "columns", "connectivity", "report", "barycenter_bits", "zone_capacity")
+    for name in (*told_exactly, "pitch_x_mm", "radius_mm"):
         assert getattr(told, name) == getattr(skin, name)
     assert told.pitch_y_mm == pytest.approx(skin.pitch_y_mm, rel=1e-6)
     for name in ("area_bits", "sum_x_bits", "sum_y_bits", "zones_bits", "record_bytes", "trailer_bytes"):
@@ -144,6 +166,13 @@ def test_bytes_on_the_wire(size, zone_bytes, frame_bytes, connectivity):
     assert [after - before for before, after in itertools.pairwise(lengths)] == [zone_bytes] * 3
 
 
+@pytest.mark.parametrize(("size", "zone_bytes"), [(16, 3), (32, 4), (64, 4)])
+def test_bytes_of_a_barycenter_on_the_wire(size, zone_bytes):
+    wire = Wire(Skin(rows=size, columns=size, report="barycenter", **SLOW))
+    lengths = [len(wire.zones([(1, 1, 1)] * zones)) for zones in range(4)]
+    assert [after - before for before, after in itertools.pairwise(lengths)] == [zone_bytes] * 3
+
+
 # ---- what is refused
 
 
@@ -156,6 +185,7 @@ def refusal(plain, skin=REFERENCE):
 WIRE = Wire(REFERENCE)
 SMALL = Skin(rows=3, columns=5, **SLOW)  # its records and bitmap rows have bits to spare
 BITMAP = SMALL.replace(report="cells")
+DIVIDED = SMALL.replace(report="barycenter", barycenter_bits=1)  # area 4, x 4, y 3 bits
 FULL = REFERENCE.replace(zone_capacity=2)
 ONE = [(4, 10, 6)]
 
@@ -193,6 +223,13 @@ def unused_bits(plain, index):
         (WIRE.plain_cells([[0] * 16] * 16), REFERENCE, "kind"),
         (WIRE.plain_hello(), REFERENCE, "kind"),
         (WIRE.plain_zones(ONE)[:-1] + last_byte(3), REFERENCE, "kind"),
+        (Wire(DIVIDED).plain_zones([(16, 0, 0)], cells=0), DIVIDED, "content"),
+        (Wire(DIVIDED).plain_zones([(1, 9, 0)]), DIVIDED, "content"),
+        (Wire(DIVIDED).plain_zones([(1, 0, 5)]), DIVIDED, "content"),
+        (Wire(DIVIDED).plain_zones([(9, 8, 4)], cells=8), DIVIDED, "content"),
+        (unused_bits(Wire(DIVIDED).plain_zones([(9, 8, 4)]), 1), DIVIDED, "content"),
+        (Wire(SMALL).plain_zones([]), DIVIDED, "kind"),
+        (Wire(DIVIDED).plain_zones([]), SMALL, "kind"),
         (Wire(BITMAP).plain_zones([]), BITMAP, "kind"),
         (Wire(BITMAP).plain_cells([[1] * 5] * 2), BITMAP, "length"),
         (Wire(BITMAP).plain_cells([[1] * 5] * 4, cells=15), BITMAP, "length"),
@@ -211,6 +248,15 @@ def test_a_mismatch_on_the_board_is_passed_on():
     assert (frame.cells, frame.moments.tolist()) == (7, [[4, 10, 6]])
 
 
+def test_all_cells_of_a_sheet_are_sent_as_0_where_that_saves_a_bit():
+    for rows, columns, record in ((4, 8, 0), (4, 7, 28), (1, 1, 1), (1, 2, 0)):
+        skin = Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=0, **SLOW)
+        area = rows * columns
+        plain = Wire(skin).plain_zones([(area, columns - 1, 0)])
+        assert plain[0] & (1 << Derived(skin).record_bits[0]) - 1 == record
+        assert decoded(seal(plain), skin).barycenters.tolist() == [[area, columns - 1, 0]]
+
+
 @pytest.mark.parametrize("version", [0, 2, 7])
 def test_another_version_says_which(version):
     error = refusal(WIRE.plain_zones(ONE, version=version))
@@ -218,12 +264,16 @@ def test_another_version_says_which(version):
     assert f"version {version}" in str(error)
 
 
+UNKNOWN = (0x0A, 0x50, 0xD0, 0xFF)
+"""Options that no board says: divided cells, 9 fraction bits, and bits without meaning."""
+
+
 @pytest.mark.parametrize(
     ("plain", "reason"),
     [
         (WIRE.plain_hello()[1:], "length"),
         (WIRE.plain_hello() + last_byte(HELLO), "length"),
-        (WIRE.plain_hello()[:2] + b"\x10" + WIRE.plain_hello()[3:], "content"),
+        *((WIRE.plain_hello()[:2] + bytes([options]) + WIRE.plain_hello()[3:], "content") for options in UNKNOWN),
     ],
 )
 def test_hellos_that_cannot_be(plain, reason):

@@ -57,6 +57,10 @@ REFUSED = [
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
     # scan and debounce
     ({"diodes": "both"}, "diodes is 'both'; it must be one of 'col2row', 'row2col', 'none'"),
+    (
+        {"diodes": "none", "connectivity": 4, "report": "barycenter"},
+        "report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'",
+    ),
     ({"diodes": "none"}, "connectivity is 8; diodes = 'none' needs connectivity = 4 with report = 'moments'"),
     (
         {"diodes": "none", "report": "cells", "scan": "adaptive"},
@@ -110,12 +114,9 @@ REFUSED = [
     # adaptive scan
     ({"scan": "adaptive", "rows": 1}, "rows is 1; it must lie between 2 and 64 with scan = 'adaptive'"),
     (
-        {"scan": "adaptive", "row_drive": "74hc595"},
-        "row_drive is '74hc595'; scan = 'adaptive' needs row_drive = 'direct'",
-    ),
-    (
         {"scan": "adaptive", "column_read": "74hc165"},
-        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct'",
+        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct', as it looks at the columns of an "
+        "untouched sheet in each clock",
     ),
     (
         {"scan": "adaptive", "settle_us": 2.0},
@@ -132,7 +133,17 @@ REFUSED = [
         "keep_alive_ms is 0.1; one scan takes 0.156 ms",
     ),
     # report and link
-    ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'cells'"),
+    ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'barycenter', 'cells'"),
+    ({"report": "barycenter", "barycenter_bits": -1}, "barycenter_bits is -1; it must lie between 0 and 8"),
+    ({"report": "barycenter", "barycenter_bits": 9}, "barycenter_bits is 9; it must lie between 0 and 8"),
+    ({"report": "barycenter", "barycenter_bits": 2.0}, "barycenter_bits is 2.0; it must be a whole number"),
+    ({"barycenter_bits": 3}, "barycenter_bits is 3; leave it out, or set report = 'barycenter'"),
+    ({"report": "cells", "barycenter_bits": 5}, "barycenter_bits is 5; leave it out, or set report = 'barycenter'"),
+    (
+        {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 256},
+        "settle_us + release_us is 72 clocks; 32 columns and 256 zones a frame need 90 clocks (7.5 us) "
+        "with labeller = 'run' and report = 'barycenter'",
+    ),
     ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),
     ({"send": "on_change", "keep_alive_ms": 101}, "keep_alive_ms is 101.0; it must lie between 0.0 and 100.0 ms"),
     ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes 0.096 ms"),
@@ -196,6 +207,9 @@ JUST_WITHIN = [
     {"send": "on_change", "keep_alive_ms": 100},
     {"send": "always", "keep_alive_ms": 500},
     {"zone_capacity": 1},
+    {"report": "barycenter", "barycenter_bits": 0},
+    {"report": "barycenter", "barycenter_bits": 8},
+    {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 199},
     {"zone_capacity": 64},
     {"scan": "adaptive", "rows": 2},
     {"scan": "adaptive", "settle_us": 2.6},
@@ -312,6 +326,21 @@ def test_max_zones_is_what_the_worst_frame_of_a_small_sheet_holds(connectivity):
             assert Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG).max_zones() == most
 
 
+@pytest.mark.parametrize(("size", "connectivity", "capacity"), [(6, 8, 9), (16, 8, 64), (16, 4, 64), (64, 8, 64)])
+def test_default_capacity_where_zones_are_divided(size, connectivity, capacity):
+    skin = Skin(rows=size, columns=size, connectivity=connectivity, report="barycenter", **LONG)
+    assert skin.zone_capacity == capacity
+
+
+def test_replace_gives_a_skin_that_begins_or_ends_to_divide_its_own_capacity():
+    skin = Skin(rows=32, columns=32, **LONG)
+    divided = skin.replace(report="barycenter")
+    assert (skin.zone_capacity, divided.zone_capacity) == (256, 64)
+    assert divided.replace(report="cells") == skin.replace(report="cells")
+    assert skin.replace(zone_capacity=7).replace(report="cells").zone_capacity == 7
+    assert divided.replace(zone_capacity=7).replace(barycenter_bits=2).zone_capacity == 7
+
+
 def test_replace_gives_a_changed_sheet_its_own_capacity():
     assert Skin(zone_capacity=7).replace(settle_us=6.0).zone_capacity == 7
     assert Skin(zone_capacity=7).replace(rows=8).zone_capacity == 32
@@ -321,6 +350,11 @@ def test_replace_gives_a_changed_sheet_its_own_capacity():
 
 
 # ---- file and fingerprint
+
+
+REPORTS = st.sampled_from([{"report": "moments"}, {"report": "cells"}]) | st.builds(
+    lambda bits: {"report": "barycenter", "barycenter_bits": bits}, st.integers(0, 8)
+)
 
 
 @st.composite
@@ -343,7 +377,7 @@ def skins(draw):
         release_us=draw(st.floats(1.0, 10_000.0)),
         debounce=draw(st.sampled_from(["none", "sym_defer_pk", "asym_eager_defer_pk"])),
         debounce_press_us=draw(st.floats(0.0, 5000.0)),
-        report=draw(st.sampled_from(["moments", "cells"])),
+        **draw(REPORTS),
         zone_capacity=draw(st.none() | st.just(1)),
     )
 
@@ -396,10 +430,17 @@ def test_every_field_is_in_the_fingerprint():
     registers = Skin(row_drive="74hc595", column_read="74hc165")
     only_there = {"row_chains": 2, "column_chains": 2, "shift_hz": 4_000_000}
     others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
-    assert set(OTHER) | {"surface", "radius_mm", "scan", *only_there} == {
+    divided = Skin(report="barycenter")
+    others += [divided, divided.replace(barycenter_bits=3)]
+    assert set(OTHER) | {"surface", "radius_mm", "scan", "barycenter_bits", *only_there} == {
         field.name for field in dataclasses.fields(Skin)
     }
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
+
+
+def test_fingerprints_of_boards_built_before_there_were_barycenters_are_the_same():
+    assert Skin().fingerprint.hex() == "672097ef0a81720e"
+    assert Skin(rows=13, columns=6, report="cells", send="on_change").fingerprint.hex() == "80b5c6534d66d5d9"
 
 
 def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written():

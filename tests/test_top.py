@@ -20,6 +20,7 @@ SKINS = {
     "1x1, all else": {"rows": 1, "columns": 1, "diodes": "row2col", "send": "on_change", "debounce": "sym_defer_pk"},
     "2x1, cells": {"rows": 2, "columns": 1, "report": "cells", "send": "on_change", "keep_alive_ms": 1.0},
     "13x6": {"rows": 13, "columns": 6, "mask": ((0, 0), (12, 5)), "debounce": "asym_eager_defer_pk"},
+    "64x64, barycenter": {"rows": 64, "columns": 64, "report": "barycenter", "labeller": "serial"},
     "64x64, cells": {"rows": 64, "columns": 64, "report": "cells", "debounce": "asym_eager_defer_pk"},
     "slow": {"rows": 5, "columns": 3, "clock_hz": 1_000_000, "baud": 9600, "settle_us": 10_000.0},
     "fast": {"clock_hz": 100_000_000, "baud": 10_000_000, "zone_capacity": 1},
@@ -76,7 +77,7 @@ def shortest(**fields):
     raise AssertionError("no Skin")
 
 
-@pytest.mark.parametrize("report", ["moments", "cells"])
+@pytest.mark.parametrize("report", ["moments", "barycenter", "cells"])
 @pytest.mark.parametrize("debounce", ["none", "sym_defer_pk", "asym_eager_defer_pk"])
 @pytest.mark.parametrize(("rows", "columns"), [(2, 16), (3, 12)])
 def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, debounce, rows, columns):

@@ -29,6 +29,7 @@ SKINS = {
         send="on_change",
         keep_alive_ms=0.3,
     ),
+    "barycenter": SMALL.replace(report="barycenter", barycenter_bits=2),
     "cells": SMALL.replace(report="cells", diodes="row2col", send="on_change", keep_alive_ms=0.3),
 }
 

@@ -9,6 +9,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
 from contactfpga_hdl.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
 from contactfpga_hdl.seek import Seek
+from contactfpga_hdl.shift import RowChain
 from contactfpga_hdl.stuck import Stuck, anywhere, present
 
 
@@ -45,7 +46,7 @@ class AdaptiveScanner(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.seek = self._seek = Seek(self.skin)
-        m.submodules.driver = self._driver = DirectRows(self.skin)
+        m.submodules.driver = self._driver = self._row_driver()
         m.submodules.reader = self._reader = DirectColumns(self.skin)
         connect_pins(m, self._driver.pins, self.pins)
         connect_pins(m, self._reader.pins, self.pins)
@@ -57,6 +58,9 @@ class AdaptiveScanner(wiring.Component):
         self._watch_stuck(m)
         self._tag_frame(m)
         return m
+
+    def _row_driver(self):
+        return DirectRows(self.skin) if self.skin.row_drive == "direct" else RowChain(self.skin)
 
     def _read_columns(self, m):
         levels, seek = self._reader.levels, self._seek
@@ -76,8 +80,8 @@ class AdaptiveScanner(wiring.Component):
         """As in a raster scan, but that idle rows stay driven. A column that reads pressed then ends the wait at once:
         that is the slot's strobe, and the release begins behind it."""
         derived, driver, seek = self.derived, self._driver, self._seek
-        slot, settled = derived.row_clocks, derived.settle_clocks
-        clock = Signal(range(slot))
+        slot, settled, shifting = derived.row_clocks, derived.settle_clocks, derived.row_shift_clocks
+        clock = Signal(range(slot), init=(slot - shifting) % slot)
         ends = clock == slot - 1
         off = Signal()  # no row is driven
         row_due = Signal(2)  # a sample on its way through the synchroniser
@@ -96,6 +100,8 @@ class AdaptiveScanner(wiring.Component):
             released_due.eq(Cat(ends & off, released_due)),
             clock.eq(Mux(ends, 0, clock + 1)),
         ]
+        if shifting:
+            self._shift_rows(m, clock == slot - shifting, clock == 0, off, ends)
         with m.If(driver.release):
             m.d.sync += off.eq(1)
         with m.Elif(driver.drive):
@@ -104,6 +110,15 @@ class AdaptiveScanner(wiring.Component):
             m.d.sync += self._watches.eq(seek.idle & ~seek.hit)
         with m.If(wakes):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
+
+    def _shift_rows(self, m, in_release, in_settle, off, ends):
+        """A pattern is shifted once it is chosen. That of idle rows is shifted anew at the beginning of each slot, so
+        that registers that were disturbed get it back."""
+        driver, seek = self._driver, self._seek
+        begun = Signal()  # the first slot has
+        with m.If(ends):
+            m.d.sync += begun.eq(1)
+        m.d.comb += driver.shift.eq(Mux(begun & ~off, in_settle & seek.idle, in_release))
 
     def _offer_rows(self, m):
         """Rows that are known, in order; at most one that was driven alone waits."""

@@ -6,7 +6,14 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_hdl.payloads import item_layout, moments_layout, record_layout, row_layout, summary_layout
+from contactfpga_hdl.payloads import (
+    item_layout,
+    moments_layout,
+    passed_layout,
+    record_layout,
+    row_layout,
+    summary_layout,
+)
 from contactfpga_hdl.tally import Change, Tally
 
 
@@ -26,14 +33,14 @@ class Audit(wiring.Component):
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
                 "records": In(stream.Signature(record_layout(self.derived))),
-                "items": Out(stream.Signature(item_layout(self.derived))),
+                "items": Out(stream.Signature(passed_layout(self.derived))),
                 "summary": Out(summary_layout(self.derived)),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        record = self.records.payload
+        record, passed = self.records.payload, self.items.payload
         taken = self.records.valid & self.records.ready
         ends = taken & record.end
         zone = taken & ~record.end
@@ -45,7 +52,7 @@ class Audit(wiring.Component):
         m.d.comb += [
             self.records.ready.eq(self.items.ready | ~passes),
             self.items.valid.eq(self.records.valid & passes),
-            self.items.payload.data.eq(record.zone.as_value()),
+            (passed.zone if self.skin.report == "barycenter" else passed.data).eq(record.zone.as_value()),
             self.items.payload.end.eq(record.end),
             counts.taken.eq(self.taken),
             counts.row.eq(self.row),

@@ -15,7 +15,8 @@ from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 class Link(wiring.Component):
     """Keeps one frame on the wire, the newest complete one waiting, and one being written.
 
-    Items wait in front of the packer, where one can be packed two clocks after it came. Three regions of one memory
+    Items wait in front of the packer, where one can be packed two clocks after it came; barycenters wait before they
+    are divided and come here one by one. Three regions of one memory
     change places between the three frames; a fourth holds the hello. A new frame drops the one that waits, counted, in
     the clock its end mark is packed, and waits in its place when it is complete. Nothing in here can hold up
     the stages before.
@@ -40,19 +41,11 @@ class Link(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.packer = packer = self.packer
-        m.submodules.backlog = backlog = SyncFIFOBuffered(
-            width=len(self.items.payload.as_value()), depth=self.derived.backlog
-        )
-        m.d.comb += [
-            backlog.w_data.eq(self.items.payload),
-            backlog.w_en.eq(self.items.valid),
-            self.items.ready.eq(backlog.w_rdy),
-            packer.items.payload.eq(backlog.r_data),
-            packer.items.valid.eq(backlog.r_rdy),
-            backlog.r_en.eq(packer.items.ready),
-            packer.tag.eq(self.tag),
-            packer.summary.eq(self.summary),
-        ]
+        if self.skin.report == "barycenter":
+            wiring.connect(m, wiring.flipped(self.items), packer.items)
+        else:
+            self._queue(m)
+        m.d.comb += [packer.tag.eq(self.tag), packer.summary.eq(self.summary)]
         self._take_frame = Signal()  # the wire takes the waiting frame
         self._waits = Signal()  # a complete frame waits
         self._place_frames(m)
@@ -60,6 +53,19 @@ class Link(wiring.Component):
         self._time_hello(m)
         self._send(m)
         return m
+
+    def _queue(self, m):
+        m.submodules.backlog = backlog = SyncFIFOBuffered(
+            width=len(self.items.payload.as_value()), depth=self.derived.backlog
+        )
+        m.d.comb += [
+            backlog.w_data.eq(self.items.payload),
+            backlog.w_en.eq(self.items.valid),
+            self.items.ready.eq(backlog.w_rdy),
+            self.packer.items.payload.eq(backlog.r_data),
+            self.packer.items.valid.eq(backlog.r_rdy),
+            backlog.r_en.eq(self.packer.items.ready),
+        ]
 
     def _place_frames(self, m):
         """Which region is written, waits, or is on the wire."""

@@ -124,7 +124,7 @@ class Packer(wiring.Component):
             trailer.stuck.eq(self.tag.stuck),
             trailer.cells.eq(self.summary.cells),
             trailer.zones.eq(self.summary.zones),
-            trailer.kind.eq(protocol.KIND_ZONES if self.skin.report == "moments" else protocol.KIND_CELLS),
+            trailer.kind.eq(protocol.KINDS[self.skin.report]),
             trailer.version.eq(protocol.VERSION),
         ]
         return trailer.as_value()

@@ -11,13 +11,24 @@ def row_layout(derived: Derived) -> data.StructLayout:
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:
-    """Exact moments of a set of cells; as bits, lowest first, this is a zone record on the wire."""
+    """Exact moments of a set of cells; with ``report = "moments"`` as bits, lowest first, a zone record on the wire."""
     return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
 
 
 def record_layout(derived: Derived) -> data.StructLayout:
     """A zone, or with ``end`` the mark behind a frame's last one."""
     return data.StructLayout({"zone": moments_layout(derived), "end": 1})
+
+
+def barycenter_layout(derived: Derived) -> data.StructLayout:
+    """Area, without the bits above what all areas of the sheet differ in, and barycenter; the bits of a record on the
+    wire with ``report = "barycenter"``."""
+    return data.StructLayout(dict(zip(("area", "x", "y"), derived.record_bits, strict=True)))
+
+
+def passed_layout(derived: Derived) -> data.StructLayout:
+    """What the audit lets through: items, or zones that are still to be divided."""
+    return record_layout(derived) if derived.skin.report == "barycenter" else item_layout(derived)
 
 
 def item_layout(derived: Derived) -> data.StructLayout:

@@ -34,8 +34,8 @@ def row_driver(skin: Skin) -> wiring.Signature:
 
     ``pattern`` holds the rows of the next slot as ones. It must be stable from ``shift``, given
     ``Derived.row_shift_clocks`` before the slot, until ``drive`` in the last clock before it. They are driven from the
-    clock after ``drive`` to that of ``release``. Direct rows need no ``shift``, and after power-up drive row 0 at once,
-    in an adaptive scan all rows.
+    clock after ``drive`` to that of ``release``; a pattern that is driven already may be shifted anew. Direct rows need
+    no ``shift``, and after power-up drive row 0 at once, in an adaptive scan all rows.
     """
     return wiring.Signature(
         {

@@ -18,7 +18,7 @@ class RowChain(wiring.Component):
 
     A pattern goes in whole, highest line of each chain first, while the one before it is driven. What the chips hold at
     power-up, or after a disturbance, is therefore gone with the next pattern. The latch rises once it is in; by then no
-    row may be driven, and the enable pin makes a row begin and end.
+    row may be driven, or the same ones, and the enable pin makes a row begin and end.
     """
 
     def __init__(self, skin: Skin):
@@ -44,6 +44,9 @@ class RowChain(wiring.Component):
                 m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
         with m.Else():
             m.d.sync += self.pins.row_latch.eq(0)
+        if self.skin.scan == "adaptive":  # a pattern that was shifted anew, for idle rows, may not be in when they hit
+            with m.If(self.release):
+                m.d.sync += [busy.eq(0), left.eq(lines), clock.eq(0)]
         with m.If(self.drive):
             m.d.sync += self.pins.row_enable_n.eq(0)
         with m.Elif(self.release):

@@ -1,6 +1,6 @@
 """The whole chain for one Skin; wiring only."""
 
-from amaranth.hdl import Module
+from amaranth.hdl import Module, Mux
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,8 +9,10 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.adaptive import AdaptiveScanner
 from contactfpga_hdl.audit import Audit, Bitmap
 from contactfpga_hdl.debounce import Debounce
+from contactfpga_hdl.divide import Divide
 from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
+from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
@@ -25,7 +27,8 @@ class Top(wiring.Component):
     ``column_data``.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
-    labeller, zone records (or with ``report = "cells"`` bitmap rows), and bytes.
+    labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
+    the records, and bytes.
     """
 
     def __init__(self, skin: Skin, probes: bool = False):
@@ -50,6 +53,9 @@ class Top(wiring.Component):
                 "byte_transfer": Out(1),
                 "byte_data": Out(8),
             }
+            if skin.report == "barycenter":
+                ports["record_data"] = Out(moments_layout(derived).size)
+                ports |= {"item_transfer": Out(1), "item_data": Out(8 * derived.item_bytes), "item_end": Out(1)}
         super().__init__(ports)
 
     def elaborate(self, platform):
@@ -60,10 +66,10 @@ class Top(wiring.Component):
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
         rows = self._debounced(m, scan)
-        if self.skin.report == "moments":
-            self._zones(m, rows, scan, link)
-        else:
+        if self.skin.report == "cells":
             self._cells(m, rows, scan, link)
+        else:
+            self._zones(m, rows, scan, link)
         wiring.connect(m, link.bytes, transmitter.bytes)
         connect_pins(m, scan.pins, self)
         m.d.comb += [
@@ -94,7 +100,10 @@ class Top(wiring.Component):
         m.submodules.audit = audit = Audit(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)
-        wiring.connect(m, audit.items, link.items)
+        if self.skin.report == "barycenter":
+            self._divided(m, audit, link)
+        else:
+            wiring.connect(m, audit.items, link.items)
         m.d.comb += [
             audit.taken.eq(rows.valid & rows.ready),
             audit.row.eq(rows.payload),
@@ -103,6 +112,14 @@ class Top(wiring.Component):
         if self.probes:
             record = label.records.payload
             self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+
+    def _divided(self, m, audit, link):
+        m.submodules.divide = divide = Divide(self.skin)
+        wiring.connect(m, audit.items, divide.records)
+        wiring.connect(m, divide.items, link.items)
+        if self.probes:
+            item = divide.items.payload
+            self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
 
     def _cells(self, m, rows, scan, link):
         m.submodules.bitmap = bitmap = Bitmap(self.skin)

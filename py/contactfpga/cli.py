@@ -125,6 +125,9 @@ def _replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help="default: 8")
     parser.add_argument("--threshold", type=float, help="cells above this count as pressed; needed for numbers")
     parser.add_argument("--pitch-mm", type=float, default=10.0, help="distance of rows and columns (default: 10)")
+    parser.add_argument(
+        "--barycenter-bits", type=int, metavar="K", help="barycenters divided on the board, to 1/2^K cell"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a frame and line")
 
 

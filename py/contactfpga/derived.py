@@ -46,9 +46,11 @@ class Derived:
 
     @property
     def release_clocks(self) -> int:
-        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched or chosen."""
+        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched, or chosen and
+        then shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
-        return max(self.clocks(self.skin.release_us), column, self.row_latch_clocks, self.choice_clocks)
+        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
+        return max(self.clocks(self.skin.release_us), column, row)
 
     @property
     def row_clocks(self) -> int:
@@ -109,7 +111,7 @@ class Derived:
         until the one before it is packed: the scanner's tag is kept for no longer."""
         if self.skin.scan == "adaptive":
             return max(self._handing_clocks, *map(self._packing_clocks, range(self.skin.rows + 1)))
-        packed = self._packed_clocks + self.max_stored_bytes
+        packed = self._packed_clocks + self._items_clocks(self.max_items)
         return max(self.skin.columns + 6, 10, self.label_clocks + 1, math.ceil(packed / self.skin.rows))
 
     @property
@@ -125,7 +127,7 @@ class Derived:
     def _handing_clocks(self) -> int:
         """An adaptive scan hands on all that a slot tells before the next one's strobe: a row that was driven alone,
         then all others as empty, a row a clock, up to the end mark."""
-        serial = self.skin.labeller == "serial" and self.skin.report == "moments"
+        serial = self.skin.labeller == "serial" and self.skin.report != "cells"
         busy = self.label_clocks if serial else self.label_clocks - 2
         empty = self.skin.columns + 2 if serial else 1
         return self._debounce_clocks + 2 * busy + self.skin.rows * empty + 8
@@ -139,9 +141,16 @@ class Derived:
             items = min(rows, math.ceil(self.skin.rows / 2)) * math.ceil(self.skin.columns / 2)
         else:
             items = math.ceil(rows * self.skin.columns / 2)
-        plain = min(items, self.max_items) * self.item_bytes + self.trailer_bytes
-        clocks = self._packed_clocks + self.skin.rows + plain + math.ceil(plain / 254)
+        clocks = self._packed_clocks + self.skin.rows + self._items_clocks(min(items, self.max_items))
         return math.ceil(clocks / min(rows + 1, self.skin.rows))
+
+    def _items_clocks(self, items: int) -> int:
+        """For a frame's items and trailer, a byte a clock; where items are divided that takes longer than packing."""
+        plain = items * self.item_bytes + self.trailer_bytes
+        stuffing = math.ceil(plain / 254)
+        if self.skin.report != "barycenter":
+            return plain + stuffing
+        return items * self.item_clocks + self.item_bytes + self.trailer_bytes + stuffing
 
     @property
     def keep_alive_frames(self) -> int:
@@ -210,9 +219,40 @@ class Derived:
         return self.skin.max_zones().bit_length()
 
     @functools.cached_property
+    def record_bits(self) -> tuple[int, int, int]:
+        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter.
+
+        An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
+        sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
+        """
+        if self.skin.report != "barycenter":
+            return self.area_bits, self.sum_x_bits, self.sum_y_bits
+        x_bits, y_bits = (
+            max(1, (lines - 1 << self.skin.barycenter_bits).bit_length())
+            for lines in (self.skin.columns, self.skin.rows)
+        )
+        return max(1, (self.cells - 1).bit_length()), x_bits, y_bits
+
+    @functools.cached_property
     def record_bytes(self) -> int:
         """Bytes of one zone on the wire."""
-        return math.ceil((self.area_bits + self.sum_x_bits + self.sum_y_bits) / 8)
+        return math.ceil(sum(self.record_bits) / 8)
+
+    @property
+    def cell_bits(self) -> int:
+        """Of a whole number of cells that a barycenter can be away from the origin, along the longer side."""
+        return (max(self.skin.rows, self.skin.columns) - 1).bit_length()
+
+    @property
+    def quotient_bits(self) -> int:
+        """Of a barycenter before it is rounded: one fraction bit more than there will be. One comes each clock."""
+        return self.cell_bits + self.skin.barycenter_bits + 1
+
+    @property
+    def item_clocks(self) -> int:
+        """The most clocks from an item to the next while many wait."""
+        divided = self.quotient_bits + 1 if self.skin.report == "barycenter" else 0
+        return max(self.item_bytes, divided)
 
     @functools.cached_property
     def bitmap_row_bytes(self) -> int:
@@ -236,11 +276,11 @@ class Derived:
     @functools.cached_property
     def item_bytes(self) -> int:
         """Bytes of one item of a frame: a zone or a bitmap row."""
-        return self.record_bytes if self.skin.report == "moments" else self.bitmap_row_bytes
+        return self.bitmap_row_bytes if self.skin.report == "cells" else self.record_bytes
 
     @functools.cached_property
     def max_items(self) -> int:
-        return self.zone_capacity if self.skin.report == "moments" else self.skin.rows
+        return self.skin.rows if self.skin.report == "cells" else self.zone_capacity
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:
@@ -293,7 +333,7 @@ class Derived:
         adaptive = self.skin.scan == "adaptive"
         if self.skin.report == "cells":
             return 2 * self.skin.rows + 2 if adaptive else 4
-        busy = self.open_zones * self.record_bytes
+        busy = self.open_zones * self.item_clocks
         late = max(0.0, 1 - (1 if adaptive else 2) * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
 

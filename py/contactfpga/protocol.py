@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
-from contactfpga.skin import Skin
+from contactfpga.skin import BARYCENTER_BITS, MAX_BARYCENTER_BITS, Skin
 
 VERSION = 1
 DELIMITER = 0
@@ -18,6 +18,10 @@ DELIMITER = 0
 KIND_HELLO = 0
 KIND_ZONES = 1
 KIND_CELLS = 2
+KIND_BARYCENTERS = 3
+
+KINDS = {"moments": KIND_ZONES, "cells": KIND_CELLS, "barycenter": KIND_BARYCENTERS}
+"""Of a frame, by the Skin's ``report``."""
 
 FLAGS = ("overflow", "mismatch", "requested")
 """Names of a frame's flags, lowest bit first."""
@@ -26,12 +30,11 @@ FLAG_BITS = len(FLAGS)
 KIND_BITS = 2
 
 _HELLO = struct.Struct("<BBBHfff8s")
-_OPTIONS: dict[str, tuple[Any, ...]] = {
-    "connectivity": (8, 4),
-    "report": ("moments", "cells"),
-    "send": ("always", "on_change"),
-    "ghosts": (False, True),
-}
+_OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
+_FRACTION = len(_OPTIONS)
+"""Four of the options' bits from here on: 0, or with ``report = "barycenter"`` one more than its fraction bits."""
+_GHOSTS = _FRACTION + 4
+"""The bit that is set without diodes."""
 
 
 class PacketError(ValueError):
@@ -65,6 +68,7 @@ class Hello:
     columns: int
     connectivity: int
     report: str
+    barycenter_bits: int
     send: str
     zone_capacity: int
     pitch_x_mm: float
@@ -95,7 +99,7 @@ class Hello:
 
 
 _FACTS = (
-    *("rows", "columns", "connectivity", "report", "zone_capacity"),
+    *("rows", "columns", "connectivity", "report", "barycenter_bits", "zone_capacity"),
     *("pitch_x_mm", "pitch_y_mm", "radius_mm"),
 )
 
@@ -118,9 +122,12 @@ class Frame:
     cells: int
     """Pressed switches."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each zone the frame carries."""
+    """(n, 3) int64: area, sum x, sum y of each zone the frame carries; (0, 3) with another report than ``moments``."""
     bitmap: np.ndarray | None
     """(rows, columns) bool with ``report = "cells"``, else None."""
+    barycenters: np.ndarray | None = None
+    """With ``report = "barycenter"`` (n, 3) int64: area, x, y of each zone the frame carries, x and y in cells /
+    2^``barycenter_bits``; else None."""
 
 
 def cobs_encode(data: bytes) -> bytes:
@@ -187,7 +194,12 @@ def unseal(packet: bytes) -> bytes:
 def encode_hello(skin: Skin) -> bytes:
     """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
     facts = Hello.of(skin)
-    options = sum(choices.index(getattr(facts, name)) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
+    chosen = {name: getattr(facts, name) for name in _OPTIONS}
+    options = facts.ghosts << _GHOSTS
+    if facts.report == "barycenter":
+        chosen["report"] = "moments"
+        options |= facts.barycenter_bits + 1 << _FRACTION
+    options |= sum(choices.index(chosen[name]) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
     plain = _HELLO.pack(
         facts.rows,
         facts.columns,
@@ -206,9 +218,12 @@ def decode_hello(plain: bytes) -> Hello:
     if kind_of(plain) != KIND_HELLO or len(plain) != _HELLO.size + 1:
         raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
     rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[:-1])
-    if options >> len(_OPTIONS):
-        raise PacketError("content", f"hello with options {options:#x}; this version knows {len(_OPTIONS)} of them")
     chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
+    chosen["barycenter_bits"] = BARYCENTER_BITS
+    if fraction := options >> _FRACTION & (1 << _GHOSTS - _FRACTION) - 1:
+        if fraction > MAX_BARYCENTER_BITS + 1 or chosen["report"] != "moments":
+            raise PacketError("content", f"hello with options {options:#x}, which this version does not know")
+        chosen |= {"report": "barycenter", "barycenter_bits": fraction - 1}
     return Hello(
         rows=rows,
         columns=columns,
@@ -217,6 +232,7 @@ def decode_hello(plain: bytes) -> Hello:
         pitch_y_mm=_shortest(pitch_y),
         radius_mm=_shortest(radius) or None,
         fingerprint=fingerprint,
+        ghosts=bool(options >> _GHOSTS),
         **chosen,
     )
 
@@ -228,7 +244,7 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
     flag a mismatch, its cells with its zones.
     """
     skin = derived.skin
-    kind = KIND_ZONES if skin.report == "moments" else KIND_CELLS
+    kind = KINDS[skin.report]
     if kind_of(plain) != kind:
         raise PacketError("kind", f"packet of kind {kind_of(plain)}; report = {skin.report!r} sends kind {kind}")
     body = len(plain) - derived.trailer_bytes
@@ -244,7 +260,7 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
     carried = min(expected, derived.max_items)
     if items != carried or ("overflow" in flags) != (carried < expected):
         raise PacketError("length", f"frame carries {items} items, states {expected} and the flags {sorted(flags)}")
-    if zones > (skin.max_zones() if skin.report == "moments" else 0):
+    if zones > (0 if skin.report == "cells" else skin.max_zones()):
         raise PacketError("content", f"frame states {zones} zones; the sheet holds at most {skin.max_zones()}")
     frame = Frame(
         sequence=sequence,
@@ -254,16 +270,17 @@ def decode_frame(plain: bytes, derived: Derived) -> Frame:
         stuck=stuck,
         zones=zones,
         cells=cells,
-        moments=_moments(plain[:body], items, derived) if skin.report == "moments" else _NO_MOMENTS,
+        moments=_records(plain[:body], items, derived) if skin.report == "moments" else _NO_RECORDS,
         bitmap=_bitmap(plain[:body], derived) if skin.report == "cells" else None,
+        barycenters=_barycenters(plain[:body], items, derived) if skin.report == "barycenter" else None,
     )
     if "mismatch" not in flags:
         _check_sums(frame, derived)
     return frame
 
 
-_NO_MOMENTS = np.zeros((0, 3), np.int64)
-_NO_MOMENTS.flags.writeable = False
+_NO_RECORDS = np.zeros((0, 3), np.int64)
+_NO_RECORDS.flags.writeable = False
 _FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << FLAG_BITS)]
 
 
@@ -274,30 +291,44 @@ def _check_sums(frame: Frame, derived: Derived) -> None:
         carried = int(frame.bitmap.sum())
         possible = carried == frame.cells
     else:
-        area, sum_x, sum_y = frame.moments.T.tolist()
+        most_x, most_y = skin.columns - 1, skin.rows - 1
+        if frame.barycenters is None:
+            area, x, y = frame.moments.T.tolist()
+            inside = all(x <= a * most_x and y <= a * most_y for a, x, y in zip(area, x, y))
+        else:
+            area, x, y = frame.barycenters.T.tolist()
+            bits = skin.barycenter_bits
+            inside = all(x <= most_x << bits and y <= most_y << bits for x, y in zip(x, y))
         carried = sum(area)
         possible = (
-            all(area)
-            and all(x <= a * (skin.columns - 1) and y <= a * (skin.rows - 1) for a, x, y in zip(area, sum_x, sum_y))
-            and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
+            all(area) and inside and (carried < frame.cells if "overflow" in frame.flags else carried == frame.cells)
         )
     if not possible or frame.cells > derived.cells:
         raise PacketError("content", f"frame carries {carried} cells and states {frame.cells}, or zones that cannot be")
 
 
-def _moments(data: bytes, zones: int, derived: Derived) -> np.ndarray:
+def _records(data: bytes, zones: int, derived: Derived) -> np.ndarray:
+    """(zones, 3) int64: the fields of zone records."""
     if not zones:
-        return _NO_MOMENTS
-    size, area_bits, sum_x_bits = derived.record_bytes, derived.area_bits, derived.sum_x_bits
-    area_mask, sum_x_mask, shift = (1 << area_bits) - 1, (1 << sum_x_bits) - 1, area_bits + sum_x_bits
+        return _NO_RECORDS
+    size = derived.record_bytes
+    area_bits, x_bits, y_bits = derived.record_bits
+    area_mask, x_mask, shift = (1 << area_bits) - 1, (1 << x_bits) - 1, area_bits + x_bits
     rows = []
     for start in range(0, len(data), size):
         word = int.from_bytes(data[start : start + size], "little")
-        rows.append((word & area_mask, word >> area_bits & sum_x_mask, word >> shift))
-    moments = np.array(rows, np.int64)
-    if max(row[2] for row in rows) >> derived.sum_y_bits:
+        rows.append((word & area_mask, word >> area_bits & x_mask, word >> shift))
+    if max(row[2] for row in rows) >> y_bits:
         raise PacketError("content", "a zone record is filled up with something other than zeros")
-    return moments
+    return np.array(rows, np.int64)
+
+
+def _barycenters(data: bytes, zones: int, derived: Derived) -> np.ndarray:
+    """The same with ``report = "barycenter"``; where all cells of the sheet are sent as 0 they are put back."""
+    records = _records(data, zones, derived)
+    if derived.cells == 1 << derived.record_bits[0] and zones:
+        records[records[:, 0] == 0, 0] = derived.cells
+    return records
 
 
 def _bitmap(data: bytes, derived: Derived) -> np.ndarray:

@@ -215,8 +215,14 @@ class Receiver:
         return raw + WRAP_US * round((likely - raw) / WRAP_US)
 
 
+def report_of(told: Hello | Skin) -> str:
+    """What a board reports, in words."""
+    precise = f" of {told.barycenter_bits} fraction bits" if told.report == "barycenter" else ""
+    return f"report {told.report!r}{precise}"
+
+
 def _describe(hello: Hello) -> str:
     return (
-        f"a {hello.rows}x{hello.columns} Skin (fingerprint {hello.fingerprint.hex()}, report {hello.report!r}, "
+        f"a {hello.rows}x{hello.columns} Skin (fingerprint {hello.fingerprint.hex()}, {report_of(hello)}, "
         f"connectivity {hello.connectivity})"
     )

@@ -19,6 +19,9 @@ MAX_BAUD_ERROR = 0.015
 MAX_KEEP_ALIVE_MS = 100.0
 MAX_DEBOUNCE_SCANS = 4095
 SHIFT_HZ = 8_000_000
+BARYCENTER_BITS = 4
+MAX_BARYCENTER_BITS = 8
+MAX_DIVIDED_ZONES = 64
 MIN_SHIFT_HZ, MAX_SHIFT_HZ = 10_000, 50_000_000
 
 _CHOICES: dict[str, tuple[Any, ...]] = {
@@ -30,11 +33,11 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "column_read": ("direct", "74hc165"),
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "labeller": ("run", "serial", "projection", "single"),
-    "report": ("moments", "cells"),
+    "report": ("moments", "barycenter", "cells"),
     "send": ("always", "on_change"),
 }
 
-_WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "clock_hz", "baud")
+_WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "clock_hz", "baud")
 
 
 class SkinError(ContactFPGAError, ValueError):
@@ -99,13 +102,17 @@ class Skin:
     a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
     cells are one zone."""
     report: str = "moments"
-    """``moments``: area, sum x and sum y of each zone; ``cells``: the pressed cells as a bitmap."""
+    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
+    rounded; ``cells``: the pressed cells as a bitmap."""
+    barycenter_bits: int = BARYCENTER_BITS
+    """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upwards."""
     send: str = "always"
     """``always``: every frame; ``on_change``: a frame whose cells differ from the last one, or a keep-alive."""
     keep_alive_ms: float = 100.0
     """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
     zone_capacity: int | None = None
-    """Zones a frame can carry. None: the most that can occur up to 32x32, at most 256 above; then filled in."""
+    """Zones a frame can carry. None: the most that can occur up to 32x32, at most 256 above, and with
+    ``report = "barycenter"`` at most 64; then filled in."""
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
@@ -151,8 +158,12 @@ class Skin:
         return cls(**values)
 
     def replace(self, **changes: Any) -> Skin:
-        """A copy with some fields changed, checked again. A changed sheet gets its default capacity again."""
-        if {"rows", "columns", "connectivity"} & set(changes):
+        """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
+        one that begins or ends to divide."""
+        divides = self.report == "barycenter"
+        if {"rows", "columns", "connectivity"} & set(changes) or divides != (
+            changes.get("report", self.report) == "barycenter"
+        ):
             changes.setdefault("zone_capacity", None)
         return dataclasses.replace(self, **changes)
 
@@ -167,7 +178,10 @@ class Skin:
     @property
     def fingerprint(self) -> bytes:
         """Eight bytes that differ between any two Skins that are not the same."""
-        canonical = json.dumps(dataclasses.asdict(self), sort_keys=True)
+        fields = dataclasses.asdict(self)
+        if self.report != "barycenter":
+            del fields["barycenter_bits"]  # says nothing there, and boards built before it was a field have none
+        canonical = json.dumps(fields, sort_keys=True)
         return hashlib.sha256(canonical.encode()).digest()[:8]
 
     @property
@@ -192,7 +206,8 @@ class Skin:
 
     def _default_capacity(self) -> int:
         small = self.rows <= 32 and self.columns <= 32
-        return self.max_zones() if small else min(self.max_zones(), 256)
+        most = self.max_zones() if small else min(self.max_zones(), 256)
+        return min(most, MAX_DIVIDED_ZONES) if self.report == "barycenter" else most
 
     def _check_types(self) -> None:
         for name, choices in _CHOICES.items():
@@ -282,15 +297,19 @@ class Skin:
         if self.scan == "raster":
             return
         _within("rows", self.rows, 2, MAX_LINES, "with scan = 'adaptive'")
-        for name in ("row_drive", "column_read"):
-            if getattr(self, name) != "direct":
-                raise SkinError(f"{name} is {getattr(self, name)!r}; scan = 'adaptive' needs {name} = 'direct'")
+        if self.column_read != "direct":
+            raise SkinError(
+                f"column_read is {self.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
+                "the columns of an untouched sheet in each clock"
+            )
 
     def _check_ghosts(self) -> None:
         """Without diodes only what can still be told apart from ghosts is taken."""
         if not self.ghosts:
             return
         wanted: dict[str, Any] = {"scan": "raster", "row_drive": "direct"}
+        if self.report == "barycenter":
+            raise SkinError("report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'")
         if self.report == "moments":
             wanted |= {"connectivity": 4, "labeller": "run" if self.labeller != "serial" else "serial"}
         for name, value in wanted.items():
@@ -304,6 +323,9 @@ class Skin:
             )
 
     def _check_link(self) -> None:
+        _within("barycenter_bits", self.barycenter_bits, 0, MAX_BARYCENTER_BITS)
+        if self.report != "barycenter" and self.barycenter_bits != BARYCENTER_BITS:
+            raise SkinError(f"barycenter_bits is {self.barycenter_bits}; leave it out, or set report = 'barycenter'")
         if self.clock_hz % 1_000_000 or not 1_000_000 <= self.clock_hz <= 400_000_000:
             raise SkinError(f"clock_hz is {self.clock_hz}; it must be a whole number of MHz from 1 to 400 MHz")
         _within("baud", self.baud, 1200, self.clock_hz // 2, "for this clock")
@@ -332,10 +354,11 @@ class Skin:
                 raise SkinError(f"{name} is {getattr(self, name)}; it must be at least one clock, {1 / megahertz:g} us")
         if derived.row_clocks < derived.min_row_clocks:
             rows = f"{self.rows} rows, " if self.scan == "adaptive" else ""
+            divided = " and report = 'barycenter'" if self.report == "barycenter" else ""
             raise SkinError(
                 f"settle_us + release_us is {derived.row_clocks} clocks; {rows}{self.columns} columns and "
                 f"{self.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
-                f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{self.labeller}'"
+                f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{self.labeller}'{divided}"
             )
         if self.send == "on_change" and derived.keep_alive_frames < 1:
             raise SkinError(

@@ -31,6 +31,10 @@ DTYPE = np.dtype(
 )
 """Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
 
+_UNSENT = ("sum_x", "sum_y")
+DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if name not in _UNSENT])
+"""The same with ``report = "barycenter"``, whose boards send no sums."""
+
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Zone:
@@ -38,16 +42,17 @@ class Zone:
 
     area_cells: int
     """Pressed cells."""
-    sum_x: int
-    """Sum of the cells' columns, exact."""
-    sum_y: int
-    """Sum of the cells' rows, exact."""
+    sum_x: int | None
+    """Sum of the cells' columns, exact; None with ``report = "barycenter"``, which does not send it."""
+    sum_y: int | None
+    """Sum of the cells' rows, exact; None likewise."""
     area_mm2: float
     """Area of the cells in mm2, measured on the sheet."""
     x_mm: float
-    """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0."""
+    """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0. It is off by at most
+    :attr:`Zones.rounding_mm`."""
     y_mm: float
-    """Barycenter along the rows in mm; row 0 lies at 0."""
+    """Barycenter along the rows in mm; row 0 lies at 0. It is off by at most :attr:`Zones.rounding_mm`."""
     point_mm: Vector
     """Barycenter in the link's frame in mm; it lies on the surface."""
     normal: Vector
@@ -118,31 +123,52 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def _suspects(self) -> list[bool]:
         if not self.skin.ghosts:
-            return [False] * len(self.frame.moments)
+            return [False] * len(self)
         return ghosts.zones(self.frame, self._before)
+
+    @property
+    def rounding_mm(self) -> tuple[float, float]:
+        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``, else
+        0."""
+        if self.skin.report != "barycenter":
+            return 0.0, 0.0
+        steps = 2 << self.skin.barycenter_bits
+        return self.skin.pitch_x_mm / steps, self.skin.pitch_y_mm / steps
 
     @functools.cached_property
     def array(self) -> np.ndarray:
-        """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones."""
-        array = np.array([dataclasses.astuple(zone) for zone in self._zones], DTYPE)
+        """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones. It has no ``sum_x`` and
+        ``sum_y`` with ``report = "barycenter"``."""
+        dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
+        assert dtype.names is not None
+        array = np.array([tuple(getattr(zone, name) for name in dtype.names) for zone in self._zones], dtype)
         array.flags.writeable = False
         return array
 
     @functools.cached_property
     def _zones(self) -> tuple[Zone, ...]:
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
-        both = zip(self.frame.moments.tolist(), self._suspects)
-        zones = [self._zone(area, sum_x, sum_y, ghost) for (area, sum_x, sum_y), ghost in both]
+        make = self._exact if self.frame.barycenters is None else self._divided
+        both = zip(self._records.tolist(), self._suspects)
+        zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
         zones.sort(key=lambda zone: (zone.y_mm, zone.x_mm, zone.area_cells))
         return tuple(zones)
 
-    def _zone(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
-        skin = self.skin
+    def _exact(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
         # Only a frame that is flagged `mismatch` may hold an area of 0.
-        x_mm = sum_x / area * skin.pitch_x_mm if area else math.nan
-        y_mm = sum_y / area * skin.pitch_y_mm if area else math.nan
-        area_mm2 = area * (skin.pitch_x_mm * skin.pitch_y_mm)
-        point_mm, normal = on_surface(x_mm, y_mm, skin.radius_mm)
+        x_mm = sum_x / area * self.skin.pitch_x_mm if area else math.nan
+        y_mm = sum_y / area * self.skin.pitch_y_mm if area else math.nan
+        return self._placed(area, sum_x, sum_y, x_mm, y_mm, ghost)
+
+    def _divided(self, area: int, x: int, y: int, ghost: bool) -> Zone:
+        steps = 1 << self.skin.barycenter_bits
+        x_mm = x / steps * self.skin.pitch_x_mm if area else math.nan
+        y_mm = y / steps * self.skin.pitch_y_mm if area else math.nan
+        return self._placed(area, None, None, x_mm, y_mm, ghost)
+
+    def _placed(self, area: int, sum_x: int | None, sum_y: int | None, x_mm: float, y_mm: float, ghost: bool) -> Zone:
+        area_mm2 = area * (self.skin.pitch_x_mm * self.skin.pitch_y_mm)
+        point_mm, normal = on_surface(x_mm, y_mm, self.skin.radius_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
 
     @overload
@@ -155,7 +181,11 @@ class Zones(Sequence[Zone]):
         return self._zones[index]
 
     def __len__(self) -> int:
-        return len(self.frame.moments)
+        return len(self._records)
+
+    @property
+    def _records(self) -> np.ndarray:
+        return self.frame.moments if self.frame.barycenters is None else self.frame.barycenters
 
     def __iter__(self) -> Iterator[Zone]:
         return iter(self._zones)
@@ -179,6 +209,7 @@ class Zones(Sequence[Zone]):
             for name in ("sequence", "time_us", "overwritten", "stuck", "total_zones", "pressed")
         }
         values["flags"] = sorted(self.flags)
+        values["rounding_mm"] = list(self.rounding_mm)
         values["zones"] = [dataclasses.asdict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]

@@ -10,7 +10,7 @@ from amaranth.sim import Simulator
 
 from contactfpga_hdl.top import Top
 from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.record import LEVELS, PAYLOADS, OutOfTime, Recorder, Stimulus
+from contactfpga_sim.record import LEVELS, PAYLOADS, OutOfTime, Recorder, Stimulus, ports
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -23,8 +23,9 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
     simulator.add_clock(1e-6)
     recorder = Recorder(cycles)
     stimulus = Stimulus(skin, timeline)
-    levels = Cat(*(getattr(top, name) for name in LEVELS))
-    payloads = [getattr(top, name) for name in PAYLOADS]
+    levels = Cat(*(getattr(top, name) for name in ports(LEVELS, skin)))
+    names = ports(PAYLOADS, skin)
+    payloads = [getattr(top, name) for name in names]
     reads = {name: getattr(top, name) for name in stimulus.reads}
     drives = Cat(*(getattr(top, name) for name in stimulus.drives))
     above = len(getattr(top, stimulus.drives[0]))
@@ -35,7 +36,7 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
             sheet, rx = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
             ctx.set(drives, sheet | rx << above)
             _, _, level, *values = await ctx.tick().sample(levels, *payloads)
-            recorder.note(cycle, level, dict(zip(PAYLOADS, values, strict=True)).__getitem__)
+            recorder.note(cycle, level, dict(zip(names, values, strict=True)).__getitem__)
             if cycle % 256 == 0 and time.monotonic() > deadline:
                 raise OutOfTime(f"{cycle} of {cycles} cycles simulated in {limit_s:g} s")
 

@@ -39,7 +39,7 @@ def trace(events: Mapping[str, np.ndarray], cycles: int) -> Trace:
     result = Trace(cycles)
     for name in BOUNDARIES:
         columns = [events[name]["cycle"].tolist(), events[name]["data"].tolist()]
-        if name in ("rows", "records"):
+        if name in ("rows", "records", "items"):
             columns.append(events[name]["mark"].astype(bool).tolist())
         setattr(result, name, list(zip(*columns)))
     return result

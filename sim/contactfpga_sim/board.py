@@ -17,14 +17,15 @@ from contactfpga_sim.circuit import Line
 if TYPE_CHECKING:
     import argparse
 
-BOUNDARIES = ("rows", "records", "bytes", "line", "contact", "driven", "received")
-"""What a board notes: transfers of rows, zone records and bytes, changes of the transmit and of the contact pin and
-of the rows that are driven, and bytes decoded from the line. The order is that of the driver."""
+BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact", "driven", "received")
+"""What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
+the transmit and of the contact pin and of the rows that are driven, and bytes decoded from the line. The order is that
+of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven rows; and for a row whether it is the frame's last, for a record whether it is
-the end mark."""
+wire, the byte, the level or the driven rows; and for a row whether it is the frame's last, for a record or an item
+whether it is the end mark."""
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -199,6 +200,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
             "BIT_CLOCKS": Derived(skin).bit_clocks,
             "PROBES": int(netlist is None),
+            "DIVIDED": int(skin.report == "barycenter"),
         },
     )
 

@@ -11,7 +11,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
 
-from contactfpga_sim.record import LEVELS, PAYLOADS, Recorder, Stimulus
+from contactfpga_sim.record import LEVELS, PAYLOADS, Recorder, Stimulus, ports
 
 
 @cocotb.test()
@@ -20,8 +20,8 @@ async def record(dut) -> None:
     job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
     recorder = Recorder(job["cycles"])
     stimulus = Stimulus(job["skin"], job["timeline"])
-    levels = [getattr(dut, name) for name in LEVELS]
-    payloads = {name: getattr(dut, name) for name in PAYLOADS}
+    levels = [getattr(dut, name) for name in ports(LEVELS, job["skin"])]
+    payloads = {name: getattr(dut, name) for name in ports(PAYLOADS, job["skin"])}
     deadline = time.monotonic() + job["limit_s"]
     reads = {name: getattr(dut, name) for name in stimulus.reads}
     drives = [getattr(dut, name) for name in stimulus.drives]

@@ -65,8 +65,8 @@ def describe(boundary: str, event: Event) -> str:
     match boundary:
         case "rows":
             return f"row {event[1]:#b}" + (" (last)" if event[2] else "")
-        case "records":
-            return f"{'end mark' if event[2] else 'record'} {event[1]:#x}"
+        case "records" | "items":
+            return f"{'end mark' if event[2] else boundary[:-1]} {event[1]:#x}"
         case "bytes":
             return f"byte {event[1]:#04x}"
         case _:

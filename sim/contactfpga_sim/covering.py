@@ -19,7 +19,8 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
     "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
     "labeller": ("run", "serial", "projection", "single"),
-    "report": ("moments", "cells"),
+    "report": ("moments", "barycenter", "cells"),
+    "barycenter_bits": (4, 0, 3),
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),
     "capacity": ("default", "one", "half"),
@@ -35,11 +36,9 @@ CHOICES: dict[str, tuple[Any, ...]] = {
 ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("adaptive",),
     "sheet": ((2, 1), (2, 9), (9, 1), (5, 7), (12, 4), (16, 16), (33, 3)),
-    "row_chains": (0,),
     "column_chains": (0,),
-    "shift_hz": (8_000_000,),
 }
-"""The same for the adaptive scan, which takes rows and columns on pins of their own only."""
+"""The same for the adaptive scan, which takes columns on pins of their own only."""
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
@@ -101,6 +100,8 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     elif columns > 1 and choice["mask"] == "column":
         values["mask"] = tuple((row, columns // 2) for row in range(rows))
     values |= _registers(choice)
+    if choice["report"] == "barycenter":
+        values["barycenter_bits"] = choice["barycenter_bits"]
     most = Skin(rows=rows, columns=columns, connectivity=choice["connectivity"], settle_us=1000.0).max_zones()
     if choice["capacity"] != "default":
         values["zone_capacity"] = 1 if choice["capacity"] == "one" else -(-most // 2)

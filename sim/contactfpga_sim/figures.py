@@ -58,6 +58,10 @@ SETTINGS = {
 }
 
 
+REPORTS = ("moments", "barycenter")
+"""Those that report zones."""
+
+
 class Latency(NamedTuple):
     """Median and worst time in us from a switch closing to an event, over the touch instants."""
 
@@ -73,15 +77,27 @@ class Latency(NamedTuple):
         return f"{self.median:.1f} / {self.worst:.1f}"
 
 
-def touch_latencies(skin: Skin) -> dict[str, Latency]:
-    """From a single switch in the first row closing to the pin, and to the first and last byte of its frame.
+def one_switch(skin: Skin, row: int) -> np.ndarray:
+    """(R, C) bool: the switch in the middle of a row."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[row, skin.columns // 2] = True
+    return cells
 
-    The first row is the worst place: the rest of the scan follows it.
+
+def dots_in_last_row(skin: Skin) -> np.ndarray:
+    """(R, C) bool: every other switch of the last row, as many zones as can end in one row with 8-connectivity."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[-1, ::2] = True
+    return cells
+
+
+def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, Latency]:
+    """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
+    single one in the first row, which is the worst place: the rest of the scan follows it.
     """
     frame = Derived(skin).frame_clocks
-    untouched = np.zeros((skin.rows, skin.columns), bool)
-    touched = untouched.copy()
-    touched[0, skin.columns // 2] = True
+    touched = one_switch(skin, 0) if touched is None else touched
+    untouched = np.zeros_like(touched)
     found: dict[str, list[int]] = {"contact": [], "first byte": [], "last byte": []}
     for instant in range(INSTANTS):
         start = 8 * frame + instant * frame // INSTANTS
@@ -103,7 +119,7 @@ def _first_frame_with_cells(board: Board, skin: Skin) -> tuple[int, int]:
     for end in map(int, ends):
         packet = received[start:end]["data"].astype(np.uint8).tobytes()
         plain = protocol.unseal(packet)
-        if protocol.kind_of(plain) == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(skin)).cells:
+        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, Derived(skin)).cells:
             return int(received[start]["cycle"]) - 10 * Derived(skin).bit_clocks, int(received[end]["cycle"])
         start = end + 1
     raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
@@ -116,7 +132,7 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
     with Board(skin) as board:
         board.hold(cells[None], scans * Derived(skin).frame_clocks)
         packets = board.receive().split(b"\0")[:-1]
-        frames = [packet for packet in packets if protocol.kind_of(protocol.unseal(packet)) == protocol.KIND_ZONES]
+        frames = [packet for packet in packets if protocol.kind_of(protocol.unseal(packet)) != protocol.KIND_HELLO]
         return len(frames) / (board.cycle / skin.clock_hz), len(frames[-1]) + 1
 
 
@@ -137,6 +153,25 @@ def reference_row(name: str, skin: Skin) -> str:
     return f"| {name} | {scan:g} us | {latency['contact']} us | **{latency['last byte']} us** | {rate:,.0f} | {size} |"
 
 
+def report_table() -> str:
+    """What dividing on the board saves on the wire, and what it costs, over some sheets."""
+    lines = [
+        "| sheet | report | bytes a zone | first row | last row | every other switch of the last row |",
+        "|---|---|---|---|---|---|",
+    ]
+    names = ("reference", "32x32", "64x64")
+    return "\n".join(
+        lines + [report_row(name, SETTINGS[name].replace(report=report)) for name in names for report in REPORTS]
+    )
+
+
+def report_row(name: str, skin: Skin) -> str:
+    """One line of :func:`report_table`."""
+    scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
+    times = " | ".join(f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes)
+    return f"| {name} | `{skin.report}` | {Derived(skin).record_bytes} | {times} |"
+
+
 def labeller_table() -> str:
     """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
     lines = [
@@ -155,12 +190,21 @@ def labeller_row(labeller: str, size: int, connectivity: int) -> str:
     """One row of :func:`labeller_table`."""
     skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
     touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
-    shapes = np.stack([cells for _, cells in variants(size, size)])
-    with LabelBench(skin) as bench:
-        clocks = [bench.run(frames).last_record_clocks.max() for frames in (touches, shapes)]
+    clocks = [last_record_clocks(skin, touches), worst_last_record_clocks(skin)]
     more = math.ceil(size / 2) if connectivity == 8 else size
     bound = more + 4 if labeller == "run" else size + more + 1
     return f"| `{labeller}` | {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |"
+
+
+def worst_last_record_clocks(skin: Skin) -> int:
+    """Clocks from the last row to the last record, at most, over the shapes that break labellers."""
+    return last_record_clocks(skin, np.stack([cells for _, cells in variants(skin.rows, skin.columns)]))
+
+
+def last_record_clocks(skin: Skin, frames: np.ndarray) -> int:
+    """The same over (n, R, C) bool frames."""
+    with LabelBench(skin) as bench:
+        return int(bench.run(frames).last_record_clocks.max())
 
 
 def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
@@ -236,6 +280,7 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
 TABLES: dict[str, Callable[[], str]] = {
     "reference": reference_table,
     "labeller": labeller_table,
+    "report": report_table,
     "gain": lambda: gain_table(built_in_scenes()),
 }
 if RECORDINGS.is_dir():  # else their table stays as it is

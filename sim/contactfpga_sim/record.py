@@ -13,13 +13,19 @@ from contactfpga_sim.shift import Sheet
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact")
+LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer")
 """Ports of the top that are looked at in every cycle."""
 
-PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "byte_data")
+PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "item_end", "byte_data")
 """Ports of the top that are read when something is transferred."""
 
-_ROW, _RECORD, _BYTE, _TX, _CONTACT = (1 << place for place in range(len(LEVELS)))
+
+def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
+    """Those of the names that the top of a Skin has."""
+    return tuple(name for name in names if not name.startswith("item_") or skin.report == "barycenter")
+
+
+_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM = (1 << place for place in range(len(LEVELS)))
 
 
 class OutOfTime(RuntimeError):
@@ -75,6 +81,8 @@ class Recorder:
             self.trace.rows.append((cycle, read("row_cells"), bool(read("row_last"))))
         if levels & _RECORD:
             self.trace.records.append((cycle, read("record_data"), bool(read("record_end"))))
+        if levels & _ITEM:
+            self.trace.items.append((cycle, read("item_data"), bool(read("item_end"))))
         if levels & _BYTE:
             self.trace.bytes.append((cycle, read("byte_data")))
         changed = levels ^ self._levels

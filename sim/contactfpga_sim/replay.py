@@ -90,12 +90,22 @@ def zones_bound(frames: np.ndarray, connectivity: int) -> int:
     return int(np.bincount(frame_of_run[~joined]).max(initial=0))
 
 
-def skin_for(rows: int, columns: int, connectivity: int, zones: int, pitch_mm: float = 10.0) -> Skin:
+def skin_for(
+    rows: int,
+    columns: int,
+    connectivity: int,
+    zones: int,
+    pitch_mm: float = 10.0,
+    barycenter_bits: int | None = None,
+) -> Skin:
     """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
 
-    Steps of the capacity are a third at most, so that recordings of one sheet share few builds.
+    With ``barycenter_bits`` the board divides, and reports so many fraction bits. Steps of the capacity are a third at
+    most, so that recordings of one sheet share few builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
+    if barycenter_bits is not None:
+        shape |= {"report": "barycenter", "barycenter_bits": barycenter_bits}
     most = Skin(**shape, zone_capacity=1).max_zones()
     steps = (step << shift for shift in range(12) for step in (4, 5, 6, 7))
     capacity = min(most, next(step for step in (1, 2, 3, *steps) if step >= zones))
@@ -189,7 +199,7 @@ class _Collector:
                 continue
             plain = protocol.unseal(bytes(self._packet))
             self._packet.clear()
-            if protocol.kind_of(plain) == protocol.KIND_ZONES:
+            if protocol.kind_of(plain) != protocol.KIND_HELLO:
                 yield from self._place(protocol.decode_frame(plain, self._derived), cycle)
 
     def _note_times(self, events: _Events) -> None:
@@ -233,10 +243,14 @@ class _Collector:
 
 def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
     """One input frame as ``contactfpga replay --json`` prints it."""
-    zones = []
+    zones: list[dict[str, Any]] = []
     for area, sum_x, sum_y in result.frame.moments.tolist():
         x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
         zones.append({"area": area, "sum_x": sum_x, "sum_y": sum_y, "x_mm": x_mm, "y_mm": y_mm})
+    if result.frame.barycenters is not None:
+        steps = 1 << skin.barycenter_bits
+        for area, x, y in result.frame.barycenters.tolist():
+            zones.append({"area": area, "x_mm": x * skin.pitch_x_mm / steps, "y_mm": y * skin.pitch_y_mm / steps})
     zones.sort(key=lambda zone: (zone["y_mm"], zone["x_mm"], zone["area"]))
     cycles = {
         "last_row_to_first_record": result.first_record,
@@ -247,11 +261,12 @@ def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
 
 
 def main(args: argparse.Namespace) -> int:
-    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.json."""
+    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.barycenter_bits,
+    args.json."""
     frames = read_frames(args.frames, args.threshold)
     _, rows, columns = frames.shape
     bound = zones_bound(frames, args.connectivity)
-    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm)
+    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm, args.barycenter_bits)
     started = time.monotonic()
     counts, late = [0], [0]
     for index, result in enumerate(replay(frames, skin)):

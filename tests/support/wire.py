@@ -5,7 +5,7 @@ import struct
 from cobs import cobs
 
 VERSION = 1
-HELLO, ZONES, CELLS = 0, 1, 2
+HELLO, ZONES, CELLS, BARYCENTERS = 0, 1, 2, 3
 FLAGS = {"overflow": 1, "mismatch": 2, "requested": 4}
 
 
@@ -64,6 +64,12 @@ class Wire:
             self.overwritten_bits += 1
 
     def record(self, area, sum_x, sum_y) -> bytes:
+        """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell."""
+        if self.skin.report == "barycenter":
+            step = 2**self.skin.barycenter_bits
+            area_bits = bits_for(self.skin.rows * self.skin.columns - 1)
+            x_bits, y_bits = (bits_for((lines - 1) * step) for lines in (self.skin.columns, self.skin.rows))
+            return fields((area % (1 << area_bits), area_bits), (sum_x, x_bits), (sum_y, y_bits))
         return fields((area, self.area_bits), (sum_x, self.sum_x_bits), (sum_y, self.sum_y_bits))
 
     def trailer(self, *, time=0, sequence=0, overwritten=0, stuck=0, cells=0, zones=0) -> bytes:
@@ -80,10 +86,11 @@ class Wire:
         body = b"".join(self.record(*row) for row in moments)
         cells = sum(row[0] for row in moments) if cells is None else cells
         zones = len(moments) if zones is None else zones
-        return body + self.trailer(cells=cells, zones=zones, **trailer) + last_byte(ZONES, flags, version)
+        kind = BARYCENTERS if self.skin.report == "barycenter" else ZONES
+        return body + self.trailer(cells=cells, zones=zones, **trailer) + last_byte(kind, flags, version)
 
     def zones(self, moments, **options) -> bytes:
-        """A frame with ``report = "moments"``; moments are (area, sum_x, sum_y)."""
+        """A frame with ``report = "moments"`` or ``"barycenter"``; moments are what :meth:`record` takes."""
         return seal(self.plain_zones(moments, **options))
 
     def plain_cells(self, bitmap, *, cells=None, flags=(), **trailer) -> bytes:
@@ -98,7 +105,9 @@ class Wire:
     def plain_hello(self, version=VERSION) -> bytes:
         skin = self.skin
         options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
-        options |= (skin.diodes == "none") << 3
+        if skin.report == "barycenter":
+            options |= (skin.barycenter_bits + 1) << 3
+        options |= (skin.diodes == "none") << 7
         sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
         lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0)
         return sizes + lengths + skin.fingerprint + last_byte(HELLO, version=version)

@@ -11,6 +11,7 @@ from pathlib import Path
 from contactfpga import driver, ports
 from contactfpga.driver import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.receiver import report_of
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
@@ -113,7 +114,7 @@ def hello(board: Board) -> Iterator[Finding]:
     surface = "plane" if skin.radius_mm is None else f"cylinder of radius {skin.radius_mm:g} mm"
     facts = (
         f"{skin.rows}x{skin.columns}, pitch {skin.pitch_x_mm:g} x {skin.pitch_y_mm:g} mm, {surface}, "
-        f"connectivity {skin.connectivity}, report {skin.report!r}, fingerprint {board.fingerprint.hex()}"
+        f"connectivity {skin.connectivity}, {report_of(skin)}, fingerprint {board.fingerprint.hex()}"
     )
     yield "ok", f"{board.port} says hello: {facts}"
 

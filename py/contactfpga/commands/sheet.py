@@ -25,7 +25,8 @@ def draw(zones: Zones) -> str:
 
 
 def _centres(zones: Zones) -> list[tuple[int, int]]:
-    return [(round(zone.sum_y / zone.area_cells), round(zone.sum_x / zone.area_cells)) for zone in _real(zones)]
+    skin = zones.skin
+    return [(round(zone.y_mm / skin.pitch_y_mm), round(zone.x_mm / skin.pitch_x_mm)) for zone in _real(zones)]
 
 
 def _discs(zones: Zones) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 
-from contactfpga_sim.chart import draw
+from contactfpga_sim.chart import draw, host, numbers
 from contactfpga_sim.chart.methods import METHODS
 from contactfpga_sim.chart.study import Point, Task, study
 from contactfpga_sim.families import FAMILIES
@@ -27,14 +27,12 @@ def main(args: argparse.Namespace) -> int:
         for method in args.method or METHODS
     ]
     with _executor(args) as executor:
-        points = _with_progress(tasks, executor, not args.no_size)
+        points = [host.timed(point) for point in _with_progress(tasks, executor, not args.no_size)]
     folder = Path(args.output)
     folder.mkdir(parents=True, exist_ok=True)
-    figure = draw.picture(points)
-    for ending in ("png", "svg"):
-        figure.savefig(folder / f"chart.{ending}", dpi=130, metadata={"Date": None} if ending == "svg" else None)
-    draw.write_csv(points, folder / "chart.csv")
-    for name in ("chart.png", "chart.svg", "chart.csv"):
+    numbers.write(points, folder / "chart.csv")
+    draw.save(numbers.read(folder / "chart.csv"), folder)
+    for name in ("chart.csv", "chart.png", "chart.svg"):
         print(folder / name)
     return 0
 

@@ -1,9 +1,7 @@
-"""The chart as a picture and as a table of numbers."""
+"""The chart as a picture."""
 
 from __future__ import annotations
 
-import csv
-import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,8 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactfpga_sim.chart.errors import METRICS
-from contactfpga_sim.chart.study import KINDS, Point, front
+from contactfpga_sim.chart.study import Point, front
 
 AXES = {
     "miscounted": "scenes miscounted, share",
@@ -31,13 +28,21 @@ COLOURS = {
     "projection": "#edae49",
     "single": "#66a182",
     "cells": "#8d6a9f",
+    "barycenter": "#5c4033",
 }
 MARKERS = {5.0: "s", 10.0: "o", 20.0: "^"}
 
 
+def save(points: Sequence[Point], folder: Path) -> None:
+    """``chart.png`` and ``chart.svg`` in a folder; the same points give the same files."""
+    with matplotlib.rc_context({"svg.hashsalt": "contactfpga", "svg.fonttype": "none"}):
+        figure = picture(points)
+        figure.savefig(folder / "chart.png", dpi=130)
+        figure.savefig(folder / "chart.svg", metadata={"Date": None})
+
+
 def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "barycenter_mm")) -> Figure:
     """A row of panels for each family of scenes, a column for each metric; both axes in powers of ten."""
-    matplotlib.rcParams["svg.hashsalt"] = "contactfpga"  # the same numbers give the same file
     families = list(dict.fromkeys(point.task.family for point in points))
     figure = Figure(figsize=(6.5 * len(metrics), 4.2 * len(families) + 1), layout="constrained")
     panels = figure.subplots(len(families), len(metrics), squeeze=False)
@@ -51,9 +56,12 @@ def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "ba
 
 
 def _panel(panel, points: Sequence[Point], metric: str) -> None:
-    panel.set(xscale="log", yscale="log", xlabel="touch to last byte, us (median; line to the worst)")
+    panel.set(xscale="log", yscale="log", xlabel="touch to the zones at the host, us (median; line to the worst)")
     panel.grid(alpha=0.2, which="both")
-    places = [(point.speed.median_us, max(point.errors["total"][metric].mean, FLOOR[metric])) for point in points]
+    places = [
+        (point.speed.median_us + point.host_us, max(point.errors["total"][metric].mean, FLOOR[metric]))
+        for point in points
+    ]
     best = front(places)
     corners = np.array([places[index] for index in best]).reshape(-1, 2)
     panel.step(*corners.T, where="post", color="black", linewidth=0.7)
@@ -61,7 +69,7 @@ def _panel(panel, points: Sequence[Point], metric: str) -> None:
     for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
         found, colour = point.errors["total"][metric], _colour(point)
         low, high = (max(end, FLOOR[metric]) for end in (found.low, found.high))
-        panel.plot([x, point.speed.worst_us], [y, y], color=colour, alpha=0.25, linewidth=1)
+        panel.plot([x, point.speed.worst_us + point.host_us], [y, y], color=colour, alpha=0.25, linewidth=1)
         panel.plot([x, x], [low, high], color=colour, alpha=0.35, linewidth=1)
         panel.plot(point.speed.bound_us, y, marker="|", color=colour, alpha=0.6)
         marker, edge = MARKERS[point.task.skin.pitch_x_mm], "black" if index in best else "white"
@@ -72,6 +80,10 @@ def _panel(panel, points: Sequence[Point], metric: str) -> None:
         text = "\n".join(map(_label, alike))
         panel.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4), fontsize=6)
     panel.margins(0.12, 0.2)
+
+
+def _place(point: Point, metric: str) -> tuple[float, float]:
+    return point.speed.median_us + point.host_us, max(point.errors["total"][metric].mean, FLOOR[metric])
 
 
 def _alike(place: tuple[float, float], other: tuple[float, float]) -> bool:
@@ -85,7 +97,9 @@ def _label(point: Point) -> str:
 
 def _colour(point: Point) -> str:
     skin = point.task.skin
-    kind = "cells" if skin.report == "cells" else "adaptive" if skin.scan == "adaptive" else skin.labeller
+    if skin.report != "moments":
+        return COLOURS[skin.report]
+    kind = "adaptive" if skin.scan == "adaptive" else skin.labeller
     return COLOURS[kind]
 
 
@@ -102,33 +116,3 @@ def _legend(points: Sequence[Point]):
     lines += [Line2D([], [], color="grey", marker="o", linestyle="", markeredgecolor="black", markeredgewidth=1.5)]
     lines += [Line2D([], [], color="grey", marker="|", linestyle="")]
     return lines, [*labels, "Pareto front", "bound of the time"]
-
-
-def command(point: Point) -> str:
-    """What works out this point alone."""
-    task = point.task
-    return (
-        f'contactfpga chart --method "{task.method}" --family {task.family} --placements {task.count} '
-        f"--seed {task.seed}"
-    )
-
-
-def write_csv(points: Sequence[Point], path: Path) -> None:
-    """All numbers, a line a point: errors with their 95 % intervals, times in us, LUT4 and clock on the UP5K."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        kinds = [f"{kind}_{name}{end}" for kind in KINDS for name in METRICS
-                 for end in ("", "_low", "_high")]  # fmt: skip
-        times = ("median_us", "worst_us", "bound_us")
-        table.writerow(["family", "method", "placements", *times, "luts", "fmax_mhz", *kinds, "command"])
-        for point in points:
-            values = [
-                f"{value:.6g}"
-                for kind in KINDS
-                for name in METRICS
-                for value in dataclasses.astuple(point.errors[kind][name])[:3]
-            ]
-            speeds = [f"{getattr(point.speed, name):.1f}" for name in times]
-            size = ["" if point.luts is None else point.luts, f"{point.fmax_mhz:.1f}" if point.fmax_mhz else ""]
-            task = point.task
-            table.writerow([task.family, task.method, task.count, *speeds, *size, *values, command(point)])

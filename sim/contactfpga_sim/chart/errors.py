@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from contactfpga.skin import Skin
 from contactfpga_sim.golden import label, zones
+from contactfpga_sim.golden.divide import barycenter
 from contactfpga_sim.truth import Truth
 
 Z95 = 1.959963984540054
@@ -75,17 +76,25 @@ def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
 
 
 def method_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
-    """What the Skin's labeller takes for zones, or with ``report = "cells"`` the host."""
+    """What the Skin's labeller takes for zones, or with ``report = "cells"`` the host; rounded if the board divides."""
     if skin.report == "cells":
         return exact_zones(cells, skin)
     work = label.labelling(cells, skin.connectivity, skin.labeller)
-    return [_blob((zone.area, zone.sum_x, zone.sum_y), skin) for zone in work.departures]
+    blob = _rounded if skin.report == "barycenter" else _blob
+    return [blob((zone.area, zone.sum_x, zone.sum_y), skin) for zone in work.departures]
 
 
 def _blob(moments: tuple[int, int, int], skin: Skin) -> Blob:
     area, sum_x, sum_y = moments
     cell = skin.pitch_x_mm * skin.pitch_y_mm
     return Blob(area * cell, sum_x / area * skin.pitch_x_mm, sum_y / area * skin.pitch_y_mm)
+
+
+def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
+    """The same with the barycenter that a board sends with ``report = "barycenter"``."""
+    area, *sums = moments
+    x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
+    return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
 
 
 @dataclasses.dataclass(frozen=True)

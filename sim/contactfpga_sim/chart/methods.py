@@ -22,6 +22,9 @@ def _methods() -> dict[str, Skin]:
         for labeller in ("run", "serial", "projection", "single"):
             methods[f"{labeller}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
         methods[f"cells, {pitch:g} mm"] = sheet(pitch, report="cells")
+    for pitch, bits in ((5.0, 4), (10.0, 4), (10.0, 1)):
+        name = f"barycenter, {pitch:g} mm" + (f", {bits} bit" if bits == 1 else "")
+        methods[name] = sheet(pitch, report="barycenter", barycenter_bits=bits)
     for pitch in (10.0, 20.0):
         methods[f"adaptive, {pitch:g} mm"] = sheet(pitch, scan="adaptive")
     methods["adaptive, 5 mm, 24 MHz"] = sheet(5.0, scan="adaptive", clock_hz=24_000_000)

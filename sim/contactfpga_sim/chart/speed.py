@@ -9,16 +9,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga import protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_sim import bench_native
+from contactfpga_sim.chart import steady
 from contactfpga_sim.compare import compare
 from contactfpga_sim.golden import Timeline, Trace, predict
 
 WARM_US = 1500.0
 """From power-up to the first scan with a touch: by then the hello is sent, and the link is at work."""
 
+STEADY = 12
+"""So many scenes are also looked at while they stay as they are."""
 
 MOST_SCANS = 4000
 """That a touch may take until it is reported."""
@@ -35,6 +37,10 @@ class Speed:
     worst_us: float
     bound_us: float
     """Median of what no scan that looks at each touched row alone can beat: (A + 1) row times, and the frame's bits."""
+    frame_us: float
+    """Once the scene stays as it is, from a frame's first row time to its last byte: median."""
+    frames_per_s: float
+    """Then, median."""
 
 
 def touch_cycle(skin: Skin, share: float) -> int:
@@ -46,16 +52,9 @@ def touch_cycle(skin: Skin, share: float) -> int:
 def last_byte(skin: Skin, trace: Trace, cells: int) -> tuple[int, int] | None:
     """Cycle in which the stop bit ends of the first frame that holds so many cells, and the frame's bytes; None where
     the trace ends before."""
-    derived = Derived(skin)
-    packet = bytearray()
-    for cycle, value in trace.bytes:
-        if value != protocol.DELIMITER:
-            packet.append(value)
-            continue
-        plain = protocol.unseal(bytes(packet))
-        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, derived).cells == cells:
-            return cycle + 10 * derived.bit_clocks, len(packet) + 1
-        packet.clear()
+    for frame in steady.frames(skin, trace):
+        if frame.cells == cells:
+            return frame.end, frame.bytes
     return None
 
 
@@ -86,10 +85,13 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6
-    found, bounds = [], []
+    found, bounds, whole, rates = [], [], [], []
     for number, cells in enumerate(frames):
         clocks, size = touch(skin, cells, number * GOLDEN % 1, check=number < checked)
         rows = int(cells.any(axis=1).sum()) + 1
         found.append(clocks / us)
         bounds.append((rows * derived.row_clocks + size * 10 * derived.bit_clocks) / us)
-    return Speed(statistics.median(found), max(found), statistics.median(bounds))
+        if number < STEADY:
+            whole.append(steady.frame_clocks(skin, cells, size) / us)
+            rates.append(steady.frames_per_second(skin, cells, size))
+    return Speed(statistics.median(found), max(found), *map(statistics.median, (bounds, whole, rates)))

@@ -61,6 +61,8 @@ class Point:
     speed: Speed
     luts: int | None
     fmax_mhz: float | None
+    host_us: float = 0.0
+    """What the host takes to label the cells, where it does; of the machine at hand, so of two runs never the same."""
 
 
 def study(

@@ -1,12 +1,13 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
 // Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
-// 0 for a netlist, which has the pins only. With MUTANTS the gateware has an input that picks a mutant.
+// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records. With MUTANTS the gateware
+// has an input that picks a mutant.
 #include <deque>
 
 #include "clocked.h"
 #include "shift.h"
 
-enum Boundary { ROW, RECORD, BYTE, LINE, CONTACT, DRIVEN, RECEIVED, BOUNDARIES };
+enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, DRIVEN, RECEIVED, BOUNDARIES };
 
 struct Event {
     uint64_t cycle, data, mark;
@@ -190,6 +191,10 @@ private:
             note(ROW, static_cast<uint64_t>(get(top.p_row__cells)), get(top.p_row__last), cycle);
         if (get(top.p_record__transfer))
             note(RECORD, static_cast<uint64_t>(get(top.p_record__data)), get(top.p_record__end), cycle);
+#if DIVIDED
+        if (get(top.p_item__transfer))
+            note(ITEM, static_cast<uint64_t>(get(top.p_item__data)), get(top.p_item__end), cycle);
+#endif
         if (get(top.p_byte__transfer))
             note(BYTE, static_cast<uint64_t>(get(top.p_byte__data)), 0, cycle);
 #endif

@@ -75,12 +75,17 @@ def moments(cells: np.ndarray) -> tuple[int, int, int]:
 
 def reported(zones: Zones) -> list[tuple[int, int, int]]:
     """The moments of a frame's zones, in order."""
-    return sorted((zone.area_cells, zone.sum_x, zone.sum_y) for zone in zones)
+    return sorted((area, x, y) for area, x, y in zones.frame.moments.tolist())
 
 
 def places(zones: Zones) -> tuple[Place, ...]:
     """The barycenters of a frame's zones, in cells."""
-    return tuple((zone.sum_x / zone.area_cells, zone.sum_y / zone.area_cells) for zone in zones)
+    return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
+
+
+def _place(sums: list[int]) -> tuple[float, float, int]:
+    area, x, y = sums
+    return y / area, x / area, area
 
 
 def faults(zones: Zones) -> tuple[str, ...]:

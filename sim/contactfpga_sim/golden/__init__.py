@@ -4,8 +4,8 @@ It shares no code with the gateware or with the host's protocol, never imports A
 declared fields of a Skin.
 """
 
-from contactfpga_sim.golden.predict import predict
-from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
+from contactfpga_sim.golden.predict import beginnings, driven, predict
+from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
 from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
 from contactfpga_sim.golden.zones import zones
 
@@ -15,6 +15,9 @@ __all__ = [
     "Timeline",
     "Trace",
     "all_departures",
+    "beginnings",
+    "boundaries",
+    "driven",
     "last_record_clocks",
     "predict",
     "row_clocks",

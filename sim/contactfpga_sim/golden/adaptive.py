@@ -59,7 +59,7 @@ class Scanner:
         choice = next(choices)
         while choice:
             rows, alone = choice
-            begin = self.slots[-1].end if self.slots else 0
+            begin = self.slots[-1].end if self.slots else facts.row_shift
             strobe = self._strobe(begin, rows)
             stuck |= self._released_before()
             columns = self._columns(strobe - 2, rows)

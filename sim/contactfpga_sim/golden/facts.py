@@ -109,7 +109,8 @@ class Facts:
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
-        return max(asked, self.load + self.column_shift, latch, self.choice)
+        chosen = self.choice + self.row_shift if self.adaptive else 0
+        return max(asked, self.load + self.column_shift, latch, chosen)
 
     @functools.cached_property
     def settle(self) -> int:
@@ -158,14 +159,19 @@ class Facts:
         return microseconds * self.clocks_per_us / self.scan_clocks
 
     @property
-    def moments(self) -> bool:
+    def zones(self) -> bool:
         """True when the items of a frame are zone records, False when they are bitmap rows."""
-        return self.skin.report == "moments"
+        return self.skin.report in ("moments", "barycenter")
+
+    @property
+    def divided(self) -> bool:
+        """True when zone records hold barycenters."""
+        return self.skin.report == "barycenter"
 
     @property
     def capacity(self) -> int:
         """Items a frame can carry."""
-        if not self.moments:
+        if not self.zones:
             return self.rows
         assert self.skin.zone_capacity is not None
         return self.skin.zone_capacity
@@ -189,14 +195,31 @@ class Facts:
         return bits(-(-self.rows * self.columns // 2))
 
     @functools.cached_property
+    def barycenter_bits(self) -> tuple[int, int, int]:
+        """Of area, x and y where records hold barycenters. Areas are 1 to R C, of which the last may wrap to 0."""
+        steps = 2**self.skin.barycenter_bits
+        return bits(self.rows * self.columns - 1), bits((self.columns - 1) * steps), bits((self.rows - 1) * steps)
+
+    @functools.cached_property
+    def division(self) -> int:
+        """Q: clocks that dividing takes, one for each bit of a row or column number, each fraction bit and rounding."""
+        return math.ceil(math.log2(max(self.rows, self.columns))) + self.skin.barycenter_bits + 1
+
+    @functools.cached_property
     def item_bytes(self) -> int:
         """Bytes of one zone record or one bitmap row."""
-        width = self.area_bits + self.sum_x_bits + self.sum_y_bits if self.moments else self.columns
+        if self.divided:
+            width = sum(self.barycenter_bits)
+        else:
+            width = self.area_bits + self.sum_x_bits + self.sum_y_bits if self.zones else self.columns
         return -(-width // 8)
 
     @functools.cached_property
     def fingerprint(self) -> bytes:
-        canonical = json.dumps(dataclasses.asdict(self.skin), sort_keys=True)
+        fields = dataclasses.asdict(self.skin)
+        if not self.divided:
+            fields.pop("barycenter_bits")
+        canonical = json.dumps(fields, sort_keys=True)
         return hashlib.sha256(canonical.encode()).digest()[:8]
 
 

@@ -11,7 +11,7 @@ from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.scan import Scan
 
-HELLO, ZONES, CELLS = 0, 1, 2
+HELLO, ZONES, CELLS, BARYCENTERS = 0, 1, 2, 3
 OVERFLOW, REQUESTED = 1, 4
 VERSION = 1
 
@@ -74,7 +74,8 @@ def hello(facts: Facts) -> bytes:
     skin = facts.skin
     assert skin.zone_capacity is not None
     options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
-    options |= (skin.diodes == "none") << 3
+    options += 8 * (1 + skin.barycenter_bits) * facts.divided
+    options += 128 * (skin.diodes == "none")
     sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
     lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0.0)
     packet = Packet()
@@ -95,12 +96,27 @@ class Items:
     """Cycle of the end mark."""
 
 
+class Queue:
+    """Where items wait for the packer."""
+
+    def offer(self, put: int, data: int) -> tuple[int, int]:
+        """A record put in at a cycle: from which one on the packer can take it, and the item's bits."""
+        return put + 2, data
+
+    def take(self, cycle: int, item: int) -> None:
+        """The packer reads the last byte of the item offered last."""
+
+    def pass_end(self, cycle: int) -> None:
+        """The packer takes an end mark."""
+
+
 class Packer:
     """Packs frame after frame, decides what is sent, and hands it to the link."""
 
-    def __init__(self, facts: Facts, link: Link):
+    def __init__(self, facts: Facts, link: Link, queue: Queue):
         self._facts = facts
         self._link = link
+        self._queue = queue
         self._free = 0
         self._since_sent = 0
         self._since_hello = 0
@@ -112,9 +128,13 @@ class Packer:
         """Pack one frame."""
         packet = Packet()
         for put, data in items.records[: self._facts.capacity]:
-            taken = max(self._free, put + 2)
-            self._free = taken + packet.push(data.to_bytes(self._facts.item_bytes, "little"))
+            offered, item = self._queue.offer(put, data)
+            plain = item.to_bytes(self._facts.item_bytes, "little")
+            last = max(self._free, offered) + packet.push(plain[:-1])
+            self._queue.take(last, item)
+            self._free = last + packet.push(plain[-1:])
         taken = max(self._free, items.end + 2)
+        self._queue.pass_end(taken)
         self._link.advance(taken)
         self._since_sent += items.scan.slots
         self._since_hello += items.scan.slots
@@ -148,7 +168,7 @@ class Packer:
         facts = self._facts
         overflow = len(items.records) > facts.capacity
         cells = int(items.cells.sum())
-        zones = len(items.records) if facts.moments else 0
+        zones = len(items.records) if facts.zones else 0
         counted = 24 + 8 + 3 + facts.area_bits + facts.zones_bits
         room = -(-(counted + 4) // 8) * 8 - counted
         word, width = join(
@@ -160,7 +180,7 @@ class Packer:
                 (zones, facts.zones_bits),
                 (self._overwritten % 2**room, room),
                 (overflow * OVERFLOW | requested * REQUESTED, 3),
-                (ZONES if facts.moments else CELLS, 2),
+                (BARYCENTERS if facts.divided else ZONES if facts.zones else CELLS, 2),
                 (VERSION, 3),
             )
         )

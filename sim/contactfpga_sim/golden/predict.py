@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import adaptive, debounce, label, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, divide, label, scan, serial
 from contactfpga_sim.golden.facts import Facts, facts
-from contactfpga_sim.golden.frame import Items, Packer, hello, join
+from contactfpga_sim.golden.frame import Items, Packer, Queue, hello, join
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
 
@@ -26,7 +26,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     link = Link(hello(known), known.bit_clocks)
     for cycle in (0, *(cycle + 1 for cycle in received)):
         link.want_hello(cycle)
-    packer = Packer(known, link)
+    packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
     handed = Labeller(known, trace)
     for one, cells in zip(scanned, counted, strict=True):
         packer.take(handed.take(one, cells))
@@ -35,6 +35,31 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     trace.line = serial.line(link.bytes, known.bit_clocks)
     trace.contact = contact
     return trace.until(cycles)
+
+
+def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
+    """(cycle, rows) of every change of the rows that are driven in cycles 0 to ``cycles`` - 1; bit r is row r."""
+    known = facts(skin)
+    if known.adaptive:
+        scanner = adaptive.Scanner(known, timeline, [])
+        while not scanner.slots or scanner.slots[-1].end < cycles:
+            scanner.frame()
+        changes = adaptive.driven(known, scanner.slots)
+    else:
+        changes = scan.driven(known, cycles)
+    return [change for change in changes if change[0] < cycles]
+
+
+def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
+    """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
+    known = facts(skin)
+    if not known.adaptive:
+        return [known.row_shift + number * known.scan_clocks for number in range(cycles // known.scan_clocks + 2)]
+    scanner, found = adaptive.Scanner(known, timeline, []), [known.row_shift]
+    while found[-1] <= cycles:
+        scanner.frame()
+        found.append(scanner.slots[-1].end)
+    return found
 
 
 Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
@@ -79,9 +104,9 @@ class Labeller:
             self._handed = cycle
             handed.append(cycle)
             self._trace.rows.append((cycle, words[row], last))
-            if facts.moments:
+            if facts.zones:
                 self._free = cycle + work.busy[row]
-        if facts.moments:
+        if facts.zones:
             records = [(handed[zone.row] + zone.clock, self._record(zone)) for zone in work.departures]
             end = handed[-1] + work.end
         else:

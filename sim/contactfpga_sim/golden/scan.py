@@ -111,9 +111,9 @@ def _stuck(facts: Facts, timeline: Timeline, slots: range) -> int:
 
 
 def driven(facts: Facts, cycles: int) -> list[tuple[int, int]]:
-    """(cycle, rows) of every change of the rows that are driven before ``cycles``; bit r is row r."""
+    """(cycle, rows) of every change of the rows that are driven, up to ``cycles`` and beyond; bit r is row r."""
     changes = []
     for slot in range(cycles // facts.row_clocks + 1):
         start = facts.row_shift + slot * facts.row_clocks
         changes += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
-    return [change for change in changes if change[0] < cycles]
+    return changes

@@ -15,8 +15,13 @@ from contactfpga_sim.golden.facts import facts
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-BOUNDARIES = ("rows", "records", "bytes", "line", "contact")
-"""Where model and gateware are compared, in the order the data takes."""
+BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact")
+"""Where model and gateware are compared, in the order the data takes; see :func:`boundaries`."""
+
+
+def boundaries(skin: Skin) -> tuple[str, ...]:
+    """Those of :data:`BOUNDARIES` that the board of a Skin has: items are apart from records where they are divided."""
+    return tuple(name for name in BOUNDARIES if name != "items" or skin.report == "barycenter")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,7 +75,9 @@ class Trace:
     rows: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
     """(cycle, cells, last): a row handed to the labeller, bit c is column c; last row of its frame."""
     records: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
-    """(cycle, data, end): an item of a frame, its bit fields packed as on the wire, or the end mark."""
+    """(cycle, data, end): a zone's exact moments or a bitmap row, in bit fields as on the wire, or the end mark."""
+    items: list[tuple[int, int, bool]] = dataclasses.field(default_factory=list)
+    """(cycle, data, end): with ``report = "barycenter"`` what becomes of them, when the packer takes it."""
     bytes: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     """(cycle, value): a byte handed to the UART."""
     line: list[tuple[int, int]] = dataclasses.field(default_factory=list)

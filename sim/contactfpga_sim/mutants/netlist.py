@@ -18,6 +18,7 @@ STAGES = {
     "label": "label",
     "audit": "report",
     "bitmap": "report",
+    "divide": "divide",
     "link.packer": "pack",
     "link": "link",
     "transmitter": "serial",

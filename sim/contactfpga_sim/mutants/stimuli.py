@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga_sim import covering, shapes
 from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.frame import hello
 from contactfpga_sim.golden.trace import Timeline
 
 # Slow clocks bring what comes once in half a second within reach.
@@ -81,6 +83,30 @@ SKINS = {
         settle_us=80.0,
         release_us=30.0,
     ),
+    "6x7, serial": Skin(
+        rows=6,
+        columns=7,
+        labeller="serial",
+        mask=((2, 3),),
+        zone_capacity=6,
+        clock_hz=1_000_000,
+        baud=250_000,
+        settle_us=24.0,
+        release_us=2.0,
+    ),
+    "5x6, adaptive": Skin(
+        rows=5,
+        columns=6,
+        scan="adaptive",
+        debounce="sym_defer_pk",
+        debounce_press_us=400.0,
+        debounce_release_us=600.0,
+        mask=((1, 4),),
+        clock_hz=1_000_000,
+        baud=500_000,
+        settle_us=60.0,
+        release_us=4.0,
+    ),
     "1x5, slow": Skin(rows=1, columns=5, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0),
 }
 
@@ -115,6 +141,7 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
         yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks))
     yield _noisy(skin, 300)
     yield _crowded(skin, 300)
+    yield _meeting(skin, 200)
     yield _frames(skin, "frames", _various_frames(skin))
     yield _rare(skin, "a second", 1_100_000)
 
@@ -163,6 +190,22 @@ def _crowded(skin: Skin, scans: int) -> Stimulus:
     requests = range(scan, (scans - 5) * scan, three_bytes)
     pieces = covering.stimulus(skin, scans * scan, 29).pieces
     return Stimulus("crowded", Timeline(pieces, requests), scans * scan)
+
+
+def _meeting(skin: Skin, chains: int) -> Stimulus:
+    """Chains of hellos behind which a frame waits. Their ends are spread over a hello's time around the next frame's
+    end mark, so that the wire comes free in any clock of it."""
+    known = facts(skin)
+    scan, byte = known.scan_clocks, 10 * known.bit_clocks
+    hello_clocks = byte * (len(hello(known)) + 1)
+    scans = math.ceil((2 * scan + 2 * hello_clocks) / scan) + 1
+    requests: list[int] = []
+    for chain in range(1, chains + 1):
+        mark = chain * scans * scan
+        begin = mark - scan - 2 * hello_clocks - chain * hello_clocks // chains
+        requests += range(max(begin, 0), mark - hello_clocks, 3 * byte)
+    cycles = (chains + 1) * scans * scan
+    return Stimulus("meeting", Timeline(covering.stimulus(skin, cycles, 31).pieces, requests), cycles)
 
 
 def _various_frames(skin: Skin) -> np.ndarray:

@@ -10,8 +10,6 @@ from contactfpga.skin import Skin
 from contactfpga_sim import bench_native, golden, native
 from contactfpga_sim.board import Board
 from contactfpga_sim.compare import compare
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.scan import driven
 from contactfpga_sim.mutants.stimuli import Stimulus
 
 OBSERVED = (*golden.BOUNDARIES, "driven")
@@ -44,7 +42,7 @@ def expected(board: Board, stimulus: Stimulus) -> Events:
     trace = bench_native.trace(events, stimulus.cycles)
     compare(golden.predict(board.skin, stimulus.timeline, stimulus.cycles), trace)
     rows = [(int(event["cycle"]), int(event["data"])) for event in events["driven"]]
-    if rows != driven(facts(board.skin), stimulus.cycles):
+    if rows != golden.driven(board.skin, stimulus.timeline, stimulus.cycles):
         raise AssertionError("rows are not driven as docs/timing.md says")
     return events
 

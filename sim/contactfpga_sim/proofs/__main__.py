@@ -4,7 +4,19 @@ import argparse
 import sys
 import time
 
-from contactfpga_sim.proofs import adaptive, label, label_serial, link, pack, records, scan, seek, serial, streams
+from contactfpga_sim.proofs import (
+    adaptive,
+    divide,
+    label,
+    label_serial,
+    link,
+    pack,
+    records,
+    scan,
+    seek,
+    serial,
+    streams,
+)
 from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
@@ -15,6 +27,7 @@ CASES: tuple[Case, ...] = (
     *records.CASES,
     *label_serial.CASES,
     *streams.CASES,
+    *divide.CASES,
     *pack.CASES,
     *link.CASES,
     *serial.CASES,

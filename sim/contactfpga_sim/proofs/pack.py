@@ -93,7 +93,7 @@ class _PlainBytes:
 def _trailer(derived: Derived, dut: Packer):
     """As docs/protocol.md has it."""
     summary, verdict = dut.summary, dut.verdict
-    kind = protocol.KIND_ZONES if derived.skin.report == "moments" else protocol.KIND_CELLS
+    kind = {"moments": protocol.KIND_ZONES, "cells": protocol.KIND_CELLS}[derived.skin.report]
     return Cat(
         dut.tag.time,
         verdict.sequence,
