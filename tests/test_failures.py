@@ -19,6 +19,8 @@ from contactfpga_sim.failures.catalogue import STUDIES
 from contactfpga_sim.failures.study import Outcome, Study, Turned
 from contactfpga_sim.failures.uart import Line
 
+pytestmark = pytest.mark.timeout(1200)  # the first test turns every knob, on fourteen boards that may have to be built
+
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "failures.md"
 
 BREAKS = {
