@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart fits formal campaign mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart fits failures formal campaign mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -78,6 +78,9 @@ chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, in
 
 fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
 	$(PY) -m contactfpga_sim.fit.page docs/fit.md
+
+failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
+	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

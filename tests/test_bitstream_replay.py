@@ -8,7 +8,7 @@ import pytest
 
 from contactfpga.derived import Derived
 from contactfpga.errors import MissingTool
-from contactfpga.skin import Skin
+from contactfpga.skin import Skin, SkinError
 from contactfpga_hdl import build
 from contactfpga_hdl.boards import BOARDS, bitstream_path
 from contactfpga_sim import bitstream_replay, ecp5_cells, native, netlist
@@ -50,6 +50,12 @@ def test_the_gateware_itself_passes_with_no_reset_before_cycle_0():
     skin = Skin(rows=4, columns=4)
     assert bitstream_replay.reset_clocks(skin, model_of(skin)) == 0
     assert replay(skin, model_of(skin), stimulus(skin, 3 * bitstream_replay.BATCH // 2, [])).packets > 300
+
+
+@pytest.mark.parametrize("made", [netlist.synthesised, netlist.from_bitstream])
+def test_rows_that_float_are_refused(made, tmp_path):
+    with pytest.raises(SkinError, match=r"diodes is 'none'; rows that float are not simulated"):
+        made(ULX3S, SMALL.replace(diodes="none"), tmp_path)
 
 
 # ---- frames

@@ -231,6 +231,33 @@ def test_doctor_counts_what_is_lost(board, run):
     assert "fault 7 lost, 0 damaged" in out
 
 
+@pytest.mark.parametrize(
+    ("board_s", "host_s", "told"),
+    [
+        (1.0, 1.0, None),
+        (1.039, 1.0, None),
+        (1.041, 1.0, "4.1 % fast"),
+        (0.9, 1.0, "10.0 % slow"),
+        (10.12, 10.0, None),
+        (10.14, 10.0, "1.4 % fast"),
+        (1.0, 0.0, None),  # a recording has no times of its own
+    ],
+)
+def test_doctor_compares_clocks(board_s, host_s, told):
+    findings = list(doctor.clock(board_s, host_s))
+    assert [verdict for verdict, _ in findings] == ([] if told is None else ["note"])
+    assert told is None or told in findings[0][1]
+
+
+def test_doctor_takes_ghosts_for_no_fault(run):
+    with FakeBoard(contactfpga.Skin(diodes="none", connectivity=4)) as board:
+        board.moments = [(1, 0, 0), (1, 5, 0)]
+        with stream_of_frames(board):
+            status, out, _ = run("doctor", "--seconds", 0.01, "--timeout", 30, board.path)
+    assert status == 0, out
+    assert "the last frame has zones that may be ghosts" in out
+
+
 def test_doctor_of_a_port_that_is_not_there(run):
     status, out, _ = run("doctor", "/dev/no_such_port")
     assert status == 1

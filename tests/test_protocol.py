@@ -264,7 +264,7 @@ def test_another_version_says_which(version):
     assert f"version {version}" in str(error)
 
 
-UNKNOWN = (0x0A, 0x50, 0x80, 0xFF)
+UNKNOWN = (0x0A, 0x50, 0xD0, 0xFF)
 """Options that no board says: divided cells, 9 fraction bits, and bits without meaning."""
 
 

@@ -1,12 +1,14 @@
 """Bytes in, zones out: chunks, counters and the device time."""
 
 import random
+from types import SimpleNamespace
 
 import pytest
 from wire import Wire, last_byte, seal
 
 import contactfpga
-from contactfpga.receiver import Receiver
+from contactfpga.commands.zones import status
+from contactfpga.receiver import Receiver, Stats
 
 SKIN = contactfpga.Skin()
 
@@ -80,3 +82,45 @@ def test_time_stands_frames_that_waited_some_seconds():
     times = [round(i * 0.5e6) for i in range(200)]
     late = [(i // 7 * 7 + 7) * 0.5 for i in range(200)]
     assert frames_at(times, late) == times
+
+
+def gaps(pauses, send="always"):
+    """Counters after frames every 96 us, with pauses of (frames, numbers of the sequence)."""
+    skin = SKIN.replace(send=send)
+    receiver, wire = Receiver("x"), Wire(skin)
+    data, sequence, time_us = wire.hello(), 0, 0
+    for frames, numbers in [(1, 1), (1, 1), *pauses, (1, 1)]:
+        sequence, time_us = sequence + numbers, time_us + 96 * frames
+        data += wire.zones([], sequence=sequence % 256, time=time_us)
+    receiver.feed(data, 0.0)
+    return receiver.stats.gaps, receiver.stats.lost
+
+
+def test_a_pause_in_which_the_sequence_may_run_around_is_counted():
+    assert gaps([(255, 255), (200, 200)]) == (0, 254 + 199)
+    assert gaps([(256, 256)]) == (1, 255)  # one before as after: 255 frames are missing, or none
+    assert gaps([(257, 257)]) == (1, 0)
+    assert gaps([(2600, 2600), (30, 30), (257, 257)]) == (2, 39 + 29)
+    assert gaps([(300, 1)]) == (1, 0)  # the board itself may have paused: `gaps` says what may be
+    assert gaps([(300, 300)], send="on_change") == (0, 43)
+
+
+def test_gaps_are_not_counted_before_a_step_is_known():
+    receiver, wire = Receiver("x"), Wire(SKIN)
+    receiver.feed(wire.hello() + wire.zones([], sequence=0, time=0) + wire.zones([], sequence=9, time=90_000), 0.0)
+    assert (receiver.stats.gaps, receiver.stats.lost) == (0, 8)
+
+
+def test_bytes_thrown_away_are_no_gap():
+    receiver, wire = Receiver("x"), Wire(SKIN)
+    receiver.feed(wire.hello() + b"".join(wire.zones([], sequence=n, time=96 * n) for n in range(3)), 0.0)
+    receiver.discard(wire.zones([], sequence=3, time=300))
+    receiver.feed(wire.zones([], sequence=40, time=900_000), 0.9)
+    assert receiver.stats.gaps == 0
+
+
+@pytest.mark.parametrize(("gaps", "told"), [(0, "3 lost"), (1, "3 or more lost")])
+def test_the_line_below_a_frame_says_that_more_may_be_lost(gaps, told):
+    receiver, wire = Receiver("x"), Wire(SKIN)
+    *_, zones = receiver.feed(wire.hello() + wire.zones([]), 0.0)
+    assert f"frames, {told}, " in status(SimpleNamespace(port="x", stats=Stats(lost=3, gaps=gaps)), zones)

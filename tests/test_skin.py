@@ -56,7 +56,28 @@ REFUSED = [
     ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
     ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
     # scan and debounce
-    ({"diodes": "none"}, "diodes is 'none'; it must be one of 'col2row', 'row2col'"),
+    ({"diodes": "both"}, "diodes is 'both'; it must be one of 'col2row', 'row2col', 'none'"),
+    (
+        {"diodes": "none", "connectivity": 4, "report": "barycenter"},
+        "report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'",
+    ),
+    ({"diodes": "none"}, "connectivity is 8; diodes = 'none' needs connectivity = 4 with report = 'moments'"),
+    (
+        {"diodes": "none", "report": "cells", "scan": "adaptive"},
+        "scan is 'adaptive'; diodes = 'none' needs scan = 'raster'",
+    ),
+    (
+        {"diodes": "none", "report": "cells", "row_drive": "74hc595"},
+        "row_drive is '74hc595'; diodes = 'none' needs row_drive = 'direct'",
+    ),
+    (
+        {"diodes": "none", "connectivity": 4, "labeller": "projection"},
+        "labeller is 'projection'; diodes = 'none' needs labeller = 'run' with report = 'moments'",
+    ),
+    (
+        {"diodes": "none", "report": "cells", "mask": [(1, 2)]},
+        "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be told",
+    ),
     ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster', 'adaptive'"),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),

@@ -67,7 +67,7 @@ class AdaptiveScanner(wiring.Component):
         self._columns = Signal(self.skin.columns)
         self._pressed = Signal(self.skin.columns)  # of the row that is driven alone
         m.d.comb += [
-            self._columns.eq(~levels if self.skin.diodes == "col2row" else levels),
+            self._columns.eq(~levels if self.skin.selects_low else levels),
             self._pressed.eq(self._columns),
             # A masked switch that is closed keeps its row on the list, so that it hides no other row's.
             seek.hit.eq((self._columns & anywhere(self.skin)).any()),

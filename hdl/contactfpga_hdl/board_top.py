@@ -24,7 +24,7 @@ class BoardTop(Elaboratable):
     """Requests the pins and wires the Skin's :class:`Top` to them.
 
     The sheet must have passed :meth:`Board.check`. Rows are plain outputs: the diode at each switch keeps two of
-    them apart.
+    them apart. Without diodes a row is low or floats, since two of them may meet.
     """
 
     def __init__(self, board: Board, skin: Skin):
@@ -57,9 +57,17 @@ class BoardTop(Elaboratable):
 
     def _connect_sheet(self, m, platform, core):
         for name, member in self._sheet.items():
+            if name == "rows" and self.skin.ghosts:
+                self._connect_floating(m, platform.request(name, 0, dir="-"), core.rows)
+                continue
             direction = "o" if member.flow == Out else "i"
             m.submodules[name] = buffer = io.Buffer(direction, platform.request(name, 0, dir="-"))
             m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
+
+    def _connect_floating(self, m, port, rows):
+        for row in range(self.skin.rows):
+            m.submodules[f"row_{row}"] = buffer = io.Buffer("o", port[row])
+            m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
     def _resources(self):
         board, skin = self.board, self.skin
@@ -68,7 +76,7 @@ class BoardTop(Elaboratable):
         for name, pins in board.pins(skin).items():
             direction = "o" if self._sheet[name].flow == Out else "i"
             # Only what hangs on switches needs a level of its own; a shift register drives its data pin.
-            pulls = board.pulls[skin.diodes] if name == "columns" else {}
+            pulls = board.pulls["col2row" if skin.selects_low else "row2col"] if name == "columns" else {}
             resources.append(Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **pulls)))
         if board.held_high:
             resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))

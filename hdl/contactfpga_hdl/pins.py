@@ -66,7 +66,7 @@ def column_reader(skin: Skin) -> wiring.Signature:
 
 def released_levels(skin: Skin, lines: int) -> int:
     """Levels of so many columns that read released."""
-    return (1 << lines) - 1 if skin.diodes == "col2row" else 0
+    return (1 << lines) - 1 if skin.selects_low else 0
 
 
 class DirectRows(wiring.Component):
@@ -84,7 +84,7 @@ class DirectRows(wiring.Component):
             m.d.sync += selected.eq(self.pattern)
         with m.Elif(self.release):
             m.d.sync += selected.eq(0)
-        m.d.comb += self.pins.rows.eq(~selected if self.skin.diodes == "col2row" else selected)
+        m.d.comb += self.pins.rows.eq(~selected if self.skin.selects_low else selected)
         return m
 
 

@@ -104,7 +104,7 @@ class Scanner(wiring.Component):
         self._columns = Signal(self.skin.columns)
         self._pressed = Signal(self.skin.columns)
         m.d.comb += [
-            self._columns.eq(~levels if self.skin.diodes == "col2row" else levels),
+            self._columns.eq(~levels if self.skin.selects_low else levels),
             self._pressed.eq(self._columns),
         ]
         with m.Switch(self._row):

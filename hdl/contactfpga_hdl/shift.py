@@ -29,7 +29,7 @@ class RowChain(wiring.Component):
         m = Module()
         derived = Derived(self.skin)
         lines, clocks = derived.row_chain_lines, derived.shift_clocks
-        levels = ~self.pattern if self.skin.diodes == "col2row" else self.pattern
+        levels = ~self.pattern if self.skin.selects_low else self.pattern
         busy = Signal()
         left = Signal(range(lines + 1), init=lines)  # bits to shift; then the latch takes as long as one
         clock = Signal(range(clocks))

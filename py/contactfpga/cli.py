@@ -23,6 +23,7 @@ _COMMANDS = {
     "cover": "contactfpga.commands.cover",
     "chart": "contactfpga_sim.chart.command",
     "fit": "contactfpga_sim.fit.command",
+    "failures": "contactfpga_sim.failures.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -75,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     cover_flags.add(commands.add_parser("cover", help="compute the soft cover: impact, sensitivity, design"))
     _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
     fit_flags.add(commands.add_parser("fit", help="find the cheapest Skin that is good enough for given scenes"))
+    _failures(commands.add_parser("failures", help="turn one knob after the other until something breaks"))
     return parser
 
 
@@ -140,6 +142,12 @@ def _chart(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work instead")
     parser.add_argument("--no-size", action="store_true", help="leave out place and route")
     parser.add_argument("--output", metavar="DIR", default="build/chart", help="folder (default: build/chart)")
+
+
+def _failures(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--study", action="append", metavar="NAME", help="only this one; can be repeated")
+    parser.add_argument("--page", metavar="FILE", help="page whose table and pictures are written anew")
+    parser.add_argument("--output", metavar="DIR", default="build/failures", help="folder (default: build/failures)")
 
 
 if __name__ == "__main__":

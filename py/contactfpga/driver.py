@@ -80,6 +80,10 @@ class Board:
         """Counters since the port was opened."""
         return self._receiver.stats
 
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts run on: this computer's; of ``sim://`` the simulated one."""
+        return self._transport.clock()
+
     def read(self, timeout: float = 1.0) -> Zones:
         """Ask the board and return the first complete frame scanned after this call; older ones are discarded.
 

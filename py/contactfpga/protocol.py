@@ -32,7 +32,9 @@ KIND_BITS = 2
 _HELLO = struct.Struct("<BBBHfff8s")
 _OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
 _FRACTION = len(_OPTIONS)
-"""The options' bits from here on: 0, or with ``report = "barycenter"`` one more than its fraction bits."""
+"""Four of the options' bits from here on: 0, or with ``report = "barycenter"`` one more than its fraction bits."""
+_GHOSTS = _FRACTION + 4
+"""The bit that is set without diodes."""
 
 
 class PacketError(ValueError):
@@ -73,6 +75,8 @@ class Hello:
     pitch_y_mm: float
     radius_mm: float | None
     fingerprint: bytes
+    ghosts: bool = False
+    """The sheet has no diodes."""
 
     @classmethod
     def of(cls, skin: Skin) -> Hello:
@@ -89,6 +93,7 @@ class Hello:
         return Skin(
             **{name: getattr(self, name) for name in _FACTS},
             surface="plane" if self.radius_mm is None else "cylinder",
+            diodes="none" if self.ghosts else "col2row",
             **slow,
         )
 
@@ -190,10 +195,10 @@ def encode_hello(skin: Skin) -> bytes:
     """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
     facts = Hello.of(skin)
     chosen = {name: getattr(facts, name) for name in _OPTIONS}
-    options = 0
+    options = facts.ghosts << _GHOSTS
     if facts.report == "barycenter":
         chosen["report"] = "moments"
-        options = facts.barycenter_bits + 1 << _FRACTION
+        options |= facts.barycenter_bits + 1 << _FRACTION
     options |= sum(choices.index(chosen[name]) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
     plain = _HELLO.pack(
         facts.rows,
@@ -215,7 +220,7 @@ def decode_hello(plain: bytes) -> Hello:
     rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[:-1])
     chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
     chosen["barycenter_bits"] = BARYCENTER_BITS
-    if fraction := options >> _FRACTION:
+    if fraction := options >> _FRACTION & (1 << _GHOSTS - _FRACTION) - 1:
         if fraction > MAX_BARYCENTER_BITS + 1 or chosen["report"] != "moments":
             raise PacketError("content", f"hello with options {options:#x}, which this version does not know")
         chosen |= {"report": "barycenter", "barycenter_bits": fraction - 1}
@@ -227,6 +232,7 @@ def decode_hello(plain: bytes) -> Hello:
         pitch_y_mm=_shortest(pitch_y),
         radius_mm=_shortest(radius) or None,
         fingerprint=fingerprint,
+        ghosts=bool(options >> _GHOSTS),
         **chosen,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections import Counter
 
 from contactfpga import protocol
@@ -27,6 +28,9 @@ class Stats:
     """Frames received whole."""
     lost: int = 0
     """Frames the board sent that did not arrive whole, from the gaps in their sequence numbers, a gap modulo 256."""
+    gaps: int = 0
+    """Pauses between frames in which 256 may have been sent, so that ``lost`` may miss a multiple of 256; only with
+    ``send = "always"``, as else a pause is nothing unusual."""
     overwritten: int = 0
     """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Derived.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
@@ -75,6 +79,7 @@ class Receiver:
         self._time_us = 0
         self._now = 0.0
         self._counting = False
+        self._shortest_us: float = math.inf  # from a frame to the one sent next
 
     def feed(self, data: bytes, now: float) -> list[Item]:
         """What ``data`` completes, in order: zones, hellos, and the errors that hellos give cause for.
@@ -137,10 +142,13 @@ class Receiver:
                 self.stats.foreign_skin += 1
             return None
         frame = protocol.decode_frame(plain, self._derived)
+        before, before_us, counting = self._last, self._time_us, self._counting
         self._count(frame, self._derived)
         self._time_us = self._unwrap(frame.time_us, now)
+        if before is not None and self._last is not None and counting:
+            self._count_gap((frame.sequence - before.sequence) % _SEQUENCES, self._time_us - before_us)
         self._last, self._now, self._counting = frame, now, True
-        return Zones(frame, self.skin, self._time_us)
+        return Zones(frame, self.skin, self._time_us, before)
 
     def _foreign(self, error: PacketError) -> VersionMismatch | None:
         self.stats.foreign_version += 1
@@ -162,7 +170,7 @@ class Receiver:
         changed = before is not None and before != hello
         if changed:
             self.stats.skin_changes += 1
-            self._last, self._counting = None, False
+            self._last, self._counting, self._shortest_us = None, False, math.inf
         if expected is not None and hello.fingerprint != expected.fingerprint:
             self.skin = self._derived = None
             return SkinMismatch(
@@ -189,6 +197,13 @@ class Receiver:
             return
         self.stats.lost += (frame.sequence - last.sequence - 1) % _SEQUENCES
         self.stats.overwritten += (frame.overwritten - last.overwritten) % (1 << derived.overwritten_bits)
+
+    def _count_gap(self, steps: int, us: int) -> None:
+        if steps == 1 and us > 0:
+            self._shortest_us = min(self._shortest_us, us)
+        assert self.hello is not None
+        if self.hello.send == "always" and us >= _SEQUENCES * self._shortest_us:
+            self.stats.gaps += 1
 
     def _unwrap(self, raw: int, now: float) -> int:
         if self._last is None:

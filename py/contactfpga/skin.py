@@ -27,7 +27,7 @@ MIN_SHIFT_HZ, MAX_SHIFT_HZ = 10_000, 50_000_000
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "surface": ("plane", "cylinder"),
     "connectivity": (4, 8),
-    "diodes": ("col2row", "row2col"),
+    "diodes": ("col2row", "row2col", "none"),
     "scan": ("raster", "adaptive"),
     "row_drive": ("direct", "74hc595"),
     "column_read": ("direct", "74hc165"),
@@ -70,7 +70,9 @@ class Skin:
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
     diodes: str = "col2row"
-    """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down."""
+    """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down; ``none``:
+    as ``col2row``, but with no diodes rows float while they are not selected, and three pressed corners of a rectangle
+    make the fourth read pressed: what that may have made is flagged ``ghost``."""
     scan: str = "raster"
     """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched."""
     settle_us: float = 5.0
@@ -182,6 +184,16 @@ class Skin:
         canonical = json.dumps(fields, sort_keys=True)
         return hashlib.sha256(canonical.encode()).digest()[:8]
 
+    @property
+    def selects_low(self) -> bool:
+        """A selected row is low, as is a column that reads pressed; else both are high."""
+        return self.diodes != "row2col"
+
+    @property
+    def ghosts(self) -> bool:
+        """Pressed switches can make others read pressed."""
+        return self.diodes == "none"
+
     def max_zones(self) -> int:
         """The most zones a frame of this sheet can hold.
 
@@ -226,6 +238,7 @@ class Skin:
         self._check_mask()
         self._check_registers()
         self._check_scan()
+        self._check_ghosts()
         if self.surface == "plane":
             if self.radius_mm is not None:
                 raise SkinError(f"radius_mm is {self.radius_mm}; a plane has none, leave it out")
@@ -288,6 +301,25 @@ class Skin:
             raise SkinError(
                 f"column_read is {self.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
                 "the columns of an untouched sheet in each clock"
+            )
+
+    def _check_ghosts(self) -> None:
+        """Without diodes only what can still be told apart from ghosts is taken."""
+        if not self.ghosts:
+            return
+        wanted: dict[str, Any] = {"scan": "raster", "row_drive": "direct"}
+        if self.report == "barycenter":
+            raise SkinError("report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'")
+        if self.report == "moments":
+            wanted |= {"connectivity": 4, "labeller": "run" if self.labeller != "serial" else "serial"}
+        for name, value in wanted.items():
+            if getattr(self, name) != value:
+                why = " with report = 'moments'" if name in ("connectivity", "labeller") else ""
+                raise SkinError(f"{name} is {getattr(self, name)!r}; diodes = 'none' needs {name} = {value!r}{why}")
+        if self.mask:
+            raise SkinError(
+                f"mask lists {len(self.mask)} switches; diodes = 'none' takes none, as what a masked switch feeds "
+                "could not be told"
             )
 
     def _check_link(self) -> None:

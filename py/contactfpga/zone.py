@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import ghosts
 from contactfpga.protocol import Frame
 from contactfpga.skin import Skin
 
@@ -25,6 +26,7 @@ DTYPE = np.dtype(
         ("y_mm", np.float64),
         ("point_mm", np.float64, 3),
         ("normal", np.float64, 3),
+        ("ghost", np.bool_),
     ]
 )
 """Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
@@ -55,12 +57,14 @@ class Zone:
     """Barycenter in the link's frame in mm; it lies on the surface."""
     normal: Vector
     """Outward unit normal at that point."""
+    ghost: bool = False
+    """On a sheet without diodes: other pressed switches may have made all of it, with nothing pressed here."""
 
 
 class Zones(Sequence[Zone]):
     """The zones of one frame, sorted by y, x and area; not to be changed."""
 
-    def __init__(self, frame: Frame, skin: Skin, time_us: int | None = None):
+    def __init__(self, frame: Frame, skin: Skin, time_us: int | None = None, before: Frame | None = None):
         self.frame = frame
         """The frame as it came over the wire."""
         self.skin = skin
@@ -68,7 +72,11 @@ class Zones(Sequence[Zone]):
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, without the wire's wrap at 2^24 us."""
         self.flags: frozenset[str] = frame.flags
-        """Names from :data:`contactfpga.protocol.FLAGS`."""
+        """Names from :data:`contactfpga.protocol.FLAGS`; and `ghost` where a sheet without diodes may show pressed
+        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to."""
+        self._before = before
+        if skin.ghosts and (self._ghost_cells.any() if frame.bitmap is not None else ghosts.spread(frame, before)):
+            self.flags |= {"ghost"}
 
     @property
     def sequence(self) -> int:
@@ -101,6 +109,24 @@ class Zones(Sequence[Zone]):
         return self.frame.bitmap
 
     @property
+    def ghost_cells(self) -> np.ndarray | None:
+        """(rows, columns) bool with ``report = "cells"``, else None: cells that other pressed ones may have made, which
+        takes a sheet without diodes (:mod:`contactfpga.ghosts`)."""
+        return None if self.frame.bitmap is None else self._ghost_cells
+
+    @functools.cached_property
+    def _ghost_cells(self) -> np.ndarray:
+        if not self.skin.ghosts:
+            return np.zeros_like(self.frame.bitmap)
+        return ghosts.cells(self.frame, self._before)
+
+    @functools.cached_property
+    def _suspects(self) -> list[bool]:
+        if not self.skin.ghosts:
+            return [False] * len(self)
+        return ghosts.zones(self.frame, self._before)
+
+    @property
     def rounding_mm(self) -> tuple[float, float]:
         """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``, else
         0."""
@@ -123,26 +149,27 @@ class Zones(Sequence[Zone]):
     def _zones(self) -> tuple[Zone, ...]:
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
         make = self._exact if self.frame.barycenters is None else self._divided
-        zones = [make(*fields) for fields in self._records.tolist()]
+        both = zip(self._records.tolist(), self._suspects)
+        zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
         zones.sort(key=lambda zone: (zone.y_mm, zone.x_mm, zone.area_cells))
         return tuple(zones)
 
-    def _exact(self, area: int, sum_x: int, sum_y: int) -> Zone:
+    def _exact(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
         # Only a frame that is flagged `mismatch` may hold an area of 0.
         x_mm = sum_x / area * self.skin.pitch_x_mm if area else math.nan
         y_mm = sum_y / area * self.skin.pitch_y_mm if area else math.nan
-        return self._placed(area, sum_x, sum_y, x_mm, y_mm)
+        return self._placed(area, sum_x, sum_y, x_mm, y_mm, ghost)
 
-    def _divided(self, area: int, x: int, y: int) -> Zone:
+    def _divided(self, area: int, x: int, y: int, ghost: bool) -> Zone:
         steps = 1 << self.skin.barycenter_bits
         x_mm = x / steps * self.skin.pitch_x_mm if area else math.nan
         y_mm = y / steps * self.skin.pitch_y_mm if area else math.nan
-        return self._placed(area, None, None, x_mm, y_mm)
+        return self._placed(area, None, None, x_mm, y_mm, ghost)
 
-    def _placed(self, area: int, sum_x: int | None, sum_y: int | None, x_mm: float, y_mm: float) -> Zone:
+    def _placed(self, area: int, sum_x: int | None, sum_y: int | None, x_mm: float, y_mm: float, ghost: bool) -> Zone:
         area_mm2 = area * (self.skin.pitch_x_mm * self.skin.pitch_y_mm)
         point_mm, normal = on_surface(x_mm, y_mm, self.skin.radius_mm)
-        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal)
+        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -186,6 +213,8 @@ class Zones(Sequence[Zone]):
         values["zones"] = [dataclasses.asdict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]
+            if self.skin.ghosts:
+                values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
         return values
 
 

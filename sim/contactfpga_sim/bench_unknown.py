@@ -121,7 +121,7 @@ def _trace(output: str, cycles: int) -> Trace:
 
 def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -> str:
     """Verilog that drives the pins as the timeline says and prints the outputs' changes and the first unknown one."""
-    selected, columns = ("~rows", "~reads") if skin.diodes == "col2row" else ("rows", "reads")
+    selected, columns = ("~rows", "~reads") if skin.selects_low else ("rows", "reads")
     reads = " | ".join(
         ["stuck", *(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))]
     )

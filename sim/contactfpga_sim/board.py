@@ -12,6 +12,7 @@ from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_sim import native, scenes
 from contactfpga_sim.cells import to_words
+from contactfpga_sim.circuit import Line
 
 if TYPE_CHECKING:
     import argparse
@@ -67,6 +68,12 @@ class Board:
         """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
         word = 0 if columns is None else int(to_words(np.asarray(columns, bool)))
         self._library.board_stick(self._board, ctypes.c_uint64(word))
+
+    def settle(self, line: Line) -> None:
+        """From the next cycle on columns take the time that such a line takes, and not none."""
+        shares = (line.share(seconds, 1 / self.skin.clock_hz) for seconds in (line.press_s, line.release_s))
+        values = (*shares, line.pulled, line.threshold)
+        self._library.board_settle(self._board, *map(ctypes.c_double, values))
 
     def run(self, cycles: int) -> None:
         """Run this many clock cycles. Other Python threads run meanwhile."""
@@ -188,7 +195,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
         defines={
             "ROWS": skin.rows,
             "COLUMNS": skin.columns,
-            "COL2ROW": int(skin.diodes == "col2row"),
+            "COL2ROW": int(skin.selects_low),
             "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
             "BIT_CLOCKS": Derived(skin).bit_clocks,

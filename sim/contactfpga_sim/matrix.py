@@ -31,7 +31,7 @@ class Matrix:
         self.columns = skin.columns
         self._all_rows = (1 << skin.rows) - 1
         self._all_columns = (1 << skin.columns) - 1
-        self._selects_low = skin.diodes == "col2row"
+        self._selects_low = skin.selects_low
         self._pressed = [0] * skin.rows
         self._stuck = 0
 

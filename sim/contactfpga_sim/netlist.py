@@ -10,7 +10,7 @@ from pathlib import Path
 from amaranth.lib.wiring import Out
 
 from contactfpga.errors import ContactFPGAError, MissingTool
-from contactfpga.skin import Skin
+from contactfpga.skin import Skin, SkinError
 from contactfpga_hdl import build, pll, synthesis
 from contactfpga_hdl.board_top import platform_for
 from contactfpga_hdl.boards import NAME, Board, bitstream_path
@@ -28,6 +28,7 @@ def from_bitstream(board: Board, skin: Skin, folder: Path) -> Netlist:
 
     Raises :class:`MissingTool` without ``icebox_vlog`` and :class:`WrongBitstream`.
     """
+    _check(skin)
     if shutil.which("icebox_vlog") is None:
         raise MissingTool("a netlist from the bitstream", "icebox_vlog", "sudo apt install fpga-icestorm")
     build.build(skin, board, folder)
@@ -51,6 +52,11 @@ def from_bitstream(board: Board, skin: Skin, folder: Path) -> Netlist:
     )
 
 
+def _check(skin: Skin) -> None:
+    if skin.ghosts:
+        raise SkinError("diodes is 'none'; rows that float are not simulated from a netlist of pins")
+
+
 def _without_pll(chip: str, board: Board, skin: Skin) -> str:
     """The netlist with the PLL's output net on the crystal's pin, and always locked; its dividers are compared."""
     cell = re.search(r"^SB_PLL40_\w+ #\((.*?)\) \S+ \((.*?)^\);", chip, re.MULTILINE | re.DOTALL)
@@ -67,6 +73,7 @@ def _without_pll(chip: str, board: Board, skin: Skin) -> str:
 
 def synthesised(board: Board, skin: Skin, folder: Path) -> Netlist:
     """Synthesise for an ECP5: the cells that place and route starts from, without their places."""
+    _check(skin)
     build.plan_for(board, skin).extract(str(folder))
     native.yosys(f"read_rtlil {NAME}.il; {synthesis.script(board.fpga, NAME)}; write_verilog -noattr chip.v", folder)
     return Netlist(

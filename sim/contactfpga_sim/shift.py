@@ -80,7 +80,7 @@ class Sheet:
         self.matrix = Matrix(skin)
         self.reads = ROW_PINS[skin.row_drive] + COLUMN_PINS[skin.column_read]
         self.drives = COLUMN_DATA[skin.column_read]
-        self._released = (1 << skin.rows) - 1 if skin.diodes == "col2row" else 0
+        self._released = (1 << skin.rows) - 1 if skin.selects_low else 0
         self.row_levels = self._released
         contents = random.Random(power_up)
         self.row_registers: RowRegisters | None = None

@@ -107,6 +107,7 @@ class Wire:
         options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
         if skin.report == "barycenter":
             options |= (skin.barycenter_bits + 1) << 3
+        options |= (skin.diodes == "none") << 7
         sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
         lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0)
         return sizes + lengths + skin.fingerprint + last_byte(HELLO, version=version)

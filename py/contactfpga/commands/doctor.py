@@ -20,6 +20,10 @@ LATENCY_MS = 1
 EVENT_CHAR = 0x100
 """Byte 0, the delimiter, and bit 8, which enables it: the chip hands over what it has when that byte comes."""
 
+CLOCK_ERROR = 0.01
+JITTER_S = 0.03
+"""By how much the time of a frame's arrival may vary, with an FTDI chip's default latency."""
+
 Finding = tuple[str, str]
 """("ok", "note" or "fault", sentence)."""
 
@@ -115,12 +119,24 @@ def hello(board: Board) -> Iterator[Finding]:
     yield "ok", f"{board.port} says hello: {facts}"
 
 
+def clock(board_s: float, host_s: float) -> Iterator[Finding]:
+    """Whether the board's clock goes like this computer's, as far as that can be told in this time."""
+    if host_s > 0 and abs(off := board_s / host_s - 1) > CLOCK_ERROR + JITTER_S / host_s:
+        yield (
+            "note",
+            f"the board's clock is {100 * abs(off):.1f} % {'fast' if off > 0 else 'slow'}, and so are all times; is "
+            "its crystal the Skin's clock_hz? (A virtual board may just not keep up.)",
+        )
+
+
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     """Frames and losses over some seconds of device time."""
     first = board.next(timeout)
+    begun = board.clock()
     zones = first
     while zones.time_us - first.time_us < seconds * 1e6 and zones.time_us >= first.time_us:
         zones = board.next(timeout)
+    yield from clock((zones.time_us - first.time_us) / 1e6, board.clock() - begun)
     stats = board.stats
     yield "ok", f"{stats.frames} frames, {stats.hellos} hellos in {(zones.time_us - first.time_us) / 1e6:.2f} s"
     if stats.overwritten:
@@ -128,10 +144,15 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
             "note",
             f"{stats.overwritten} frames overwritten on the board: the line is slower than the scan, a hello too",
         )
+    if stats.gaps:
+        yield "note", f"{stats.gaps} pauses in which more frames may have been lost than are counted"
     faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
     told = ", ".join(f"{number} {name}" for name, number in faults.items())
     yield ("fault" if any(faults.values()) else "ok", told)
     if zones.stuck:
         yield "fault", f"{zones.stuck} columns read pressed while no row is driven; look for a short circuit there"
     for flag in sorted(zones.flags - {"requested"}):
-        yield "fault", f"the last frame is flagged {flag!r}"
+        if flag == "ghost":
+            yield "note", "the last frame has zones that may be ghosts: the sheet has no diodes"
+        else:
+            yield "fault", f"the last frame is flagged {flag!r}"

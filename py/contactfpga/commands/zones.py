@@ -48,11 +48,12 @@ def render(board: driver.Board, zones: Zones):  # type: ignore[no-untyped-def]
 def status(board: driver.Board, zones: Zones) -> str:
     """The line below a frame: which one it is, and what went wrong so far."""
     stats = board.stats
+    lost = f"{stats.lost} or more" if stats.gaps else str(stats.lost)
     parts = [
         f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",
         f"{zones.pressed} cells pressed",
         *sorted(zones.flags - {"requested"}),
         f"{zones.stuck} columns stuck" if zones.stuck else "",
-        f"{stats.frames} frames, {stats.lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
+        f"{stats.frames} frames, {lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
     ]
     return " · ".join(part for part in parts if part)

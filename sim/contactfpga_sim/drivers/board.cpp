@@ -18,14 +18,34 @@ class Matrix {
 public:
     uint64_t pressed[ROWS] = {};
     uint64_t stuck = 0;
+    // A column with capacitance goes a share of its way a clock: to the level that a pressed switch pulls it to, or back
+    // to 0. It reads pressed above the threshold.
+    bool slow = false;
+    double press_share = 1, release_share = 1, pulled = 1, threshold = 0.5;
 
     static uint64_t driven(uint64_t row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROWS); }
 
-    uint64_t levels(uint64_t driven) const {
+    // Once a clock.
+    uint64_t levels(uint64_t driven) {
         uint64_t reads = stuck;
         for (; driven; driven &= driven - 1)
             reads |= pressed[__builtin_ctzll(driven)];
+        if (slow)
+            reads = settled(reads);
         return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
+    }
+
+private:
+    double volts_[COLUMNS] = {};
+
+    uint64_t settled(uint64_t pulls) {
+        uint64_t reads = 0;
+        for (unsigned column = 0; column < COLUMNS; column++) {
+            const bool pull = pulls >> column & 1;
+            volts_[column] += ((pull ? pulled : 0) - volts_[column]) * (pull ? press_share : release_share);
+            reads |= static_cast<uint64_t>(volts_[column] > threshold) << column;
+        }
+        return reads;
     }
 };
 
@@ -199,6 +219,14 @@ EXPORT void board_restart(Board *board, unsigned mutant) {
     board->mutant = mutant;
 }
 EXPORT void board_stick(Board *board, uint64_t columns) { board->matrix.stuck = columns; }
+EXPORT void board_settle(Board *board, double press_share, double release_share, double pulled, double threshold) {
+    Matrix &matrix = board->matrix;
+    matrix.slow = true;
+    matrix.press_share = press_share;
+    matrix.release_share = release_share;
+    matrix.pulled = pulled;
+    matrix.threshold = threshold;
+}
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 
 // Each of `frames` sheets is pressed for `cycles`.

@@ -75,6 +75,7 @@ def hello(facts: Facts) -> bytes:
     assert skin.zone_capacity is not None
     options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
     options += 8 * (1 + skin.barycenter_bits) * facts.divided
+    options += 128 * (skin.diodes == "none")
     sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
     lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0.0)
     packet = Packet()
