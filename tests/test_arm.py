@@ -1,6 +1,7 @@
 """The arm's physics and controller: the consistent set of numbers, against integration written a second time here."""
 
 import dataclasses
+import itertools
 import math
 from types import SimpleNamespace
 
@@ -205,7 +206,7 @@ def test_halving_the_step_changes_nothing_by_more_than_a_hundredth():
     """The controller's period and the places of its samples stay; 25 us is near the largest step that is taken."""
     names = [field.name for field in dataclasses.fields(run(PAPER, "latency").outcome)]
     outcomes = [run(PAPER.but(run={"step_s": step}), "latency").outcome for step in (25e-6, 12.5e-6, 6.25e-6)]
-    for coarse, fine in zip(outcomes, outcomes[1:]):
+    for coarse, fine in itertools.pairwise(outcomes):
         for name in names:
             value = getattr(fine, name)
             assert getattr(coarse, name) == (pytest.approx(value, rel=0.01) if isinstance(value, float) else value), (

@@ -50,7 +50,8 @@ class Case:
         limit = self.motor.time_constant_s / STEPS_A_TIME_CONSTANT
         if self.run.step_s > limit * (1 + 1e-9):
             raise CaseError(
-                f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of the current's time constant"
+                f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the "
+                "current takes"
             )
         for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
             part = self.run.step_s if name == "period_s" else self.control.period_s
@@ -62,7 +63,7 @@ class Case:
         """What presses on the switches."""
         return Cover(self.model, self.foam.thickness_m, self.switch.switch)
 
-    def but(self, **changes: dict[str, Any] | Any) -> Case:
+    def but(self, **changes: Any) -> Case:
         """The same with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""
         new: dict[str, Any] = {}
         for name, change in changes.items():

@@ -24,11 +24,11 @@ class Sensed(NamedTuple):
 class Controller:
     """Speed PI with one of two behaviours.
 
-    ``reverse``, the paper's: a contact, or torque at the limit, makes the arm go back until the contact is resolved, then
-    slow down to rest. ``comply``: the arm follows the torque on it like an inertia with a damper and a spring; torque at
-    the limit makes it go back all the same. Where the host falls silent the arm stops; in a contact it first goes back as
-    far as it does at most. A contact that is still there then, and may be one that nobody tells the end of, is not gone back
-    from again before it was away once; the torque limit is.
+    ``reverse``, the paper's: a contact, or torque at the limit, makes the arm go back until the contact is resolved,
+    then slow down to rest. ``comply``: the arm follows the torque on it like an inertia with a damper and a spring;
+    torque at the limit makes it go back all the same. Where the host falls silent the arm stops; in a contact it first
+    goes back as far as it does at most. A contact that is still there then, and may be one that nobody tells the end
+    of, is not gone back from again before it was away once; the torque limit is.
     """
 
     def __init__(self, case: Case):

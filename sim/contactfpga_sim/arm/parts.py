@@ -41,7 +41,7 @@ class Link(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Motor(_Checked):
-    """A direct-current gear motor behind a current loop: u = gain (i_ref - i) + R i_ref + k N omega, within the supply."""
+    """A direct-current gear motor in a current loop: u = gain (i_ref - i) + R i_ref + k N omega, within the supply."""
 
     gear: float
     """Turns of the motor a turn of the joint."""

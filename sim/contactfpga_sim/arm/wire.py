@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 
 class Chip:
-    """Holds bytes until it has a packet full or its latency timer ran out; the host takes them at its next frame."""
+    """Holds bytes until it has a packet full or its latency timer ran out, which runs also while it has none; the host
+    takes them at its next frame."""
 
     def __init__(self, usb: Usb):
         self._usb = usb
@@ -27,7 +28,7 @@ class Chip:
     def take(self, seconds: float) -> bytes:
         """What the host takes now; called once at each of its frames."""
         ready = sum(1 for at, _ in self._held if at <= seconds)
-        if not ready or (ready < self._usb.packet_bytes and seconds - self._sent < self._usb.timer_s - 1e-9):
+        if ready < self._usb.packet_bytes and seconds - self._sent < self._usb.timer_s - 1e-9:
             return b""
         self._sent = seconds
         return bytes(self._held.popleft()[1] for _ in range(min(ready, int(self._usb.packet_bytes))))
