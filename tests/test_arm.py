@@ -189,7 +189,7 @@ def test_damped_foam_on_an_arm_that_gives_way_against_a_second_integration():
 
 def test_the_current_follows_its_loop():
     plant, motor = Plant(free()), PAPER.motor
-    state, seconds = (-0.1, 0.3, 0.0, 0.0, 0.0), 0.0
+    state, seconds = (-0.1, 0.3, 0.0), 0.0
     for number in range(1, 51):
         state = plant.step(seconds, state, 0.5, 10e-6)
         seconds = number * 10e-6
@@ -198,7 +198,7 @@ def test_the_current_follows_its_loop():
 
 def test_the_supply_limits_how_fast_the_current_rises():
     plant = Plant(PAPER.but(motor={"supply_v": 1.5, "current_gain": 1000.0}, run={"step_s": 1e-7}))
-    state = plant.step(0.0, (-0.1, 0.0, 0.0, 0.0, 0.0), 1.2, 1e-7)
+    state = plant.step(0.0, (-0.1, 0.0, 0.0), 1.2, 1e-7)
     assert state[2] == pytest.approx(1.5 / 0.5e-3 * 1e-7, rel=1e-3)
 
 

@@ -116,7 +116,7 @@ def test_a_step_that_is_too_long_is_refused_and_would_blow_up():
         PAPER.but(run={"step_s": 50e-6})
     plant = Plant(PAPER.but(motor={"supply_v": 1e300}))  # no limit that would hide it
     for share, stays in ((2.7, True), (2.9, False)):
-        state = (-1.0, 0.0, 1.0, 0.0, 0.0)
+        state = (-1.0, 0.0, 1.0)
         for number in range(400):
             state = plant.step(number * 1e-4, state, 0.0, share * PAPER.motor.time_constant_s)
         assert (abs(state[2]) < 1) == stays

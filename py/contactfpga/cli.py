@@ -22,6 +22,7 @@ _COMMANDS = {
     "replay": "contactfpga_sim.replay",
     "cover": "contactfpga.commands.cover",
     "chart": "contactfpga_sim.chart.command",
+    "arm": "contactfpga_sim.arm.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     _replay(commands.add_parser("replay", help="put recorded frames through the compiled gateware"))
     cover_flags.add(commands.add_parser("cover", help="compute the soft cover: impact, sensitivity, design"))
     _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
+    _arm(commands.add_parser("arm", help="run the arm into a human arm, and see what force it takes"))
     return parser
 
 
@@ -135,6 +137,21 @@ def _chart(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work instead")
     parser.add_argument("--no-size", action="store_true", help="leave out place and route")
     parser.add_argument("--output", metavar="DIR", default="build/chart", help="folder (default: build/chart)")
+
+
+def _arm(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--case", default="paper", metavar="NAME", help="paper, paper-offset, push or a .toml file")
+    parser.add_argument(
+        "--latency", type=float, default=6.0, metavar="MS", help="that is put in (default: the paper's 6)"
+    )
+    parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin)")
+    parser.add_argument("--json", action="store_true", help="one JSON object, in SI units, and no pictures")
+    parser.add_argument("--charts", action="store_true", help="draw force, safe speed and thickness against latency")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes for the charts (default: one a core)")
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that works the charts out instead"
+    )
+    parser.add_argument("--output", metavar="DIR", default="build/arm", help="folder (default: build/arm)")
 
 
 if __name__ == "__main__":

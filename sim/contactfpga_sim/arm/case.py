@@ -50,8 +50,7 @@ class Case:
         limit = self.motor.time_constant_s / STEPS_A_TIME_CONSTANT
         if self.run.step_s > limit * (1 + 1e-9):
             raise CaseError(
-                f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the "
-                "current takes"
+                f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the current takes"
             )
         for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
             part = self.run.step_s if name == "period_s" else self.control.period_s

@@ -93,7 +93,7 @@ class Controller:
         if gone >= self._control.retreat_m:
             self._stale = True
             self._now(seconds, "slowing", "retreat")
-        elif by_contact and seconds - self._touched_at > self._control.clear_s - 1e-9:
+        elif by_contact and seconds > self._touched_at and seconds - self._touched_at >= self._control.clear_s - 1e-9:
             self._now(seconds, "slowing", "resolved")
 
     def _yield(self, sensed: Sensed) -> None:

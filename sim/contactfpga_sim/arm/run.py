@@ -25,8 +25,8 @@ STAY_S = 20e-3
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it first
-    turns the arm back or stops it."""
+    """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it
+    first turns the arm back or stops it."""
 
     closes_s: float | None
     """The first switch does."""

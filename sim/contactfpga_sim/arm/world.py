@@ -109,18 +109,19 @@ class World:
         forces = self._plant.forces(now, self._state)
         cells = self._switches.at(now, forces.contact_n)
         self._press(cells)
-        self._learn(now, bool(cells.any()))
+        closed = bool(cells.any())
+        self._learn(now)
         theta, omega, current = self._state[:3]
         if self._number % self._ticks == 0:
             torque = max(-case.control.sensor_nm, min(case.control.sensor_nm, forces.sensor_nm))
             sensed = Sensed(theta, omega, torque, self._level, self._alive(now))
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
-        closed, known = bool(cells.any()), self._level
+        known = self._level
         self.course.append(
             Moment(now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), closed, known)
         )
-        self._state = self._plant.step(now, self._state, self._wanted, case.run.step_s)
+        self._state = self._plant.step(now, self._state, self._wanted, case.run.step_s, forces)
         if not finite(self._state):
             raise FloatingPointError(f"the integration blew up at {now:g} s with steps of {case.run.step_s:g} s")
         self._number += 1
@@ -147,7 +148,7 @@ class World:
             if self._board is not None:
                 self._board.press(cells)
 
-    def _learn(self, now: float, closed: bool) -> None:
+    def _learn(self, now: float) -> None:
         """Bring what has come to the controller by now into its input."""
         while self._changes and self._changes[0][0] <= now + 1e-9:
             at, self._level = self._changes.popleft()

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from pathlib import Path
 
@@ -26,8 +27,8 @@ def main(args: argparse.Namespace) -> int:
         for family in args.family or FAMILIES_DRAWN
         for method in args.method or METHODS
     ]
-    with _executor(args) as executor:
-        points = _with_progress(tasks, executor, not args.no_size)
+    with executor(args) as workers:
+        points = _with_progress(tasks, workers, not args.no_size)
     folder = Path(args.output)
     folder.mkdir(parents=True, exist_ok=True)
     figure = draw.picture(points)
@@ -45,7 +46,8 @@ def _known(option: str, names: Iterable[str] | None, known: Iterable[str]) -> No
             raise ValueError(f"{option} {name!r} is not known; take one of: {'; '.join(known)}")
 
 
-def _executor(args: argparse.Namespace) -> Executor:
+def executor(args: argparse.Namespace) -> Executor:
+    """What ``args.dask`` and ``args.jobs`` ask for."""
     if args.dask is None:
         return ProcessPoolExecutor(args.jobs)
     from distributed import Client
@@ -53,14 +55,21 @@ def _executor(args: argparse.Namespace) -> Executor:
     return Client(args.dask).get_executor()
 
 
-def _with_progress(tasks: list[Task], executor: Executor, with_size: bool) -> list[Point]:
+def _with_progress(tasks: list[Task], workers: Executor, with_size: bool) -> list[Point]:
+    with progress("placements") as step:
+        return study(tasks, workers, with_size, step)
+
+
+@contextlib.contextmanager
+def progress(first: str) -> Iterator[Callable[[str, int], None]]:
+    """A bar; what it gives is called with the name and number of all steps after each of them."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns) as progress:
-        bar = progress.add_task("placements")
+    with Progress(*columns) as shown:
+        bar = shown.add_task(first)
 
         def step(name: str, of: int) -> None:
-            progress.update(bar, advance=1, total=of, description=name)
+            shown.update(bar, advance=1, total=of, description=name)
 
-        return study(tasks, executor, with_size, step)
+        yield step
