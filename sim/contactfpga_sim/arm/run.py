@@ -85,6 +85,7 @@ def run(
     cycles = case.run.step_s * skin.clock_hz
     if way in ("pin", "uart") and abs(cycles - round(cycles)) > 1e-6:
         raise CaseError(f"step_s is {case.run.step_s:g}; it must be a whole number of clocks of {skin.clock_hz} Hz")
+    _on_sheet(case, skin)
     world = World(case, way, skin, latency_s, faults)
     try:
         if way == "uart":
@@ -94,6 +95,14 @@ def run(
     finally:
         world.close()
     return Result(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
+
+
+def _on_sheet(case: Case, skin: Skin) -> None:
+    ends = (("x_mm", (skin.columns - 0.5) * skin.pitch_x_mm), ("y_mm", (skin.rows - 0.5) * skin.pitch_y_mm))
+    for touch in case.touch:
+        for name, end in ends:
+            if getattr(touch, name) > end:
+                raise CaseError(f"{name} of a touch is {getattr(touch, name):g}; the sheet ends at {end:g} mm")
 
 
 def _host(world: World) -> None:

@@ -31,6 +31,9 @@ class Switches:
         self._per_newton = [self._under(number, 1.0) for number in range(len(case.touch))]
         self._made = np.zeros((skin.rows, skin.columns), bool)
         self._since = np.full(self._made.shape, -np.inf)
+        self._any = False
+        self._closed = self._made
+        self._bounces_until = -np.inf
 
     def stress_pa(self, forces_n: Sequence[float]) -> np.ndarray:
         """(rows, columns) normal stress in Pa below the forces of the touches."""
@@ -42,18 +45,30 @@ class Switches:
         return stress
 
     def at(self, seconds: float, forces_n: Sequence[float]) -> np.ndarray:
-        """(rows, columns) bool: which are closed at a moment; moments come in order."""
-        if any(forces_n) or self._made.any():
+        """(rows, columns) bool: which are closed at a moment; moments come in order. The same array as long as nothing
+        changes."""
+        if any(forces_n) or self._any:
             stress = self.stress_pa(forces_n)
             made = np.where(self._made, stress > self._opening, stress >= self._closing)
-            self._since[made != self._made] = seconds
-            self._made = made
+            changed = made != self._made
+            if changed.any():
+                self._since[changed] = seconds
+                self._made, self._any = made, bool(made.any())
+                self._bounces_until = seconds + self._bounce_s
+                self._closed = self._bouncing(seconds)
+        if self._closed is not self._made and seconds < self._bounces_until + self._period_s:
+            closed = self._bouncing(seconds)
+            self._closed = self._closed if np.array_equal(closed, self._closed) else closed
+        return self._closed
+
+    def _bouncing(self, seconds: float) -> np.ndarray:
         if not self._bounce_s:
             return self._made
         age = seconds - self._since
         bouncing = age < self._bounce_s
         half_periods = np.where(bouncing, age, 0.0) // (self._period_s / 2)
-        return self._made ^ (bouncing & (half_periods % 2 == 1))
+        found: np.ndarray = self._made ^ (bouncing & (half_periods % 2 == 1))
+        return found
 
     def _under(self, number: int, force_n: float) -> np.ndarray:
         touch = self._touches[number]

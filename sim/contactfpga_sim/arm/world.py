@@ -70,7 +70,9 @@ class World:
         self._clock_hz = skin.clock_hz
         self._chip = Chip(case.usb)
         self._bytes = b""
-        self._cells = np.zeros((skin.rows, skin.columns), bool)
+        self._cells = self._switches.at(-case.run.lead_s, (0.0,))
+        self._closed = False
+        self._frame = 0
         self._changes: collections.deque[tuple[float, bool]] = collections.deque()
         self._level = False
         self._number = 0
@@ -94,7 +96,8 @@ class World:
 
     def send(self, data: bytes) -> None:
         """Bytes from the host to the board."""
-        if self._board is not None and not self._dead(self.faults.board_dies_s):
+        if self._board is not None and not self._dead():
+            self._catch_up()
             self._board.send(data)
 
     def say(self, zones: int) -> None:
@@ -107,33 +110,33 @@ class World:
         """Go on by one step of the integrator."""
         case, now = self.case, self.time_s
         forces = self._plant.forces(now, self._state)
-        cells = self._switches.at(now, forces.contact_n)
-        self._press(cells)
-        closed = bool(cells.any())
+        self._press(self._switches.at(now, forces.contact_n))
+        tick = self._number % self._ticks == 0
+        if tick and self._way == "pin":
+            self._catch_up()
         self._learn(now)
         theta, omega, current = self._state[:3]
-        if self._number % self._ticks == 0:
+        if tick:
             torque = max(-case.control.sensor_nm, min(case.control.sensor_nm, forces.sensor_nm))
             sensed = Sensed(theta, omega, torque, self._level, self._alive(now))
             self._wanted = self.controller.sample(now, sensed)
         total, deepest = sum(forces.contact_n), max(forces.indentation_m)
-        known = self._level
         self.course.append(
-            Moment(now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), closed, known)
+            Moment(now, theta, omega, current, forces.sensor_nm, total, max(0.0, deepest), self._closed, self._level)
         )
         self._state = self._plant.step(now, self._state, self._wanted, case.run.step_s, forces)
         if not finite(self._state):
             raise FloatingPointError(f"the integration blew up at {now:g} s with steps of {case.run.step_s:g} s")
         self._number += 1
-        self._run_board()
+        self._host_frame()
 
     def close(self) -> None:
         """Free the board."""
         if self._board is not None:
             self._board.close()
 
-    def _dead(self, since: float | None) -> bool:
-        return since is not None and self.time_s >= since
+    def _dead(self) -> bool:
+        return self.faults.board_dies_s is not None and self.time_s >= self.faults.board_dies_s
 
     def _alive(self, now: float) -> bool:
         if self._way != "uart" or not self.heard:
@@ -141,33 +144,43 @@ class World:
         return now - self.heard[-1][0] <= self.case.control.watchdog_s
 
     def _press(self, cells: np.ndarray) -> None:
-        if not np.array_equal(cells, self._cells):
-            if self._way == "latency" and cells.any() != self._cells.any():
-                self._changes.append((self.time_s + self._latency_s, bool(cells.any())))
-            self._cells = cells.copy()
-            if self._board is not None:
-                self._board.press(cells)
+        if cells is self._cells:
+            return
+        self._cells, before, self._closed = cells, self._closed, bool(cells.any())
+        if self._way == "latency" and self._closed != before:
+            self._changes.append((self.time_s + self._latency_s, self._closed))
+        if self._board is not None:
+            self._catch_up()
+            self._board.press(cells)
 
     def _learn(self, now: float) -> None:
-        """Bring what has come to the controller by now into its input."""
+        """Bring what has come to the controller by now into its input; a pin is looked at when it samples."""
         while self._changes and self._changes[0][0] <= now + 1e-9:
             at, self._level = self._changes.popleft()
             if self._level and self.detected_s is None:
                 self.detected_s = at
 
-    def _run_board(self) -> None:
-        board = self._board
-        if board is not None and not self._dead(self.faults.board_dies_s):
-            board.run(round(self.clock() * self._clock_hz) - board.cycle)
-            lead = self.case.run.lead_s
-            for cycle, level, _ in board.take("contact").tolist():
-                if self._way == "pin":
-                    self._changes.append((cycle / self._clock_hz - lead, bool(level)))
-            for cycle, value, _ in board.take("received").tolist():
-                self._chip.put(cycle / self._clock_hz, self._noisy(cycle / self._clock_hz - lead, value))
-        clock, step = self.clock(), self.case.run.step_s
-        if self._chip.frame_at(clock) != self._chip.frame_at(clock - step):
-            self._bytes += self._chip.take(clock)
+    def _catch_up(self) -> None:
+        """Run the board to the plant's time, unless it died before. It need not run along with every step: nothing
+        passes between the two but at a change of the switches, a sample of the controller, a frame of the host."""
+        board, lead, hz = self._board, self.case.run.lead_s, self._clock_hz
+        if board is None:
+            return
+        dies = self.faults.board_dies_s
+        until = self.clock() if dies is None else min(self.clock(), dies + lead)
+        board.run(max(0, round(until * hz) - board.cycle))
+        for cycle, level, _ in board.take("contact").tolist():
+            if self._way == "pin":
+                self._changes.append((cycle / hz - lead, bool(level)))
+        for cycle, value, _ in board.take("received").tolist():
+            self._chip.put(cycle / hz, self._noisy(cycle / hz - lead, value))
+
+    def _host_frame(self) -> None:
+        frame = self._chip.frame_at(self.clock())
+        if frame != self._frame and self._way == "uart":
+            self._catch_up()
+            self._bytes += self._chip.take(self.clock())
+        self._frame = frame
 
     def _noisy(self, seconds: float, value: int) -> int:
         noise = self.faults.noise_s
