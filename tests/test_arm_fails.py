@@ -37,6 +37,21 @@ def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
     assert alone.reason == ""
 
 
+def test_by_the_patchs_pressure_the_switch_closes_at_28_n_which_the_limit_does_not_wait_for():
+    """Huber's stress below a Hertz patch of R* = 38 mm, by hand: 3 F / (2 pi (a^2 + z^2)) = 1 N / 12.6 mm^2."""
+    wide = PAPER.but(model="hertz", control=UNLIMITED, link={"speed_m_s": 0.3}, run={"duration_s": 0.04})
+    course = run(wide, "torque").course
+
+    def stress(force):
+        patch2 = (0.75 * force * 0.038 / (PAPER.foam.stiffness * 0.75 / math.sqrt(0.038))) ** (2 / 3)
+        return 1.5 * force / (math.pi * (patch2 + 25e-6)) - 1 / 12.6e-6
+
+    closing = brentq(stress, 1.0, 100.0)
+    assert course["force_n"][course["closed"].argmax()] == pytest.approx(closing, rel=5e-3)
+    outcome = run(PAPER.but(model="hertz"), "latency").outcome
+    assert (outcome.reason, outcome.closes_s) == ("torque", None)
+
+
 def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
     outcomes = [run(PAPER.but(link={"speed_m_s": speed}), "latency").outcome for speed in (0.3, 0.4, 0.5, 0.6)]
     flat = [outcome.peak_indentation_m > 5e-3 for outcome in outcomes]

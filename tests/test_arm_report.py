@@ -6,6 +6,7 @@ import functools
 import json
 import math
 import re
+import subprocess
 import sys
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
@@ -211,6 +212,28 @@ def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
         thick = case.but(foam={"thickness_m": point.thickness_m - less}, run={"step_s": 25e-6, "duration_s": 0.05})
         assert run(thick, "latency", latency_s=6e-3).outcome.bottomed == flat
     assert 4e-3 < point.thickness_m < 5e-3
+
+
+def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeypatch, capsys):
+    few = charts.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
+    few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
+    monkeypatch.setattr(charts, "plan", lambda case: few)
+    assert cli.main(["arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    ends = [f"{name}.{end}" for name in ("arm-force", "arm-speed", "arm-thickness") for end in ("png", "svg")]
+    assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
+    assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
+
+
+@pytest.mark.parametrize("latency", ["-1", "nan", "inf"])
+def test_a_latency_that_cannot_be_is_refused(latency, capsys):
+    assert cli.main(["arm", f"--latency={latency}"]) == 1
+    assert "--latency is" in capsys.readouterr().err
+
+
+def test_the_arm_needs_no_more_than_the_simulation():
+    code = "import sys, contactfpga_sim.arm.command, contactfpga_sim.arm.charts; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_charts_of_a_few_points(nothing_kept, tmp_path):

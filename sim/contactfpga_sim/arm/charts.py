@@ -20,7 +20,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.arm import sweep
 from contactfpga_sim.arm.case import Case
 from contactfpga_sim.arm.sweep import Point, Task
-from contactfpga_sim.chart.command import executor, progress
+from contactfpga_sim.workers import executor, progress
 
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from pathlib import Path
 
 from contactfpga.skin import Skin
@@ -18,8 +19,8 @@ SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
     case = Case.load(args.case)
-    if args.latency < 0:
-        raise CaseError(f"--latency is {args.latency}; it must be 0 ms or above")
+    if not 0 <= args.latency < math.inf:
+        raise CaseError(f"--latency is {args.latency}; it must be a finite number, 0 ms or above")
     if args.charts:
         from contactfpga_sim.arm import charts  # which needs processes and a progress bar
 

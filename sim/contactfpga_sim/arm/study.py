@@ -18,7 +18,7 @@ from contactfpga_sim.arm.command import SHARES
 from contactfpga_sim.arm.run import Result, run
 from contactfpga_sim.arm.sweep import Point, Task
 from contactfpga_sim.arm.world import Faults
-from contactfpga_sim.chart.command import progress
+from contactfpga_sim.workers import progress
 
 STEPS_US = (25.0, 12.5, 6.25)
 """Of the integrator; each is half of the one before."""
@@ -45,6 +45,7 @@ FAILURES = (
     Failure("halfway between four switches", {"touch": (HALFWAY,)}),
     Failure("that, 0.1 m from the joint", {"touch": (HALFWAY | {"lever_m": 0.1},)}),
     Failure("two contacts, one on a switch, one halfway", {"touch": ({}, {"x_mm": 25.0, "y_mm": 25.0})}),
+    Failure("the patch's pressure, not a point force", {"model": "hertz"}),
     Failure("0.6 m/s: pressed flat", {"link": {"speed_m_s": 0.6}}),
     Failure("0.6 m/s, torque limit alone", {"link": {"speed_m_s": 0.6}}, "torque"),
     Failure("bounce of 8 ms, nobody waits", {"switch": BOUNCING, "control": {"clear_s": 0.0}}),

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Iterable
+from concurrent.futures import Executor
 from pathlib import Path
 
 from contactfpga_sim.chart import draw
 from contactfpga_sim.chart.methods import METHODS
 from contactfpga_sim.chart.study import Point, Task, study
 from contactfpga_sim.families import FAMILIES
+from contactfpga_sim.workers import executor, progress
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 
@@ -46,30 +46,6 @@ def _known(option: str, names: Iterable[str] | None, known: Iterable[str]) -> No
             raise ValueError(f"{option} {name!r} is not known; take one of: {'; '.join(known)}")
 
 
-def executor(args: argparse.Namespace) -> Executor:
-    """What ``args.dask`` and ``args.jobs`` ask for."""
-    if args.dask is None:
-        return ProcessPoolExecutor(args.jobs)
-    from distributed import Client
-
-    return Client(args.dask).get_executor()
-
-
 def _with_progress(tasks: list[Task], workers: Executor, with_size: bool) -> list[Point]:
     with progress("placements") as step:
         return study(tasks, workers, with_size, step)
-
-
-@contextlib.contextmanager
-def progress(first: str) -> Iterator[Callable[[str, int], None]]:
-    """A bar; what it gives is called with the name and number of all steps after each of them."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns) as shown:
-        bar = shown.add_task(first)
-
-        def step(name: str, of: int) -> None:
-            shown.update(bar, advance=1, total=of, description=name)
-
-        yield step
