@@ -231,6 +231,11 @@ def test_a_latency_that_cannot_be_is_refused(latency, capsys):
     assert "--latency is" in capsys.readouterr().err
 
 
+def test_charts_of_an_arm_at_rest_are_refused(capsys):
+    assert cli.main(["arm", "--case", "push", "--charts"]) == 1
+    assert "behaviour is 'comply' at 0 m/s" in capsys.readouterr().err
+
+
 def test_the_arm_needs_no_more_than_the_simulation():
     code = "import sys, contactfpga_sim.arm.command, contactfpga_sim.arm.charts; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

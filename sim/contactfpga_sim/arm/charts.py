@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from contactfpga.cover.drawing import SETTINGS, save
 from contactfpga.skin import Skin
 from contactfpga_sim.arm import sweep
-from contactfpga_sim.arm.case import Case
+from contactfpga_sim.arm.case import Case, CaseError
 from contactfpga_sim.arm.sweep import Point, Task
 from contactfpga_sim.workers import executor, progress
 
@@ -76,6 +76,10 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
 
 def main(args: argparse.Namespace, case: Case) -> int:
     """``contactfpga arm --charts``."""
+    if case.control.behaviour != "reverse" or not case.link.speed_m_s:
+        raise CaseError(
+            f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; the charts need 'reverse' and speed"
+        )
     tasks = plan(case)
     with executor(args) as workers, progress("runs of the arm") as step:
         found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step)))
