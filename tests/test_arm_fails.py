@@ -199,6 +199,11 @@ def test_one_that_dies_before_the_contact_leaves_it_to_the_torque_limit(way, who
     assert result.outcome.peak_force_n == pytest.approx(limited.peak_force_n, rel=1e-9)
 
 
+def test_a_board_that_speaks_more_rarely_than_the_watchdog_waits_is_refused():
+    with pytest.raises(CaseError, match=r"keep_alive_ms is 100; the controller stops the arm after 0.02 s"):
+        run(PAPER, "uart", skin=Skin(send="on_change"))
+
+
 @pytest.mark.parametrize("who", ["board", "host"])
 def test_an_arm_that_hears_nothing_any_more_stops_before_it_touches(who):
     dies = -5e-3

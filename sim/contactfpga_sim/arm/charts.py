@@ -78,7 +78,7 @@ def main(args: argparse.Namespace, case: Case) -> int:
     """``contactfpga arm --charts``."""
     if case.control.behaviour != "reverse" or not case.link.speed_m_s:
         raise CaseError(
-            f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; the charts need 'reverse' and speed"
+            f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
         )
     tasks = plan(case)
     with executor(args) as workers, progress("runs of the arm") as step:

@@ -86,6 +86,11 @@ def run(
     if way in ("pin", "uart") and abs(cycles - round(cycles)) > 1e-6:
         raise CaseError(f"step_s is {case.run.step_s:g}; it must be a whole number of clocks of {skin.clock_hz} Hz")
     _on_sheet(case, skin)
+    if way == "uart" and skin.send == "on_change" and 1e-3 * skin.keep_alive_ms >= case.control.watchdog_s:
+        raise CaseError(
+            f"keep_alive_ms is {skin.keep_alive_ms:g}; the controller stops the arm after {case.control.watchdog_s:g} s "
+            "without a frame"
+        )
     world = World(case, way, skin, latency_s, faults)
     try:
         if way == "uart":
