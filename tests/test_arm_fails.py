@@ -200,7 +200,9 @@ def test_one_that_dies_before_the_contact_leaves_it_to_the_torque_limit(way, who
 
 
 def test_a_board_that_speaks_more_rarely_than_the_watchdog_waits_is_refused():
-    with pytest.raises(CaseError, match=r"keep_alive_ms is 100; the controller stops the arm after 0.02 s"):
+    with pytest.raises(
+        CaseError, match=r"keep_alive_ms is 100; without a frame the controller stops the arm after 0.02 s"
+    ):
         run(PAPER, "uart", skin=Skin(send="on_change"))
 
 

@@ -88,8 +88,8 @@ def run(
     _on_sheet(case, skin)
     if way == "uart" and skin.send == "on_change" and 1e-3 * skin.keep_alive_ms >= case.control.watchdog_s:
         raise CaseError(
-            f"keep_alive_ms is {skin.keep_alive_ms:g}; the controller stops the arm after {case.control.watchdog_s:g} s "
-            "without a frame"
+            f"keep_alive_ms is {skin.keep_alive_ms:g}; without a frame the controller stops the arm after "
+            f"{case.control.watchdog_s:g} s"
         )
     world = World(case, way, skin, latency_s, faults)
     try:
