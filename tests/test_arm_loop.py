@@ -1,6 +1,7 @@
 """The arm's loop through the compiled gateware and the real driver, against the golden model and simple sums."""
 
 import dataclasses
+import functools
 import itertools
 import time
 
@@ -25,22 +26,32 @@ STEP = PAPER.run.step_s
 LEAD = PAPER.run.lead_s
 
 
-@pytest.fixture(scope="module")
+@functools.cache
+def paper(way):
+    return run(PAPER, way)
+
+
+@functools.cache
+def direct():
+    return run(DIRECT, "uart").outcome
+
+
+@pytest.fixture
 def by_pin():
-    return run(PAPER, "pin")
+    return paper("pin")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def by_uart():
-    return run(PAPER, "uart")
+    return paper("uart")
 
 
 @pytest.fixture(scope="module")
-def golden(by_pin):
+def golden():
     """What the golden model says of a sheet whose switch at (8, 8) closes when ours does."""
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
     cells[8, 8] = True
-    closes = round((by_pin.outcome.closes_s + LEAD) * SKIN.clock_hz)
+    closes = round((paper("pin").outcome.closes_s + LEAD) * SKIN.clock_hz)
     return predict(SKIN, Timeline([(closes, cells, None)]), closes + 8 * Derived(SKIN).frame_clocks)
 
 
@@ -64,7 +75,7 @@ def test_the_pin_rises_in_the_clock_in_which_the_golden_model_says(by_pin, golde
 
 
 def test_the_driver_hands_over_the_first_frame_that_the_golden_model_sends(golden):
-    detected = run(DIRECT, "uart").outcome.detected_s
+    detected = direct().detected_s
     assert 0 <= detected - frame_ends(golden)[0] <= 2 * STEP
 
 
@@ -72,8 +83,7 @@ def test_the_usb_chip_and_the_host_add_their_time(by_uart, golden):
     usb = PAPER.usb
     late = by_uart.outcome.detected_s - frame_ends(golden)[0]
     assert usb.host_s <= late <= usb.timer_s + usb.frame_s + usb.host_s + 2 * STEP
-    direct = run(DIRECT, "uart").outcome.detected_s
-    assert by_uart.outcome.detected_s > direct
+    assert by_uart.outcome.detected_s > direct().detected_s
 
 
 def test_what_comes_together_in_a_usb_packet_is_heard_at_once(by_uart):
@@ -95,8 +105,8 @@ def test_detection_is_no_later_than_the_sum_of_its_bounds(by_pin, by_uart):
 
 
 def test_sooner_is_softer(by_pin, by_uart):
-    alone = run(PAPER, "torque").outcome
-    late = run(PAPER, "latency", latency_s=6e-3).outcome
+    alone = paper("torque").outcome
+    late = paper("latency").outcome
     forces = [one.peak_force_n for one in (by_pin.outcome, by_uart.outcome, late, alone)]
     assert forces == sorted(forces)
     assert forces[0] < 0.6 * forces[2]
@@ -106,7 +116,7 @@ def test_sooner_is_softer(by_pin, by_uart):
 
 @pytest.mark.parametrize("way", ["latency", "pin", "uart", "torque"])
 def test_the_arm_goes_back_until_nothing_is_closed_then_slows_to_rest(way):
-    result = run(PAPER, way)
+    result = paper(way)
     outcome = result.outcome
     assert [state for _, state, _ in result.events] == ["reversing", "slowing", "resting"]
     slows = result.events[1][0]
@@ -120,7 +130,7 @@ def test_a_byte_damaged_on_the_wire_costs_a_frame(golden):
     """One byte of the first frame that tells of the contact: the next frame does, 96 us later."""
     first, second = frame_ends(golden)[:2]
     byte = 10 * Derived(SKIN).bit_clocks / SKIN.clock_hz
-    clean = run(DIRECT, "uart").outcome
+    clean = direct()
     noisy = run(DIRECT, "uart", faults=Faults(noise_s=(first - 8.5 * byte, first - 7.5 * byte))).outcome
     assert noisy.detected_s - clean.detected_s == pytest.approx(second - first, abs=2 * STEP)
     assert noisy.reacts_s >= clean.reacts_s
