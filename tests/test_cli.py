@@ -357,6 +357,8 @@ def test_bad_skin_file_is_named(tmp_path, run):
         (["build", "icestick"], "amaranth_boards.icestick", "boards"),
         (["chart"], "scipy.optimize", "chart"),
         (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+        (["arm"], "matplotlib.figure", "sim"),
+        (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):

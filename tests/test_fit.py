@@ -17,8 +17,8 @@ from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga_hdl import packed, sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim import figures, kept, size
-from contactfpga_sim.chart import pool, speed
+from contactfpga_sim import figures, kept, pool, size
+from contactfpga_sim.chart import speed
 from contactfpga_sim.chart.errors import Interval, interval
 from contactfpga_sim.chart.speed import Speed
 from contactfpga_sim.fit import cost, page, search, sources

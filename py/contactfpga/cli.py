@@ -24,6 +24,7 @@ _COMMANDS = {
     "chart": "contactfpga_sim.chart.command",
     "fit": "contactfpga_sim.fit.command",
     "failures": "contactfpga_sim.failures.command",
+    "arm": "contactfpga_sim.arm.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -77,6 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     _chart(commands.add_parser("chart", help="chart what speed costs in accuracy"))
     fit_flags.add(commands.add_parser("fit", help="find the cheapest Skin that is good enough for given scenes"))
     _failures(commands.add_parser("failures", help="turn one knob after the other until something breaks"))
+    _arm(commands.add_parser("arm", help="run the arm into a human arm, and see what force it takes"))
     return parser
 
 
@@ -148,6 +150,21 @@ def _failures(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--study", action="append", metavar="NAME", help="only this one; can be repeated")
     parser.add_argument("--page", metavar="FILE", help="page whose table and pictures are written anew")
     parser.add_argument("--output", metavar="DIR", default="build/failures", help="folder (default: build/failures)")
+
+
+def _arm(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--case", default="paper", metavar="NAME", help="paper, paper-offset, push or a .toml file")
+    parser.add_argument(
+        "--latency", type=float, default=6.0, metavar="MS", help="that is put in (default: the paper's 6)"
+    )
+    parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin)")
+    parser.add_argument("--json", action="store_true", help="one JSON object, in SI units, and no pictures")
+    parser.add_argument("--charts", action="store_true", help="draw force, safe speed and thickness against latency")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes for the charts (default: one a core)")
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that works the charts out instead"
+    )
+    parser.add_argument("--output", metavar="DIR", default="build/arm", help="folder (default: build/arm)")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
-from contactfpga_sim.chart import draw, host, numbers, pool
+from contactfpga_sim import pool
+from contactfpga_sim.chart import draw, host, numbers
 from contactfpga_sim.chart.methods import METHODS
 from contactfpga_sim.chart.study import Task, study
 from contactfpga_sim.families import FAMILIES

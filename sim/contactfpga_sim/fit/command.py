@@ -18,7 +18,7 @@ from rich.table import Table
 
 from contactfpga.commands.cover import UNSOLVED
 from contactfpga.skin import Skin
-from contactfpga_sim.chart import pool
+from contactfpga_sim import pool
 from contactfpga_sim.fit import show
 from contactfpga_sim.fit.candidates import METHODS, SCANS, Candidate, candidates, pitches_for, size_for
 from contactfpga_sim.fit.goals import Goals

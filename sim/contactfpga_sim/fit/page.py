@@ -8,8 +8,7 @@ import sys
 from collections.abc import Callable
 
 from contactfpga.commands import fit_flags
-from contactfpga_sim import figures
-from contactfpga_sim.chart import pool
+from contactfpga_sim import figures, pool
 from contactfpga_sim.fit import show
 from contactfpga_sim.fit.command import asked
 from contactfpga_sim.fit.search import fit

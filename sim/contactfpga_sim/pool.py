@@ -1,4 +1,4 @@
-"""What works out the pieces of a chart or a fit, and how far it is."""
+"""What works out the pieces of a chart, a fit or a sweep, and how far it is."""
 
 from __future__ import annotations
 
