@@ -339,7 +339,7 @@ def test_quick_synthesises_no_refused_ones(file, shortcuts):
     assert {skin.labeller for skin in shortcuts.sized} == {"serial", "run"}
 
 
-def test_wires_then_bytes_decide_between_equal_luts(file, monkeypatch):
+def test_wires_then_bytes_decide_between_equal_luts(file, shortcuts, monkeypatch):
     monkeypatch.setattr(cost, "luts_of", lambda skin: 500)
     found = chosen(file(BUMPER), pitches=(10.0, 20.0), barycenter_mm=None, host_us=0.0)
     assert found.answer.wires == 8
