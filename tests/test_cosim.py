@@ -39,7 +39,8 @@ COCOTB = {
     "serial": Skin(labeller="serial", settle_us=2.5),
     "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
 }
-MARKS = dict.fromkeys(("serial", "barycenter", "debounced-cells"), pytest.mark.campaign)  # what they add is in the covering set, too
+MARKS = dict.fromkeys(("serial", "barycenter", "debounced-cells"), pytest.mark.campaign)
+"""What they add is in the covering set, too."""
 SIMULATORS = [
     "verilator",
     pytest.param(
