@@ -19,7 +19,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart fits failures formal campaign mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart chart-page fits failures arm-page formal campaign mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -76,11 +76,18 @@ sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and c
 chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
 	$(VENV)/bin/contactfpga chart $(ARGS)
 
+chart-page: $(VENV)/.stamp-chart | compiler ## the same for docs/chart.md, with its tables (half an hour)
+	$(VENV)/bin/contactfpga chart --output docs/chart $(ARGS)
+	$(PY) -m contactfpga_sim.chart.tables docs/chart.md
+
 fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
 	$(PY) -m contactfpga_sim.fit.page docs/fit.md
 
 failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
 	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
+
+arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
+	$(PY) -m contactfpga_sim.arm.study docs/arm.md docs/images
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

@@ -6,6 +6,7 @@ import itertools
 import math
 import shlex
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from scipy.stats import binomtest
 from contactfpga import cli, protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_sim import kept
+from contactfpga_sim import figures, kept
 from contactfpga_sim.board import Board
-from contactfpga_sim.chart import errors, host, numbers, speed, steady, study
+from contactfpga_sim.chart import draw, errors, host, numbers, speed, steady, study, tables
+from contactfpga_sim.chart.command import FAMILIES_DRAWN
 from contactfpga_sim.chart.errors import Blob
 from contactfpga_sim.chart.methods import EXTENT_MM, METHODS
 from contactfpga_sim.chart.study import Task
@@ -24,6 +26,7 @@ from contactfpga_sim.compare import Mismatch
 from contactfpga_sim.golden import zones
 from contactfpga_sim.scenes import edge, fingertip, palm, two_fingers
 
+ROOT = Path(__file__).resolve().parent.parent
 SMALL = METHODS["run, 20 mm"]
 
 
@@ -239,6 +242,35 @@ def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, caps
 def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
     assert cli.main(["chart", *arguments]) == 1
     assert message in capsys.readouterr().err
+
+
+def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
+    """Picture and table of docs/chart.md come from docs/chart/chart.csv."""
+    monkeypatch.chdir(ROOT)
+    points = numbers.read(tables.NUMBERS)
+    assert {point.task.method for point in points} == set(METHODS)
+    assert {point.task.family for point in points} == set(FAMILIES_DRAWN)
+    assert min(point.task.count for point in points) >= 1000
+    draw.save(points, tmp_path)
+    assert (tmp_path / "chart.svg").read_text() == (ROOT / "docs/chart/chart.svg").read_text()
+    page = (ROOT / "docs/chart.md").read_text()
+    assert figures.update(page, {"front": tables.front_table}) == page
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(7200)
+def test_the_pages_numbers_are_found_again(tmp_path):
+    assert cli.main(["chart", "--output", str(tmp_path)]) == 0
+    for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / tables.NUMBERS), strict=True):
+        assert dataclasses.replace(found, host_us=shown.host_us) == shown
+
+
+def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
+    monkeypatch.setattr(tables, "SHEETS", (16,))
+    monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
+    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in tables.host_table().splitlines()[2:]}
+    # 4 bytes a zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
+    assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
 
 
 def test_all_sheets_have_the_same_extent():

@@ -18,7 +18,7 @@ LABELLERS: tuple[dict[str, Any], ...] = (
 )
 """Connectivity makes no difference to the others."""
 
-REPORTS: tuple[dict[str, Any], ...] = ({"report": "moments"},)
+REPORTS: tuple[dict[str, Any], ...] = ({"report": "moments"}, {"report": "barycenter"})
 """Of zones."""
 
 METHODS = (*(labeller | report for report in REPORTS for labeller in LABELLERS), {"report": "cells"})
