@@ -55,7 +55,7 @@ def play(board: Board, timeline: Timeline, cycles: int) -> int:
 @pytest.mark.parametrize("number", range(len(COVERING)))
 def test_covering_set_in_amaranths_simulator(number):
     skin = skin_for(COVERING[number])
-    cycles = 4_000
+    cycles = 2_500
     make = stimulus if number % 2 else touches
     timeline = make(skin, cycles, number)
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100

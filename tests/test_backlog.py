@@ -38,7 +38,15 @@ SHEETS = {
     "2x3, cells": {"rows": 2, "columns": 3, "report": "cells"},
     "3x64, cells": {"rows": 3, "columns": 64, "report": "cells"},
 }
-MARKS = dict.fromkeys(("9x9, divided", "16x16, divided"), pytest.mark.campaign)
+
+
+def cases():
+    """Every sheet with every labeller; bitmaps have none."""
+    for name, fields in SHEETS.items():
+        for labeller in LABELLERS if fields.get("report") != "cells" else ("run",):
+            long = name in ("9x9, divided", "16x16, divided")
+            long |= name.startswith("24x40") and labeller in ("projection", "single")
+            yield pytest.param(name, labeller, marks=[pytest.mark.campaign] * long)
 
 
 class Chain(wiring.Component):
@@ -107,8 +115,7 @@ def patterns(rng, rows, columns, capacity):
     return [*frames, [dots] * rows, noise, checkers, checkers]
 
 
-@pytest.mark.parametrize("labeller", LABELLERS)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in SHEETS])
+@pytest.mark.parametrize(("name", "labeller"), list(cases()))
 def test_no_item_is_lost_and_no_summary_is_late_in_the_worst_frames(bench, rng, name, labeller):
     skin, clocks = shortest({**SHEETS[name], "labeller": labeller})
     frames = patterns(rng, skin.rows, skin.columns, skin.zone_capacity)

@@ -11,12 +11,12 @@ from contactfpga_sim import shapes
 from contactfpga_sim.golden import all_departures, row_clocks
 from contactfpga_sim.label_bench import LabelBench, Labelled
 
-pytestmark = pytest.mark.parametrize("labeller", ["run", "serial"])
+BOTH = pytest.mark.parametrize("labeller", ["run", "serial"])
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 SQUARES = (8, 16, 33, 64)
-RANDOM = {  # (rows, columns): frames; more than 100,000 in all, for each connectivity; `serial` takes a quarter
+RANDOM = {  # (rows, columns): frames; more than 100,000 in all, for each connectivity; `serial` takes a tenth
     (1, 1): 200,
     (1, 16): 5_000,
     (16, 1): 5_000,
@@ -102,7 +102,10 @@ def check_stalled(bench: LabelBench, frames: np.ndarray, gap: int, stall: int) -
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize("columns", [4, 5])
+@pytest.mark.parametrize(
+    ("columns", "labeller"),
+    [(4, "run"), (5, "run"), (4, "serial"), pytest.param(5, "serial", marks=pytest.mark.campaign)],
+)
 def test_every_small_frame(benches, record_property, columns, connectivity, labeller):
     bench = benches(4, columns, connectivity, labeller)
     total, part = 1 << 4 * columns, 1 << 16
@@ -114,6 +117,7 @@ def test_every_small_frame(benches, record_property, columns, connectivity, labe
     record_property("worst_last_record_clocks", worst)
 
 
+@BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("size", SQUARES)
 def test_shapes_that_break_labellers(benches, record_property, size, connectivity, labeller):
@@ -123,19 +127,21 @@ def test_shapes_that_break_labellers(benches, record_property, size, connectivit
     record_property("cases", len(frames))
 
 
+@BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("size", RANDOM, ids=str)
 def test_random_frames(benches, record_property, size, connectivity, labeller):
-    count = RANDOM[size] if labeller == "run" else RANDOM[size] // 4
+    count = RANDOM[size] if labeller == "run" else RANDOM[size] // 10
     frames = random_frames(*size, count, seed=size[0] * 100 + size[1])
     check_exact(benches(*size, connectivity, labeller), frames)
     record_property("cases", len(frames))
 
 
-def test_random_frames_are_enough(labeller):
+def test_random_frames_are_enough():
     assert sum(RANDOM.values()) >= 100_000
 
 
+@BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("gap", "stall"), [(0, 50), (50, 0), (30, 30), (10, 90)])
 def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity, labeller):
@@ -146,6 +152,7 @@ def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivit
     record_property("cases", len(small) + len(large))
 
 
+@BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_recordings(benches, record_property, name, connectivity, labeller):
@@ -158,6 +165,7 @@ def test_recordings(benches, record_property, name, connectivity, labeller):
     record_property("cases", len(frames))
 
 
+@BOTH
 def test_a_wrong_sum_would_be_seen(benches, monkeypatch, labeller):
     """The comparison itself: one bit of one record, and one clock, each make it fail."""
     bench = benches(4, 4, 8, labeller)
