@@ -96,7 +96,7 @@ campaign: $(VENV)/.stamp-test | compiler ## run the long tests that `make test` 
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
-mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (a quarter of an hour)
+mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (half an hour and more)
 	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.mutants.campaign --page docs/mutants.md $(ARGS)
 
 lint: $(VENV)/.stamp-lint ## check style and types
