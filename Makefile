@@ -92,7 +92,7 @@ arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md an
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
 
-campaign: $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
+campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
