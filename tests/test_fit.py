@@ -16,7 +16,7 @@ from scipy.stats import binomtest
 
 from contactfpga import cli
 from contactfpga.skin import Skin
-from contactfpga_hdl import packed, sizes
+from contactfpga_hdl import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim import figures, kept, pool, size
 from contactfpga_sim.chart import speed
@@ -436,7 +436,7 @@ def test_the_command_writes_a_skin_that_loads_and_builds(file, tmp_path, capsys,
 @pytest.mark.campaign
 def test_the_luts_are_those_of_place_and_route():
     skin = Skin(rows=4, columns=4, labeller="single")
-    found = packed.luts(lambda: Top(skin), sizes.UP5K)
+    found = sizes.luts(lambda: Top(skin), sizes.UP5K)
     assert 300 < found < 700
     assert (
         found == sizes.measure(lambda: Top(skin), sizes.UP5K, seeds=1).luts == size.luts(lambda: Top(skin), cost.DEVICE)

@@ -11,7 +11,7 @@ import signal
 import statistics
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -86,10 +86,8 @@ def square(size: int) -> Skin:
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
     """Synthesise what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
-    with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as name:  # these tools do not see /tmp
-        folder = Path(name)
-        _synthesise(component(), device, folder)
-        packed = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
+    luts, flip_flops, block_rams = _packed(component(), device)
+    with _folder() as folder:
         _synthesise(_Registered(component()), device, folder)
         fmax: list[float] = []
         for seed in itertools.count(1):
@@ -99,8 +97,26 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
                 break
             if seed == 3 * seeds:
                 raise BuildFailed(f"place and route ended for {len(fmax)} of {seed} seeds")
-    luts, flip_flops, block_rams = (sum(map(int, re.findall(pattern, packed))) for pattern in device.counts)
     return Size(luts, flip_flops, block_rams, statistics.median(fmax))
+
+
+def luts(component: Callable[[], wiring.Component], device: Device) -> int:
+    """LUT4 as :func:`measure` gives them, in seconds: synthesised and packed, but neither placed nor routed."""
+    return _packed(component(), device)[0]
+
+
+def _packed(design: Elaboratable, device: Device) -> list[int]:
+    """LUT4, flip-flops and block RAMs."""
+    with _folder() as folder:
+        _synthesise(design, device, folder)
+        log = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
+    return [sum(map(int, re.findall(pattern, log))) for pattern in device.counts]
+
+
+@contextlib.contextmanager
+def _folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as name:  # these tools do not see /tmp
+        yield Path(name)
 
 
 def _fmax(folder: Path, device: Device, seed: int) -> float:

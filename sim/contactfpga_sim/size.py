@@ -9,7 +9,7 @@ from pathlib import Path
 
 from amaranth.lib import wiring
 
-from contactfpga_hdl import packed, sizes, synthesis
+from contactfpga_hdl import sizes, synthesis
 from contactfpga_hdl.sizes import Device, Size
 from contactfpga_sim import kept, native
 
@@ -21,8 +21,8 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """What :func:`contactfpga_hdl.packed.luts` says, or said."""
-    found: int = kept.kept("luts", _how(component(), device), lambda: packed.luts(component, device))
+    """What :func:`contactfpga_hdl.sizes.luts` says, or said."""
+    found: int = kept.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
     return found
 
 
