@@ -7,6 +7,10 @@ class ContactFPGAError(Exception):
     """Base of every error of this package."""
 
 
+class SkinError(ContactFPGAError, ValueError):
+    """A Skin that cannot work; the message names the field, its value and the limit."""
+
+
 class PortNotFound(ContactFPGAError):
     """No port, or no single one, could be chosen or opened."""
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
-from contactfpga.skin import BARYCENTER_BITS, MAX_BARYCENTER_BITS, Skin
+from contactfpga.limits import BARYCENTER_BITS, MAX_BARYCENTER_BITS
+from contactfpga.skin import Skin
 
 VERSION = 1
 DELIMITER = 0

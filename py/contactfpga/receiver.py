@@ -9,8 +9,9 @@ from collections import Counter
 from contactfpga import protocol
 from contactfpga.derived import SEQUENCE_BITS, TIME_BITS, Derived
 from contactfpga.errors import SkinMismatch, VersionMismatch
+from contactfpga.limits import MAX_LINES
 from contactfpga.protocol import Frame, Hello, PacketError
-from contactfpga.skin import MAX_LINES, Skin, SkinError
+from contactfpga.skin import Skin, SkinError
 from contactfpga.zone import Zones
 
 WRAP_US = 1 << TIME_BITS

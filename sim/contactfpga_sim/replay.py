@@ -17,8 +17,9 @@ import numpy as np
 from contactfpga import protocol
 from contactfpga.derived import Derived
 from contactfpga.errors import ContactFPGAError
+from contactfpga.limits import MAX_LINES
 from contactfpga.protocol import Frame
-from contactfpga.skin import MAX_LINES, Skin
+from contactfpga.skin import Skin
 from contactfpga_sim.board import Board
 
 if TYPE_CHECKING:
