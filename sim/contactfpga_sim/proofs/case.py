@@ -32,7 +32,7 @@ class Case:
         solve = search if self.bounded else prove
         return solve(self.build, self.clocks, limit_s)
 
-    def run_with(self, bug: Bug, limit_s: float = 600) -> Verdict:
+    def run_with(self, bug: Bug, limit_s: float = 3600) -> Verdict:
         """Look for a counterexample to the claims, without the lemmas, in the gateware with the bug."""
         with planted(bug):
             return search(self.build, self.bug_clocks, limit_s)
