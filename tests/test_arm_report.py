@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from contactfpga import cli
+from contactfpga_sim import figures
 from contactfpga_sim.arm import command, comply, report, study
 from contactfpga_sim.arm.case import Case, CaseError, names
 from contactfpga_sim.arm.run import run
@@ -170,11 +171,11 @@ PAGE = (Path(__file__).parents[1] / "docs/arm.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert study.update(PAGE, {"set": lambda: study.set_table(found)}) == PAGE
+    assert figures.update(PAGE, {"set": lambda: study.set_table(found)}) == PAGE
 
 
 def test_the_page_has_a_section_for_every_table():
     assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == ["set", "sheet", "speeds", "pushes", "failures", "steps"]
-    assert study.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
+    assert figures.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
         "<!-- figures: steps -->\nnew\n<!-- end -->"
     )

@@ -11,9 +11,3 @@ def to_words(cells: np.ndarray) -> np.ndarray:
     whole = np.zeros((*packed.shape[:-1], 8), np.uint8)
     whole[..., : packed.shape[-1]] = packed
     return whole.view("<u8")[..., 0].astype(np.uint64)
-
-
-def from_words(words: np.ndarray, columns: int) -> np.ndarray:
-    """(...) uint64 to (..., columns) bool."""
-    packed = np.asarray(words, "<u8")[..., None].view(np.uint8)
-    return np.unpackbits(packed, axis=-1, count=columns, bitorder="little").astype(bool)

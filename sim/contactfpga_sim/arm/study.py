@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactfpga_sim import figures
 from contactfpga_sim.arm import charts, comply, draw, report, sweep
 from contactfpga_sim.arm.case import Case
 from contactfpga_sim.arm.command import SHARES
@@ -126,15 +126,6 @@ def speed_table(tasks: charts.Plan, found: Mapping[Task, Point]) -> str:
     return report.markdown(lines)
 
 
-def update(text: str, tables: Mapping[str, Callable[[], str]]) -> str:
-    """The page with each `<!-- figures: NAME -->` section that is in ``tables`` written anew."""
-
-    def written(match: re.Match[str]) -> str:
-        return f"{match[1]}\n{tables[match[2]]()}\n{match[3]}" if match[2] in tables else match[0]
-
-    return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", written, text, flags=re.DOTALL)
-
-
 def main() -> int:
     """Write the tables into the page and the pictures into the folder named on the command line."""
     parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on the arm anew.")
@@ -154,7 +145,7 @@ def main() -> int:
         "failures": failure_table,
         "steps": step_table,
     }
-    args.page.write_text(update(args.page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+    args.page.write_text(figures.update(args.page.read_text(encoding="utf-8"), tables), encoding="utf-8")
     print(f"wrote {args.page}")
     drawn = (*draw.pictures(found, args.folder, ("svg",)), *charts.draw(case, tasks, points, args.folder, ("svg",)))
     for path in drawn:

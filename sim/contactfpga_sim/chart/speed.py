@@ -16,9 +16,6 @@ from contactfpga_sim.chart import steady
 from contactfpga_sim.compare import compare
 from contactfpga_sim.golden import Timeline, Trace, predict
 
-WARM_US = 1500.0
-"""From power-up to the first scan with a touch: by then the hello is sent, and the link is at work."""
-
 STEADY = 12
 """So many scenes are also looked at while they stay as they are."""
 
@@ -48,7 +45,7 @@ class Speed:
 def touch_cycle(skin: Skin, share: float) -> int:
     """When a touch begins, after ``share`` of a scan."""
     scan = Derived(skin).frame_clocks
-    return int((math.ceil(WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
+    return int((math.ceil(steady.WARM_US * skin.clock_hz / 1e6 / scan) + share) * scan)
 
 
 def last_byte(skin: Skin, trace: Trace, cells: int) -> tuple[int, int] | None:

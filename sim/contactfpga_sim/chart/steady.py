@@ -16,8 +16,8 @@ from contactfpga_sim.golden import Timeline, Trace, beginnings, predict
 FRAMES = 12
 """Frames between which the rate is taken."""
 
-HELLO_US = 1500.0
-"""By then the first hello is sent."""
+WARM_US = 1500.0
+"""From power-up: by then the first hello is sent, and the link is at work."""
 
 
 class Frame(NamedTuple):
@@ -79,6 +79,6 @@ def _longest(skin: Skin, size: int) -> int:
 def _held(skin: Skin, cells: np.ndarray, clocks: int) -> list[Frame]:
     """Frames of a board on which ``cells`` are pressed from the start, once hello and debounce are over."""
     debounce_us = skin.debounce_press_us if skin.debounce != "none" else 0.0
-    settled = round(max(debounce_us, HELLO_US) * skin.clock_hz / 1e6)
+    settled = round(max(debounce_us, WARM_US) * skin.clock_hz / 1e6)
     trace = predict(skin, Timeline([(0, cells, None)]), settled + clocks)
     return [frame for frame in frames(skin, trace) if frame.first > settled]

@@ -6,6 +6,7 @@ serve to choose, those from it on to report.
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import functools
 import hashlib
@@ -38,7 +39,7 @@ Size = tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True)
-class Source:
+class Source(abc.ABC):
     """Scenes to choose a Skin with, and others to report."""
 
     def size_mm(self) -> Size | None:
@@ -49,22 +50,32 @@ class Source:
         """Scenes there are to choose with, ``count`` at most; and as many to report."""
         return count
 
+    @abc.abstractmethod
     def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
         """The scenes with these numbers, below twice ``count``, on a sheet; ``base``: the Skin asked for."""
+
+    @abc.abstractmethod
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+        """(R, C) bool of the same, without what there is to be found."""
+
+
+class Placed(Source):
+    """Contacts at places drawn at random."""
+
+    @abc.abstractmethod
+    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
+        """A scene, and the instant in s at which it is looked at."""
+
+    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
         return [look(*self.at(skin, base, number), skin) for number in numbers]
 
     def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
-        """(R, C) bool of the same, without what there is to be found."""
         drawn = (self.at(skin, base, number) for number in numbers)
         return [scene.pressed(seconds, skin) for scene, seconds in drawn]
 
-    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
-        """A scene, and the instant in s at which it is looked at."""
-        raise NotImplementedError
-
 
 @dataclasses.dataclass(frozen=True)
-class Family(Source):
+class Family(Placed):
     """One of :data:`contactfpga_sim.families.FAMILIES`."""
 
     family: str
@@ -75,7 +86,7 @@ class Family(Source):
 
 
 @dataclasses.dataclass(frozen=True)
-class BuiltIn(Source):
+class BuiltIn(Placed):
     """One of :data:`contactfpga_sim.scenes.CONTACTS`, made for the Skin asked for."""
 
     scene: str
@@ -107,7 +118,7 @@ def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
 
 
 @dataclasses.dataclass(frozen=True)
-class File(Source):
+class File(Placed):
     """What a scene file says."""
 
     says: SceneFile
