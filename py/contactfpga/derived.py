@@ -14,6 +14,10 @@ HELLO_PERIOD_US = 500_000
 
 TIME_BITS = 24
 SEQUENCE_BITS = 8
+HEARD_BITS = 3
+"""Of a request's number, in each frame."""
+EPOCH_BITS = 22
+"""The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
 """The stuck-line counter stops here."""
@@ -271,7 +275,7 @@ class Derived:
 
     @property
     def _counted_bits(self) -> int:
-        return TIME_BITS + SEQUENCE_BITS + STUCK_BITS + self.area_bits + self.zones_bits
+        return TIME_BITS + SEQUENCE_BITS + HEARD_BITS + self.area_bits + self.zones_bits
 
     @functools.cached_property
     def item_bytes(self) -> int:

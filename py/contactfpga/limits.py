@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 Mask = tuple[tuple[int, int], ...]
 
 MAX_LINES = 64
+MAX_NAME_BYTES = 32
 MAX_BAUD_ERROR = 0.015
 MAX_KEEP_ALIVE_MS = 100.0
 MAX_DEBOUNCE_SCANS = 4095
@@ -53,6 +54,7 @@ def check_types(skin: Skin) -> dict[str, float]:
             continue
         if not isinstance(value, int) or isinstance(value, bool):
             raise SkinError(f"{name} is {value!r}; it must be a whole number")
+    _check_name(skin.name)
     for field in dataclasses.fields(skin):
         if field.type not in ("float", "float | None"):
             continue
@@ -63,6 +65,15 @@ def check_types(skin: Skin) -> dict[str, float]:
             raise SkinError(f"{field.name} is {value!r}; it must be a finite number")
         kept[field.name] = float(value)
     return kept
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str):
+        raise SkinError(f"name is {name!r}; it must be a string")
+    if not name.isprintable() or name != name.strip():
+        raise SkinError(f"name is {name!r}; it must be printable, with no spaces around it")
+    if len(name.encode()) > MAX_NAME_BYTES:
+        raise SkinError(f"name is {name!r}, {len(name.encode())} bytes of UTF-8; at most {MAX_NAME_BYTES} are possible")
 
 
 def check_sheet(skin: Skin) -> Mask:

@@ -5,37 +5,103 @@ from __future__ import annotations
 import binascii
 import dataclasses
 import struct
+import zlib
 from typing import Any
 
 import numpy as np
 
-from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
-from contactfpga.limits import BARYCENTER_BITS, MAX_BARYCENTER_BITS
+from contactfpga.derived import CHECK_BYTES, HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 
-VERSION = 1
+VERSION = 2
 DELIMITER = 0
 
-KIND_HELLO = 0
-KIND_ZONES = 1
-KIND_CELLS = 2
-KIND_BARYCENTERS = 3
-
-KINDS = {"moments": KIND_ZONES, "cells": KIND_CELLS, "barycenter": KIND_BARYCENTERS}
-"""Of a frame, by the Skin's ``report``."""
-
-FLAGS = ("overflow", "mismatch", "requested")
+FLAGS = ("overflow", "mismatch", "fault")
 """Names of a frame's flags, lowest bit first."""
 
-FLAG_BITS = len(FLAGS)
-KIND_BITS = 2
+FLAG_BITS = 4
+KIND_BITS = 4
 
-_HELLO = struct.Struct("<BBBHfff8s")
-_OPTIONS = {"connectivity": (8, 4), "report": ("moments", "cells"), "send": ("always", "on_change")}
-_FRACTION = len(_OPTIONS)
-"""Four of the options' bits from here on: 0, or with ``report = "barycenter"`` one more than its fraction bits."""
-_GHOSTS = _FRACTION + 4
-"""The bit that is set without diodes."""
+KIND_HELLO = 4
+KINDS = {"moments": 5, "cells": 6, "barycenter": 7}
+"""Kind of a frame, by the Skin's ``report``."""
+
+KIND_REQUEST = 5
+"""To the board."""
+REQUEST_HELLO = 1
+"""Flag of a request that asks for a hello as well."""
+
+# ---- fields of a hello
+
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
+
+_SHEET = struct.Struct("<BBBBBBHBx")
+_PITCH = struct.Struct("<dd")
+_RADIUS = struct.Struct("<d")
+_RATES = struct.Struct("<II")
+_CHECK = struct.Struct("<I")
+_REPORTS = ("moments", "cells", "barycenter")
+_SENDS = ("always", "on_change")
+
+DIGIT_BITS = 7
+SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
+STATE_DIGITS = 16
+"""Of which the last is not used yet."""
+
+STATE_OFFSET = 16
+"""Of the first digit in a hello as :func:`encode_hello` writes it, from the leading delimiter on."""
+
+
+def digits(value: int, count: int) -> bytes:
+    """A number in ``count`` digits of seven bits, lowest first, none of them a zero byte."""
+    assert 0 <= value < 1 << DIGIT_BITS * count, f"{value} does not fit {count} digits"
+    return bytes(0x80 | value >> DIGIT_BITS * place & 0x7F for place in range(count))
+
+
+def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0) -> bytes:
+    """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end."""
+    assert skin.zone_capacity is not None
+    fraction_bits = skin.barycenter_bits if skin.report == "barycenter" else 0
+    sheet = _SHEET.pack(
+        skin.rows,
+        skin.columns,
+        skin.connectivity,
+        _REPORTS.index(skin.report),
+        fraction_bits,
+        _SENDS.index(skin.send),
+        skin.zone_capacity,
+        skin.ghosts,
+    )
+    facts = [(SHEET, sheet), (PITCH, _PITCH.pack(skin.pitch_x_mm, skin.pitch_y_mm))]
+    if skin.radius_mm is not None:
+        facts.append((RADIUS, _RADIUS.pack(skin.radius_mm)))
+    facts += [(FINGERPRINT, skin.fingerprint), (RATES, _RATES.pack(skin.clock_hz, skin.baud))]
+    if skin.name:
+        facts.append((NAME, skin.name.encode()))
+    fixed = [bytes([kind, len(value)]) + value for kind, value in facts]
+    counters = ((sent, SENT_DIGITS), (epoch, EPOCH_DIGITS), (heard, HEARD_DIGITS), (stuck, STUCK_DIGITS), (0, 1))
+    state = bytes([STATE, STATE_DIGITS]) + b"".join(digits(value, count) for value, count in counters)
+    check = bytes([CHECK, _CHECK.size]) + _CHECK.pack(zlib.crc32(b"".join(fixed)))
+    plain = fixed[0] + state + b"".join(fixed[1:]) + check + bytes([last_byte(KIND_HELLO)])
+    return bytes([DELIMITER]) + seal(plain)
+
+
+def encode_request(number: int, hello: bool = False) -> bytes:
+    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end."""
+    assert may_number(number), f"{number} is no number of a request"
+    plain = digits(number, HEARD_DIGITS) + bytes([last_byte(KIND_REQUEST, REQUEST_HELLO * hello)])
+    return bytes([DELIMITER]) + seal(plain)
+
+
+def may_number(number: int) -> bool:
+    """Whether a request may have this number: no digit of it is 0, nor are the bits that frames repeat."""
+    each = (number >> DIGIT_BITS * place & 0x7F for place in range(HEARD_DIGITS))
+    return 0 <= number < 1 << DIGIT_BITS * HEARD_DIGITS and all(each) and number % (1 << HEARD_BITS) != 0
+
+
+def last_byte(kind: int, flags: int = 0) -> int:
+    """Last plain byte of every packet: flags in the lower four bits, kind in the upper four."""
+    return kind << FLAG_BITS | flags
 
 
 class PacketError(ValueError):
@@ -51,58 +117,13 @@ class PacketError(ValueError):
         self.version = version
 
 
-def kind_byte(kind: int, flags: int = 0) -> int:
-    """Last plain byte of every packet: flags in the lower three bits, kind in two, version in the upper three."""
-    return VERSION << FLAG_BITS + KIND_BITS | kind << FLAG_BITS | flags
-
-
 def kind_of(plain: bytes) -> int:
     """Kind of an unsealed packet."""
-    return plain[-1] >> FLAG_BITS & (1 << KIND_BITS) - 1
+    return plain[-1] >> FLAG_BITS
 
 
-@dataclasses.dataclass(frozen=True)
 class Hello:
-    """What the board says of itself: all that decoding its frames needs."""
-
-    rows: int
-    columns: int
-    connectivity: int
-    report: str
-    barycenter_bits: int
-    send: str
-    zone_capacity: int
-    pitch_x_mm: float
-    pitch_y_mm: float
-    radius_mm: float | None
-    fingerprint: bytes
-    ghosts: bool = False
-    """The sheet has no diodes."""
-
-    @classmethod
-    def of(cls, skin: Skin) -> Hello:
-        assert skin.zone_capacity is not None
-        shared = {field.name for field in dataclasses.fields(cls)}
-        return cls(**{name: getattr(skin, name) for name in shared})
-
-    def skin(self) -> Skin:
-        """A Skin with this hello's facts: it decodes the board's frames; its clock and scan times are unknown."""
-        slow: dict[str, Any] = {
-            "clock_hz": 400_000_000,
-            "settle_us": 10_000.0,
-        }  # what the host does not know must not refuse
-        return Skin(
-            **{name: getattr(self, name) for name in _FACTS},
-            surface="plane" if self.radius_mm is None else "cylinder",
-            diodes="none" if self.ghosts else "col2row",
-            **slow,
-        )
-
-
-_FACTS = (
-    *("rows", "columns", "connectivity", "report", "barycenter_bits", "zone_capacity"),
-    *("pitch_x_mm", "pitch_y_mm", "radius_mm"),
-)
+    """What the board says of itself."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,20 +182,25 @@ def cobs_decode(data: bytes) -> bytes:
 _MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
-def check_bytes(stuffed: bytes) -> bytes:
-    """CRC-16/MCRF4XX of the stuffed bytes, lowest bits first, in three bytes that are never zero.
+def check_bytes(stuffed: bytes, before: bytes = b"") -> bytes:
+    """CRC-16/MCRF4XX of ``before`` and the stuffed bytes, lowest bits first, in three bytes that are never zero.
 
     That CRC takes bits in the order of the line; the standard library has its mirror image.
     """
-    mirrored = binascii.crc_hqx(stuffed.translate(_MIRRORED), 0xFFFF)
+    mirrored = binascii.crc_hqx((before + stuffed).translate(_MIRRORED), 0xFFFF)
     crc = _MIRRORED[mirrored >> 8] | _MIRRORED[mirrored & 0xFF] << 8
     return bytes([0x80 | crc & 0x7F, 0x80 | crc >> 7 & 0x7F, 0x80 | crc >> 14])
 
 
-def seal(plain: bytes) -> bytes:
-    """A packet's bytes on the wire: stuffed, check bytes, delimiter."""
+def check_prefix(skin: Skin) -> bytes:
+    """What the check of frames covers besides their bytes: the start of the board's fingerprint."""
+    return skin.fingerprint[:2]
+
+
+def seal(plain: bytes, before: bytes = b"") -> bytes:
+    """A packet's bytes on the wire: stuffed, check bytes, delimiter. ``before`` as for :func:`check_bytes`."""
     stuffed = cobs_encode(plain)
-    return stuffed + check_bytes(stuffed) + bytes([DELIMITER])
+    return stuffed + check_bytes(stuffed, before) + bytes([DELIMITER])
 
 
 def unseal(packet: bytes) -> bytes:
@@ -190,52 +216,6 @@ def unseal(packet: bytes) -> bytes:
         message = f"packet of protocol version {version}; this host speaks {VERSION}"
         raise PacketError("version", message, kind_of(plain) if plain else 0, version)
     return plain
-
-
-def encode_hello(skin: Skin) -> bytes:
-    """The hello of a board built from ``skin``, as on the wire: at most 32 bytes."""
-    facts = Hello.of(skin)
-    chosen = {name: getattr(facts, name) for name in _OPTIONS}
-    options = facts.ghosts << _GHOSTS
-    if facts.report == "barycenter":
-        chosen["report"] = "moments"
-        options |= facts.barycenter_bits + 1 << _FRACTION
-    options |= sum(choices.index(chosen[name]) << bit for bit, (name, choices) in enumerate(_OPTIONS.items()))
-    plain = _HELLO.pack(
-        facts.rows,
-        facts.columns,
-        options,
-        facts.zone_capacity,
-        facts.pitch_x_mm,
-        facts.pitch_y_mm,
-        facts.radius_mm or 0.0,
-        facts.fingerprint,
-    )
-    return seal(plain + bytes([kind_byte(KIND_HELLO)]))
-
-
-def decode_hello(plain: bytes) -> Hello:
-    """Read an unsealed hello."""
-    if kind_of(plain) != KIND_HELLO or len(plain) != _HELLO.size + 1:
-        raise PacketError("length", f"hello of {len(plain)} bytes; it has {1 + _HELLO.size}")
-    rows, columns, options, capacity, pitch_x, pitch_y, radius, fingerprint = _HELLO.unpack(plain[:-1])
-    chosen: dict[str, Any] = {name: choices[options >> bit & 1] for bit, (name, choices) in enumerate(_OPTIONS.items())}
-    chosen["barycenter_bits"] = BARYCENTER_BITS
-    if fraction := options >> _FRACTION & (1 << _GHOSTS - _FRACTION) - 1:
-        if fraction > MAX_BARYCENTER_BITS + 1 or chosen["report"] != "moments":
-            raise PacketError("content", f"hello with options {options:#x}, which this version does not know")
-        chosen |= {"report": "barycenter", "barycenter_bits": fraction - 1}
-    return Hello(
-        rows=rows,
-        columns=columns,
-        zone_capacity=capacity,
-        pitch_x_mm=_shortest(pitch_x),
-        pitch_y_mm=_shortest(pitch_y),
-        radius_mm=_shortest(radius) or None,
-        fingerprint=fingerprint,
-        ghosts=bool(options >> _GHOSTS),
-        **chosen,
-    )
 
 
 def decode_frame(plain: bytes, derived: Derived) -> Frame:

@@ -23,6 +23,10 @@ class Skin:
     the rows, and cell (row 0, column 0) lies at 0 mm. A Skin that cannot work raises :class:`SkinError`.
     """
 
+    name: str = ""
+    """What the board calls itself: at most 32 bytes of UTF-8. It tells boards of one Skin apart and is in the bitstream,
+    but not in the fingerprint."""
+
     rows: int = 16
     """Driven lines, 1 to 64."""
     columns: int = 16
@@ -148,12 +152,17 @@ class Skin:
 
     @property
     def fingerprint(self) -> bytes:
-        """Eight bytes that differ between any two Skins that are not the same."""
+        """Eight bytes that differ between any two Skins that differ in more than their names.
+
+        They are made of the fields that differ from their defaults, so that a new field with a default changes no
+        fingerprint (docs/protocol.md).
+        """
+        defaults = {field.name: field.default for field in dataclasses.fields(self)}
+        defaults["zone_capacity"] = self._default_capacity()
         fields = dataclasses.asdict(self)
-        if self.report != "barycenter":
-            del fields["barycenter_bits"]  # says nothing there, and boards built before it was a field have none
-        canonical = json.dumps(fields, sort_keys=True)
-        return hashlib.sha256(canonical.encode()).digest()[:8]
+        del fields["name"]
+        changed = {name: value for name, value in fields.items() if value != defaults[name]}
+        return hashlib.sha256(json.dumps(changed, sort_keys=True).encode()).digest()[:8]
 
     @property
     def selects_low(self) -> bool:
