@@ -4,10 +4,11 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import TIME_BITS, Derived
+from contactfpga.derived import HEARD_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
 from contactfpga_hdl.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
+from contactfpga_hdl.scan import watch_epoch
 from contactfpga_hdl.seek import Seek
 from contactfpga_hdl.shift import RowChain
 from contactfpga_hdl.stuck import Stuck, anywhere, present
@@ -36,6 +37,8 @@ class AdaptiveScanner(wiring.Component):
                 "rows": Out(stream.Signature(row_layout(self.derived))),
                 "tag": Out(tag_layout(self.derived)),
                 "request": In(1),
+                "heard": In(HEARD_BITS),
+                "epoch": Out(1),
                 "contact": Out(1),
                 "alone": Out(1),
                 "sampled": Out(self.derived.slot_bits),
@@ -180,21 +183,23 @@ class AdaptiveScanner(wiring.Component):
         per_us, seek = self.derived.clocks_per_us, self._seek
         prescaler = Signal(range(max(2, per_us)))
         time, begun = Signal(TIME_BITS), Signal(TIME_BITS)
-        waiting, requested = Signal(), Signal()
+        waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         slots = Signal.like(self.tag.slots)
         m.d.sync += prescaler.eq(prescaler + 1)
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
+        watch_epoch(m, time, self.epoch)
         with m.If(seek.strobe):
             m.d.sync += slots.eq(slots + 1)
         with m.If(seek.strobe & seek.first):
-            m.d.sync += [begun.eq(time), requested.eq(waiting), waiting.eq(self.request)]
+            m.d.sync += [begun.eq(time), requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
         with m.If(seek.ends):
             m.d.sync += [
                 self.tag.time.eq(begun),
                 self.tag.requested.eq(requested),
+                self.tag.heard.eq(heard),
                 self.tag.slots.eq(slots),
                 slots.eq(0),
             ]

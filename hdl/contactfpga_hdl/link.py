@@ -6,10 +6,13 @@ from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import protocol
-from contactfpga.derived import CHECK_BYTES, SEQUENCE_BITS, Derived
+from contactfpga.derived import CHECK_BYTES, Derived
 from contactfpga.skin import Skin
+from contactfpga_hdl.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.pack import Packer
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
+
+STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
 class Link(wiring.Component):
@@ -20,12 +23,15 @@ class Link(wiring.Component):
     change places between the three frames; a fourth holds the hello. A new frame drops the one that waits, counted, in
     the clock its end mark is packed, and waits in its place when it is complete. Nothing in here can hold up
     the stages before.
+
+    The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
+    ``asked`` is high for a clock when a hello is wanted, ``epoch`` when another 2^22 us are over.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
+        self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]  # from its leading delimiter on
         self._offset_bits = max(self.derived.max_stored_bytes, len(self._hello)).bit_length()
         self.packer = Packer(skin, self._offset_bits)
         super().__init__(
@@ -33,7 +39,9 @@ class Link(wiring.Component):
                 "items": In(stream.Signature(item_layout(self.derived))),
                 "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
-                "received": In(1),
+                "asked": In(1),
+                "epoch": In(1),
+                "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
                 "bytes": Out(stream.Signature(8)),
             }
         )
@@ -52,6 +60,7 @@ class Link(wiring.Component):
         self._decide(m)
         self._time_hello(m)
         self._send(m)
+        self._say_state(m)
         return m
 
     def _queue(self, m):
@@ -88,19 +97,13 @@ class Link(wiring.Component):
     def _decide(self, m):
         """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known."""
         verdict = self.packer.verdict
-        sent = Signal(SEQUENCE_BITS)
+        self._sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
         overwritten = Signal(self.derived.overwritten_bits)
-        requested = Signal()
         drops = self._waits & ~self._take_frame
-        m.d.comb += [
-            verdict.sequence.eq(sent),
-            verdict.overwritten.eq(overwritten),
-            verdict.requested.eq(requested),
-            verdict.send.eq(1),
-        ]
-        m.d.sync += sent.eq(sent + self._take_frame)
+        m.d.comb += [verdict.sequence.eq(self._sent), verdict.overwritten.eq(overwritten), verdict.send.eq(1)]
+        m.d.sync += self._sent.eq(self._sent + self._take_frame)
         with m.If(self.packer.decide & verdict.send):
-            m.d.sync += [overwritten.eq(overwritten + drops), requested.eq(self.tag.requested | drops & requested)]
+            m.d.sync += overwritten.eq(overwritten + drops)
         if self.skin.send == "on_change":
             keep_alive = self.derived.keep_alive_frames
             idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
@@ -121,7 +124,7 @@ class Link(wiring.Component):
             m.d.sync += since.eq(waited)
             with m.If(due):
                 m.d.sync += [since.eq(0), self._hello_due.eq(1)]
-        with m.If(self.received):
+        with m.If(self.asked):
             m.d.sync += self._hello_due.eq(1)
 
     def _wait(self, waited, limit):
@@ -138,40 +141,54 @@ class Link(wiring.Component):
             shape=8, depth=hello + len(self._hello), init=[0] * hello + list(self._hello)
         )
         read, write = store.read_port(), store.write_port()
-        offset = Signal(self._offset_bits)
+        self._offset = Signal(self._offset_bits)
+        self._sends_hello = Signal()
         end = Signal(self._offset_bits)
-        sends_hello = Signal()
+        seeds = Signal()  # one clock after a frame was taken
+        self._idle, self._fetches = Signal(), Signal()
+        self._digit = Signal(protocol.DIGIT_BITS)
+        in_state = self._sends_hello & (self._offset >> STATE_PLACE_BITS == protocol.STATE_OFFSET >> STATE_PLACE_BITS)
+        byte = Mux(in_state, Cat(self._digit, Const(1, 1)), read.data)
         m.d.comb += [
             write.en.eq(self.packer.write.en),
             write.addr.eq(Cat(self.packer.write.offset, self._filling)),
             write.data.eq(self.packer.write.data),
-            read.addr.eq(Cat(offset, Mux(sends_hello, 3, self._sending))),
+            read.addr.eq(Cat(self._offset, Mux(self._sends_hello, 3, self._sending))),
         ]
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
+        first, second = protocol.check_prefix(self.skin)
         tail = Signal(range(CHECK_BYTES + 1))
-        m.d.comb += [check.data.eq(read.data), check.start.eq(self._take_hello | self._take_frame)]
+        m.d.sync += seeds.eq(self._take_frame)
+        m.d.comb += [check.data.eq(byte), check.start.eq(self._take_hello | self._take_frame)]
+        with m.If(self._take_frame):
+            m.d.comb += [check.data.eq(first), check.valid.eq(1)]
+        with m.Elif(seeds):
+            m.d.comb += [check.data.eq(second), check.valid.eq(1)]
         with m.FSM(name="wire"):
             with m.State("IDLE"):
-                m.d.comb += [self._take_hello.eq(self._hello_due), self._take_frame.eq(self._waits & ~self._hello_due)]
+                m.d.comb += [
+                    self._idle.eq(1),
+                    self._take_hello.eq(self._hello_due),
+                    self._take_frame.eq(self._waits & ~self._hello_due),
+                ]
                 m.d.sync += [
-                    sends_hello.eq(self._hello_due),
+                    self._sends_hello.eq(self._hello_due),
                     end.eq(Mux(self._hello_due, len(self._hello), self._waiting_end)),
-                    offset.eq(0),
+                    self._offset.eq(0),
                 ]
                 with m.If(self._hello_due | self._waits):
                     m.next = "FETCH"
             with m.State("FETCH"):
+                m.d.comb += self._fetches.eq(1)
                 m.next = "BYTE"
-                with m.If(offset == end):
+                with m.If(self._offset == end):
                     m.next = "TAIL"
             with m.State("BYTE"):
-                m.d.comb += [
-                    self.bytes.valid.eq(1),
-                    self.bytes.payload.eq(read.data),
-                    check.valid.eq(self.bytes.ready),
-                ]
+                leads = self._sends_hello & (self._offset == 0)  # the delimiter in front
+                m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(byte)]
                 with m.If(self.bytes.ready):
-                    m.d.sync += [offset.eq(offset + 1), tail.eq(0)]
+                    m.d.comb += check.valid.eq(~leads)
+                    m.d.sync += [self._offset.eq(self._offset + 1), tail.eq(0)]
                     m.next = "FETCH"
             with m.State("TAIL"):
                 # The CRC in pieces of seven bits, so that none of its bytes is zero.
@@ -182,3 +199,28 @@ class Link(wiring.Component):
                     m.d.sync += tail.eq(tail + 1)
                     with m.If(tail == CHECK_BYTES):
                         m.next = "IDLE"
+
+    def _say_state(self, m):
+        """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
+        m.submodules.odometer = odometer = Odometer()
+        place = self._offset[:STATE_PLACE_BITS]
+        high = self._sent[-1]
+        before = Signal()
+        m.d.sync += before.eq(high)
+        m.d.comb += [
+            odometer.sent.eq(before & ~high),
+            odometer.epoch.eq(self.epoch),
+            odometer.hold.eq(self._sends_hello & ~self._idle),
+            odometer.place.eq(place),
+        ]
+        live, digit = Signal(protocol.DIGIT_BITS), Signal(protocol.DIGIT_BITS)
+        number = [self.number.word_select(index, protocol.DIGIT_BITS) for index in range(protocol.HEARD_DIGITS)]
+        sent = [self._sent.word_select(index, protocol.DIGIT_BITS) for index in range(LIVE_DIGITS)]
+        first_of_number = protocol.SENT_DIGITS + protocol.EPOCH_DIGITS
+        with m.Switch(place):
+            for index, value in (*enumerate(sent), *enumerate([*number, self.tag.stuck], first_of_number)):
+                with m.Case(index):
+                    m.d.comb += digit.eq(value)
+        with m.If(self._fetches):
+            m.d.sync += live.eq(digit)
+        m.d.comb += self._digit.eq(live | odometer.digit)  # of which one is 0

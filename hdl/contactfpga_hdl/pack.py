@@ -5,7 +5,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import protocol
-from contactfpga.derived import SEQUENCE_BITS, STUCK_BITS, TIME_BITS, Derived
+from contactfpga.derived import HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
@@ -15,9 +15,7 @@ FULL_BLOCK = 255
 
 def verdict_layout(derived: Derived) -> data.StructLayout:
     """What the link decides about a frame whose end mark is packed: ``send`` at once, the rest one clock later."""
-    return data.StructLayout(
-        {"send": 1, "sequence": SEQUENCE_BITS, "overwritten": derived.overwritten_bits, "requested": 1}
-    )
+    return data.StructLayout({"send": 1, "sequence": SEQUENCE_BITS, "overwritten": derived.overwritten_bits})
 
 
 def _trailer_layout(derived: Derived) -> data.StructLayout:
@@ -25,15 +23,14 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
         {
             "time": TIME_BITS,
             "sequence": SEQUENCE_BITS,
-            "stuck": STUCK_BITS,
+            "heard": HEARD_BITS,
             "cells": derived.area_bits,
             "zones": derived.zones_bits,
             "overwritten": derived.overwritten_bits,
             "overflow": 1,
             "mismatch": 1,
-            "requested": 1,
+            "fault": protocol.FLAG_BITS - 2,
             "kind": protocol.KIND_BITS,
-            "version": 8 - protocol.FLAG_BITS - protocol.KIND_BITS,
         }
     )
 
@@ -120,12 +117,11 @@ class Packer(wiring.Component):
             trailer.overwritten.eq(self.verdict.overwritten),
             trailer.overflow.eq(self.summary.overflow),
             trailer.mismatch.eq(self.summary.mismatch),
-            trailer.requested.eq(self.verdict.requested),
-            trailer.stuck.eq(self.tag.stuck),
+            trailer.fault.eq(self.tag.stuck.any()),
+            trailer.heard.eq(self.tag.heard),
             trailer.cells.eq(self.summary.cells),
             trailer.zones.eq(self.summary.zones),
             trailer.kind.eq(protocol.KINDS[self.skin.report]),
-            trailer.version.eq(protocol.VERSION),
         ]
         return trailer.as_value()
 

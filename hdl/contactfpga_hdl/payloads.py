@@ -2,7 +2,7 @@
 
 from amaranth.lib import data
 
-from contactfpga.derived import STUCK_BITS, TIME_BITS, Derived
+from contactfpga.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
@@ -37,9 +37,13 @@ def item_layout(derived: Derived) -> data.StructLayout:
 
 
 def tag_layout(derived: Derived) -> data.StructLayout:
-    """What the scanner knows of a frame besides its cells; ``slots``, where they differ, counts its row times."""
+    """What the scanner knows of a frame besides its cells; ``slots``, where they differ, counts its row times.
+
+    ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
+    the frame before.
+    """
     slots = {"slots": derived.max_frame_slots.bit_length()} if derived.skin.scan == "adaptive" else {}
-    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "requested": 1, **slots})
+    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:

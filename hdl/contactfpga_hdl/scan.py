@@ -4,7 +4,7 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import TIME_BITS, Derived
+from contactfpga.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import row_layout, tag_layout
 from contactfpga_hdl.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
@@ -19,8 +19,9 @@ class Scanner(wiring.Component):
     stages and the row register), and later by what its columns take on shift registers. ``contact`` rises with the
     offer of the first row that holds a pressed switch and falls with the last row of a scan without one. ``tag``
     belongs to the frame whose last row was offered; it is complete one clock after that and holds until the next
-    frame's last row. A ``request`` is answered by ``requested`` in the tag of the next frame to start. ``pins`` are
-    those of the row driver and of the column reader.
+    frame's last row. A ``request`` is answered by ``requested`` in the tag of the next frame to start, which takes
+    ``heard`` over. ``epoch`` is high for a clock when a further 2^22 us are over. ``pins`` are those of the row driver
+    and of the column reader.
     """
 
     def __init__(self, skin: Skin):
@@ -32,6 +33,8 @@ class Scanner(wiring.Component):
                 "rows": Out(stream.Signature(row_layout(self.derived))),
                 "tag": Out(tag_layout(self.derived)),
                 "request": In(1),
+                "heard": In(HEARD_BITS),
+                "epoch": Out(1),
                 "contact": Out(1),
             }
         )
@@ -155,13 +158,24 @@ class Scanner(wiring.Component):
             m.d.sync += prescaler.eq(prescaler + 1)
             with m.If(prescaler == per_us - 1):
                 m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
-        waiting, requested = Signal(), Signal()
+        watch_epoch(m, time, self.epoch)
+        waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         # What comes while columns are shifted in came after their sample: it asks for the next frame.
         begins = (self._begins_row if late else self._sampled) & self._first
-        asked = requested if late else Mux(begins, waiting, requested)
+        asked, heard_now = requested, heard
+        if not late:
+            asked, heard_now = Mux(begins, waiting, requested), Mux(begins, self.heard, heard)
         with m.If(begins):
-            m.d.sync += [requested.eq(waiting), waiting.eq(self.request)]
+            m.d.sync += [requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
         with m.If(self._sampled & self._last):
-            m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked)]
+            m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked), self.tag.heard.eq(heard_now)]
+
+
+def watch_epoch(m: Module, time: Signal, epoch: Signal) -> None:
+    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us."""
+    highest = time[EPOCH_BITS - 1]
+    before = Signal(name="before_epoch")
+    m.d.sync += before.eq(highest)
+    m.d.comb += epoch.eq(before & ~highest)

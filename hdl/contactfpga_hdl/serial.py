@@ -37,19 +37,21 @@ class Transmitter(wiring.Component):
         return m
 
 
-class Receiver(wiring.Component):
-    """Line level in; ``received`` is high for one clock in the middle of a good stop bit.
+LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "good": Out(1), "bad": Out(1)})
+"""What a receiver tells: ``bit`` is high in the middle of each data bit, whose level is then ``level``; in the middle of
+the stop bit ``good`` or ``bad`` is high for one clock, as it is high or low."""
 
-    The board takes any byte as the same request, so the bits between are not kept.
-    """
+
+class Receiver(wiring.Component):
+    """Line level in, bits out."""
 
     def __init__(self, bit_clocks: int):
         self.bit_clocks = bit_clocks
-        super().__init__({"pin": In(1, init=1), "received": Out(1)})
+        super().__init__({"pin": In(1, init=1), "bits": Out(LINE_BITS)})
 
     def elaborate(self, platform):
         m = Module()
-        level = Signal(init=1)
+        level = self.bits.level
         m.submodules.sync_pin = FFSynchronizer(self.pin, level, init=1)
         half = self.bit_clocks // 2
         clock = Signal(range(self.bit_clocks))
@@ -61,7 +63,12 @@ class Receiver(wiring.Component):
             m.d.sync += clock.eq(clock - 1)
         with m.Else():
             m.d.sync += [bits_left.eq(bits_left - 1), clock.eq(self.bit_clocks - 1)]
-            with m.If((bits_left == 10) & level):
+            starts, stops = bits_left == 10, bits_left == 1
+            with m.If(starts & level):
                 m.d.sync += bits_left.eq(0)  # no start bit, only noise
-            m.d.comb += self.received.eq((bits_left == 1) & level)
+            m.d.comb += [
+                self.bits.bit.eq(~starts & ~stops),
+                self.bits.good.eq(stops & level),
+                self.bits.bad.eq(stops & ~level),
+            ]
         return m

@@ -14,6 +14,7 @@ from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link import Link
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
+from contactfpga_hdl.request import RequestReader
 from contactfpga_hdl.scan import Scanner
 from contactfpga_hdl.serial import Receiver, Transmitter
 from contactfpga_hdl.timed_debounce import TimedDebounce
@@ -65,6 +66,8 @@ class Top(wiring.Component):
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
+        m.submodules.request = request = RequestReader()
+        wiring.connect(m, receiver.bits, request.bits)
         rows = self._debounced(m, scan)
         if self.skin.report == "cells":
             self._cells(m, rows, scan, link)
@@ -76,9 +79,12 @@ class Top(wiring.Component):
             self.contact.eq(scan.contact),
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
-            scan.request.eq(receiver.received),
+            scan.request.eq(request.received),
+            scan.heard.eq(request.heard),
             link.tag.eq(scan.tag),
-            link.received.eq(receiver.received),
+            link.epoch.eq(scan.epoch),
+            link.asked.eq(request.received & request.hello),
+            link.number.eq(request.number),
         ]
         if self.probes:
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)

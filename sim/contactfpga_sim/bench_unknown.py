@@ -161,10 +161,10 @@ endmodule
 def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
     """Assignments to the bench's inputs, by the cycle from which they hold."""
     moves: dict[int, str] = {}
-    requests = Stimulus(skin, Timeline([], timeline.requests))
+    line = Stimulus(skin, Timeline([], timeline.received))
     before = 1
     for cycle in range(cycles):
-        _, level = requests.pins(cycle, {"rows": 0})
+        _, level = line.pins(cycle, {"rows": 0})
         if level != before:
             moves[cycle] = f"rx = {level};"
         before = level

@@ -24,7 +24,7 @@ from contactfpga_hdl.boards import BOARDS, Board, find
 from contactfpga_sim import bench_native, native, netlist
 from contactfpga_sim.board import model_of
 from contactfpga_sim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, predict, requests
 from contactfpga_sim.replay import skin_for
 from contactfpga_sim.shapes import variants
 
@@ -78,7 +78,9 @@ def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> 
     derived = Derived(skin)
     scan = derived.frame_clocks
     cycles = len(frames) * scan + 2 * derived.max_frame_bytes * 10 * derived.bit_clocks
-    timeline = Timeline.frames(skin, frames, requests=range(scan // 2, cycles, 37 * scan + 5))
+    timeline = Timeline.frames(
+        skin, frames, received=requests(range(scan // 2, cycles, 37 * scan + 5), derived.bit_clocks)
+    )
     expected = predict(skin, timeline, cycles)
     got = bench_native.run(skin, _after(timeline, reset), cycles + reset, model)
     changes = compare(expected.at_the_pins(), got.at_the_pins().since(reset))
@@ -98,7 +100,7 @@ def reset_clocks(skin: Skin, model: native.Model) -> int:
 
 def _after(timeline: Timeline, cycles: int) -> Timeline:
     pieces = [(start + cycles, cells, stuck) for start, cells, stuck in timeline.pieces]
-    return Timeline(pieces, [start + cycles for start in timeline.requests])
+    return Timeline(pieces, [(start + cycles, data) for start, data in timeline.received])
 
 
 # ---- frames

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import random
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.request import request
 from contactfpga_sim.golden.trace import Timeline
 
 CHOICES: dict[str, tuple[Any, ...]] = {
@@ -145,7 +147,7 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 
 
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
-    """Random cells that come and go at any cycle, stuck columns and requests."""
+    """Random cells that come and go at any cycle, stuck columns, requests and other bytes."""
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)
     scan = facts(skin).scan_clocks
@@ -158,7 +160,35 @@ def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
         stuck = rng.random(skin.columns) < 0.3 if rng.random() < 0.25 else None
         pieces.append((start, cells, stuck))
         start += int(scan * rng.choice([0.3, 1.0, 1.0, 1.7, 3.0])) + 1
-    byte = 10 * facts(skin).bit_clocks
     gaps = rng.choice([0, 1, 7, scan, 5 * scan], size=6)
-    starts = np.cumsum(gaps + byte) + int(rng.integers(scan))
-    return Timeline(pieces, [int(cycle) for cycle in starts if cycle < cycles])
+    return Timeline(pieces, traffic(skin, gaps.tolist(), int(rng.integers(scan)), cycles, rng))
+
+
+def traffic(
+    skin: Skin, gaps: Iterable[int], start: int, cycles: int, rng: np.random.Generator
+) -> list[tuple[int, bytes]]:
+    """What a host sends from ``start`` on, with these gaps after each: requests, and what is none: with a bit changed, cut
+    off, of another kind, or any bytes."""
+    byte = 10 * facts(skin).bit_clocks
+    sent = []
+    for gap in gaps:
+        data = _packet(rng)
+        if start + len(data) * byte > cycles:
+            break
+        sent.append((start, data))
+        start += len(data) * byte + gap
+    return sent
+
+
+def _packet(rng: np.random.Generator) -> bytes:
+    data = bytearray(request(int(rng.integers(1, 1 << 21)), bool(rng.random() < 0.5)))
+    match rng.choice(["whole", "flip", "cut", "kind", "bytes"], p=[0.6, 0.15, 0.1, 0.05, 0.1]):
+        case "flip":
+            data[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
+        case "cut":
+            data = data[: int(rng.integers(1, len(data)))]
+        case "kind":
+            data[5] = 0x61
+        case "bytes":
+            data = bytearray(rng.choice([0, 5, 0x51, 0x81, 0xFF], size=int(rng.integers(1, 13))).astype(np.uint8))
+    return bytes(data)

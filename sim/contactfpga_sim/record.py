@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
@@ -44,9 +43,8 @@ class Stimulus:
         self.drives = (self._sheet.drives, "rx")
         self._pieces = list(reversed(timeline.pieces))
         self._bit_clocks = facts(skin).bit_clocks
-        self._requests = list(reversed(timeline.requests))
-        self._random = random.Random(0)
-        self._start, self._bits = 0, 0
+        self._received = list(reversed(timeline.received))
+        self._start, self._data = 0, b""
 
     def pins(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, int]:
         """Levels of ``drives``, given those of ``reads``."""
@@ -56,16 +54,12 @@ class Stimulus:
         return self._sheet.step(pins), self._rx(cycle)
 
     def _rx(self, cycle: int) -> int:
-        if self._requests and self._requests[-1] == cycle:
-            self._start = self._requests.pop()
-            self._bits = 1 << 9 | self._random.randrange(256) << 1  # stop, data, start; sent lowest first
-        elif not self._bits:
+        if self._received and self._received[-1][0] == cycle:
+            self._start, self._data = self._received.pop()
+        byte, place = divmod((cycle - self._start) // self._bit_clocks, 10)
+        if byte >= len(self._data):
             return 1
-        place = (cycle - self._start) // self._bit_clocks
-        if place > 9:
-            self._bits = 0
-            return 1
-        return self._bits >> place & 1
+        return (1 << 9 | self._data[byte] << 1) >> place & 1  # stop, data, start; sent lowest first
 
 
 class Recorder:

@@ -5,6 +5,7 @@ declared fields of a Skin.
 """
 
 from contactfpga_sim.golden.predict import beginnings, driven, predict
+from contactfpga_sim.golden.request import request, requests
 from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
 from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
 from contactfpga_sim.golden.zones import zones
@@ -20,6 +21,8 @@ __all__ = [
     "driven",
     "last_record_clocks",
     "predict",
+    "request",
+    "requests",
     "row_clocks",
     "zones",
 ]

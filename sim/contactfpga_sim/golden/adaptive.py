@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from contactfpga_sim.golden import debounce, seek
 from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.scan import Scan
+from contactfpga_sim.golden.request import Request
+from contactfpga_sim.golden.scan import Scan, last_number
 from contactfpga_sim.golden.trace import Timeline
 
 
@@ -29,9 +30,9 @@ class Slot:
 
 
 class Scanner:
-    """Goes through a timeline frame by frame. ``received``: cycles at which a byte was received."""
+    """Goes through a timeline frame by frame, with the requests in the order in which they were received."""
 
-    def __init__(self, facts: Facts, timeline: Timeline, received: Iterable[int]):
+    def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request]):
         self.slots: list[Slot] = []
         """All slots so far."""
         self.contact: list[tuple[int, int]] = []
@@ -39,7 +40,8 @@ class Scanner:
         self._facts = facts
         self._timeline = timeline
         self._changes = [piece[0] for piece in timeline.pieces]
-        self._requests = sorted(received)
+        self._requests = requests
+        self._answered = 0
         self._listed: frozenset[int] = frozenset()
         self._busy: frozenset[int] = frozenset()
         self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
@@ -92,6 +94,8 @@ class Scanner:
             stuck=int(np.sum(stuck & self._present)),
             time_us=begun // facts.clocks_per_us,
             requested=self._asked_before(begun),
+            heard=last_number(self._requests, begun) % 8,
+            told=self.slots[-1].strobe + 3,
             slots=len(self.slots) - first,
             alone=frozenset(alone_in),
         )
@@ -166,9 +170,8 @@ class Scanner:
             self.contact.append((cycle, 0))
 
     def _asked_before(self, cycle: int) -> bool:
-        asked = bisect.bisect_left(self._requests, cycle)
-        del self._requests[:asked]
-        return asked > 0
+        before, self._answered = self._answered, sum(request.cycle < cycle for request in self._requests)
+        return self._answered > before
 
 
 def driven(facts: Facts, slots: Iterable[Slot]) -> list[tuple[int, int]]:

@@ -216,11 +216,22 @@ class Facts:
 
     @functools.cached_property
     def fingerprint(self) -> bytes:
-        fields = dataclasses.asdict(self.skin)
-        if not self.divided:
-            fields.pop("barycenter_bits")
-        canonical = json.dumps(fields, sort_keys=True)
-        return hashlib.sha256(canonical.encode()).digest()[:8]
+        fields = {}
+        for field in dataclasses.fields(self.skin):
+            value = getattr(self.skin, field.name)
+            chosen = self._capacity_by_default if field.name == "zone_capacity" else field.default
+            if field.name != "name" and value != chosen:
+                fields[field.name] = value
+        return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).digest()[:8]
+
+    @property
+    def _capacity_by_default(self) -> int:
+        most = math.ceil(self.rows / 2) * math.ceil(self.columns / 2)
+        if self.skin.connectivity == 4:
+            most = math.ceil(self.rows * self.columns / 2)
+        if max(self.rows, self.columns) > 32:
+            most = min(most, 256)
+        return min(most, 64) if self.divided else most
 
 
 def bits(largest: int) -> int:

@@ -3,84 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import struct
 
 import numpy as np
 
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.link import Link
+from contactfpga_sim.golden.packet import Packet
 from contactfpga_sim.golden.scan import Scan
 
-HELLO, ZONES, CELLS, BARYCENTERS = 0, 1, 2, 3
-OVERFLOW, REQUESTED = 1, 4
-VERSION = 1
-
-
-class Packet:
-    """A packet while it is packed: COBS blocks fill up."""
-
-    def __init__(self) -> None:
-        self._plain = bytearray()
-        self._block = 0
-
-    def push(self, plain: bytes) -> int:
-        """Pack bytes; returns the cycles that takes."""
-        cycles = 0
-        for byte in plain:
-            cycles += 1
-            if self._block == 254:
-                cycles += 1
-                self._block = 0
-            self._block = self._block + 1 if byte else 0
-            self._plain.append(byte)
-        return cycles
-
-    def wire(self) -> bytes:
-        """The packet as it goes over the wire: stuffed, check bytes, delimiter."""
-        stuffed = stuff(bytes(self._plain))
-        crc = crc16(stuffed)
-        return stuffed + bytes(128 + piece for piece in (crc % 128, crc // 128 % 128, crc // 128**2)) + b"\0"
-
-
-def crc16(data: bytes) -> int:
-    """CRC-16/MCRF4XX: x^16 + x^12 + x^5 + 1, register full of ones, lowest bit of each byte first."""
-    crc = 0xFFFF
-    for byte in data:
-        for bit in range(8):
-            feedback = (crc ^ byte >> bit) & 1
-            crc = crc >> 1 ^ feedback * 0x8408
-    return crc
-
-
-def stuff(plain: bytes) -> bytes:
-    """Consistent Overhead Byte Stuffing (Cheshire and Baker, 1999), table 1, byte by byte."""
-    out = bytearray([0])
-    code = 0
-    for index, byte in enumerate(plain):
-        if byte:
-            out.append(byte)
-        length = len(out) - code
-        full = length == 255 and index + 1 < len(plain)
-        if not byte or full:
-            out[code] = length
-            code = len(out)
-            out.append(0)
-    out[code] = len(out) - code
-    return bytes(out)
-
-
-def hello(facts: Facts) -> bytes:
-    """The hello of the board, as on the wire."""
-    skin = facts.skin
-    assert skin.zone_capacity is not None
-    options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
-    options += 8 * (1 + skin.barycenter_bits) * facts.divided
-    options += 128 * (skin.diodes == "none")
-    sizes = struct.pack("<BBBH", skin.rows, skin.columns, options, skin.zone_capacity)
-    lengths = struct.pack("<fff", skin.pitch_x_mm, skin.pitch_y_mm, skin.radius_mm or 0.0)
-    packet = Packet()
-    packet.push(sizes + lengths + facts.fingerprint + bytes([VERSION << 5 | HELLO << 3]))
-    return packet.wire()
+ZONES, CELLS, BARYCENTERS = 5, 6, 7
+OVERFLOW, FAULT = 1, 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,7 +54,6 @@ class Packer:
         self._since_hello = 0
         self._before: np.ndarray | None = None
         self._overwritten = 0
-        self._carried_request = False
 
     def take(self, items: Items) -> None:
         """Pack one frame."""
@@ -155,16 +86,12 @@ class Packer:
         return changed or self._since_sent >= self._facts.keep_alive_slots
 
     def _send(self, packet: Packet, items: Items, taken: int) -> None:
-        requested = items.scan.requested
-        if self._link.drop():
-            self._overwritten += 1
-            requested |= self._carried_request
-        self._carried_request = requested
-        closing = packet.push(self._trailer(items, requested))
-        self._link.offer(taken + closing + 2, packet.wire())
+        self._overwritten += self._link.drop()
+        closing = packet.push(self._trailer(items))
+        self._link.offer(taken + closing + 2, packet.wire(before=self._facts.fingerprint[:2]))
         self._free = taken + closing + 2
 
-    def _trailer(self, items: Items, requested: bool) -> bytes:
+    def _trailer(self, items: Items) -> bytes:
         facts = self._facts
         overflow = len(items.records) > facts.capacity
         cells = int(items.cells.sum())
@@ -175,13 +102,12 @@ class Packer:
             (
                 (items.scan.time_us % 2**24, 24),
                 (self._link.sent % 256, 8),
-                (min(items.scan.stuck, 7), 3),
+                (items.scan.heard, 3),
                 (cells, facts.area_bits),
                 (zones, facts.zones_bits),
                 (self._overwritten % 2**room, room),
-                (overflow * OVERFLOW | requested * REQUESTED, 3),
-                (BARYCENTERS if facts.divided else ZONES if facts.zones else CELLS, 2),
-                (VERSION, 3),
+                (overflow * OVERFLOW | (items.scan.stuck > 0) * FAULT, 4),
+                (BARYCENTERS if facts.divided else ZONES if facts.zones else CELLS, 4),
             )
         )
         return word.to_bytes(width // 8, "little")

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.hello import DIGITS, State, hello
+
 
 class Link:
     """Who takes the wire when. Time only moves forward, by :meth:`advance`."""
 
-    def __init__(self, hello: bytes, bit_clocks: int):
+    def __init__(self, facts: Facts, state: State):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
         """Frames the wire has taken so far."""
-        self._hello = hello
-        self._byte_clocks = 10 * bit_clocks
+        self._facts = facts
+        self._state = state
+        self._byte_clocks = 10 * facts.bit_clocks
         self._hellos: list[int] = []
         self._frame: tuple[int, bytes] | None = None
         self._idle_from = 0
@@ -44,13 +48,20 @@ class Link:
                 return
             if self._hellos and min(self._hellos) <= taken:
                 self._hellos = [wait for wait in self._hellos if wait > taken]
-                self._send(taken, self._hello)
+                self._send_hello(taken)
             else:
                 assert self._frame
                 packet = self._frame[1]
                 self._frame = None
                 self.sent += 1
                 self._send(taken, packet)
+
+    def _send_hello(self, taken: int) -> None:
+        """Each digit is taken in the cycle after the transfer of the byte before it."""
+        first = max(taken + 2, self._uart_from)
+        before = (first + (place - 1) * self._byte_clocks for place in DIGITS)
+        digits = [self._state.digit(place, at + 1, self.sent, taken) for place, at in enumerate(before)]
+        self._send(taken, hello(self._facts, digits))
 
     def _send(self, taken: int, packet: bytes) -> None:
         cycle = max(taken + 2, self._uart_from)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import adaptive, debounce, divide, label, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, divide, label, request, scan, serial
 from contactfpga_sim.golden.facts import Facts, facts
-from contactfpga_sim.golden.frame import Items, Packer, Queue, hello, join
+from contactfpga_sim.golden.frame import Items, Packer, Queue, join
+from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
 
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
     known = facts(skin)
-    received = serial.received(timeline.requests, known.bit_clocks)
-    scanned, counted, contact = (_adaptive if known.adaptive else _raster)(known, timeline, received, cycles)
+    heard = request.heard(timeline.received, known.bit_clocks)
+    scanned, counted, contact = (_adaptive if known.adaptive else _raster)(known, timeline, heard.requests, cycles)
     trace = Trace(cycles)
-    link = Link(hello(known), known.bit_clocks)
-    for cycle in (0, *(cycle + 1 for cycle in received)):
+    link = Link(known, State(known, scanned, heard))
+    for cycle in (0, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
     packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
     handed = Labeller(known, trace)
@@ -66,16 +67,16 @@ Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
 """Frames, their cells as they count once debounced, and changes of the contact pin."""
 
 
-def _raster(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
-    scanned = scan.scans(facts, timeline, received, cycles // facts.scan_clocks + 1)
+def _raster(facts: Facts, timeline: Timeline, requests: list[request.Request], cycles: int) -> Scanned:
+    scanned = scan.scans(facts, timeline, requests, cycles // facts.scan_clocks + 1)
     counted = debounce.debounced(
         np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
     )
     return scanned, counted, scan.contact(facts, scanned)
 
 
-def _adaptive(facts: Facts, timeline: Timeline, received: list[int], cycles: int) -> Scanned:
-    scanner = adaptive.Scanner(facts, timeline, received)
+def _adaptive(facts: Facts, timeline: Timeline, requests: list[request.Request], cycles: int) -> Scanned:
+    scanner = adaptive.Scanner(facts, timeline, requests)
     frames = [scanner.frame()]
     while scanner.slots[-1].end < cycles:
         frames.append(scanner.frame())

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.trace import Timeline
 
 
@@ -24,7 +26,11 @@ class Scan:
     time_us: int
     """Device time of the first row's strobe, less what the columns were shifted; unbounded."""
     requested: bool
-    """A byte came in since the scan before began."""
+    """A request came in since the scan before began."""
+    heard: int
+    """The lowest three bits of the last request's number before it began; 0 before the first one."""
+    told: int
+    """From this cycle on a hello tells its stuck columns."""
     slots: int
     """Row times it took."""
     alone: frozenset[int]
@@ -46,9 +52,8 @@ def _asked_before(facts: Facts, slot: int) -> int:
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
 
 
-def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int) -> list[Scan]:
-    """The first ``count`` scans. ``received``: cycles at which a byte was received."""
-    requests = sorted(received)
+def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
+    """The first ``count`` scans, with the requests in the order in which they were received."""
     result = []
     for index in range(count):
         slots = range(index * facts.rows, (index + 1) * facts.rows)
@@ -61,12 +66,20 @@ def scans(facts: Facts, timeline: Timeline, received: Iterable[int], count: int)
                 offered=[strobe(facts, slot) + 1 for slot in slots],
                 stuck=_stuck(facts, timeline, slots),
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
-                requested=any(early <= cycle < late for cycle in requests),
+                requested=any(early <= request.cycle < late for request in requests),
+                heard=last_number(requests, late) % 8,
+                told=strobe(facts, slots[-1]) + 2,
                 slots=facts.rows,
                 alone=frozenset(range(facts.rows)),
             )
         )
     return result
+
+
+def last_number(requests: Sequence[Request], cycle: int) -> int:
+    """Of the last request that was received before ``cycle``; 0 if there was none."""
+    index = bisect.bisect_left(requests, cycle, key=lambda request: request.cycle)
+    return requests[index - 1].number if index else 0
 
 
 def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import dataclasses
 from collections.abc import Iterable
 
 
@@ -19,9 +19,24 @@ def line(sent: Iterable[tuple[int, int]], bit_clocks: int) -> list[tuple[int, in
     return changes
 
 
-def received(requests: Iterable[int], bit_clocks: int) -> list[int]:
-    """Cycle at which each byte is received whose start bit begins at the pin at the cycle given."""
-    starts = list(requests)
-    if any(late - early < 10 * bit_clocks for early, late in itertools.pairwise(starts)):
-        raise ValueError(f"requests must be at least one byte, {10 * bit_clocks} clocks, apart")
-    return [start + 2 + bit_clocks // 2 + 9 * bit_clocks for start in starts]
+@dataclasses.dataclass(frozen=True)
+class Byte:
+    """A byte that was received: when its first data bit was, and its stop bit."""
+
+    value: int
+    first_bit: int
+    stop: int
+
+
+def received(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[Byte]:
+    """What is received of (cycle, bytes), each of which begin at the pin back to back in that cycle."""
+    found, free = [], 0
+    for cycle, data in sent:
+        if cycle < free:
+            raise ValueError(f"bytes begin in cycle {cycle}; those before them take until {free}")
+        for value in data:
+            middle = cycle + 2 + bit_clocks // 2
+            found.append(Byte(value, middle + bit_clocks, middle + 9 * bit_clocks))
+            cycle += 10 * bit_clocks
+        free = cycle
+    return found

@@ -30,19 +30,19 @@ class Timeline:
 
     ``pieces`` are (start cycle, cells, stuck): from that cycle on the (R, C) bool array ``cells`` is pressed,
     and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven.
-    Starts rise; before the first one nothing is pressed. ``requests`` are the cycles at which the start bit
-    of a byte begins at the receive pin, rising and at least one byte apart.
+    Starts rise; before the first one nothing is pressed. ``received`` are (cycle, bytes): bytes whose first start
+    bit begins at the receive pin in that cycle, back to back; cycles rise, and those before are over.
     """
 
     pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
-    requests: Sequence[int] = ()
+    received: Sequence[tuple[int, bytes]] = ()
 
     def __post_init__(self) -> None:
         starts = [piece[0] for piece in self.pieces]
         if any(late <= early for early, late in itertools.pairwise(starts)):
             raise ValueError("pieces must start at rising cycles")
-        if any(late <= early for early, late in itertools.pairwise(self.requests)):
-            raise ValueError("requests must be at rising cycles")
+        if any(late[0] <= early[0] for early, late in itertools.pairwise(self.received)):
+            raise ValueError("bytes must be received at rising cycles")
         object.__setattr__(self, "_starts", starts)
 
     @classmethod
@@ -51,7 +51,7 @@ class Timeline:
         skin: Skin,
         frames: Iterable[np.ndarray],
         stuck: Iterable[np.ndarray | None] | None = None,
-        requests: Sequence[int] = (),
+        received: Sequence[tuple[int, bytes]] = (),
     ) -> Timeline:
         """Each (R, C) frame, with its stuck columns if any, held for exactly one scan; the first one from power-up."""
         held = [np.asarray(cells, bool) for cells in frames]
@@ -59,7 +59,7 @@ class Timeline:
         first, scan = facts(skin).row_shift, facts(skin).scan_clocks
         starts = [first * (i > 0) + i * scan for i in range(len(held))]
         pieces = list(zip(starts, held, lines, strict=True))
-        return cls(pieces, requests)
+        return cls(pieces, received)
 
     def at(self, cycle: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Cells and stuck columns in ``cycle``; None stands for none pressed."""

@@ -11,7 +11,8 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga_sim import covering, shapes
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.frame import hello
+from contactfpga_sim.golden.hello import hello
+from contactfpga_sim.golden.request import requests
 from contactfpga_sim.golden.trace import Timeline
 
 # Slow clocks bring what comes once in half a second within reach.
@@ -155,41 +156,42 @@ def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
     """Requests come all along, in bursts and one by one."""
     rng = np.random.default_rng([seed, 11])
     known = facts(skin)
-    byte, scan = 10 * known.bit_clocks, known.scan_clocks
-    gaps = byte + rng.choice([0, 0, 1, 7, scan, 8 * scan, 30 * scan], size=cycles // byte)
-    starts = np.cumsum(gaps) + int(rng.integers(scan))
-    pieces = covering.stimulus(skin, cycles, seed).pieces
-    return Stimulus(f"random {seed}", Timeline(pieces, [int(cycle) for cycle in starts if cycle < cycles]), cycles)
+    scan = known.scan_clocks
+    gaps = rng.choice([0, 0, 1, 7, scan, 8 * scan, 30 * scan], size=cycles // (10 * known.bit_clocks))
+    received = covering.traffic(skin, gaps.tolist(), int(rng.integers(scan)), cycles, rng)
+    return Stimulus(f"random {seed}", Timeline(covering.stimulus(skin, cycles, seed).pieces, received), cycles)
 
 
 def _noisy(skin: Skin, scans: int) -> Stimulus:
-    """Bytes, and between them what is none: a low level of up to half a bit, or until behind the stop bit's middle.
+    """Requests, and between them what is none: a low level of up to half a bit, or until after the stop bit's middle.
 
     Most come so far apart that what each does is seen.
     """
     rng = np.random.default_rng(17)
     known = facts(skin)
     bit, cycles = known.bit_clocks, scans * known.scan_clocks
-    requests, noise = [], []
+    asked, noise = [], []
     start = 5
     while start < cycles:
-        kind = rng.choice(["byte", "pulse", "break"], p=[0.2, 0.5, 0.3])
-        if kind == "byte":
-            requests.append(start)
+        kind = rng.choice(["request", "pulse", "break"], p=[0.2, 0.5, 0.3])
+        if kind == "request":
+            asked.append(start)
+            start += 100 * bit
         else:
             longest = 9 * bit + bit // 2 + 1
             noise.append((start, longest if kind == "break" else int(rng.integers(1, bit // 2 + 1))))
         start += 11 * bit + int(rng.integers(2 * bit)) + int(rng.choice([0, 2, 15])) * known.scan_clocks
-    return Stimulus("noise", Timeline(covering.stimulus(skin, cycles, 19).pieces, requests), cycles, noise)
+    pieces = covering.stimulus(skin, cycles, 19).pieces
+    return Stimulus("noise", Timeline(pieces, requests(asked, bit)), cycles, noise)
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
     """Hellos one behind the other: more frames are overwritten than the counter of them can count."""
     known = facts(skin)
-    scan, three_bytes = known.scan_clocks, 30 * known.bit_clocks
-    requests = range(scan, (scans - 5) * scan, three_bytes)
+    scan = known.scan_clocks
+    asked = range(scan, (scans - 5) * scan, 130 * known.bit_clocks)
     pieces = covering.stimulus(skin, scans * scan, 29).pieces
-    return Stimulus("crowded", Timeline(pieces, requests), scans * scan)
+    return Stimulus("crowded", Timeline(pieces, requests(asked, known.bit_clocks)), scans * scan)
 
 
 def _meeting(skin: Skin, chains: int) -> Stimulus:
@@ -199,13 +201,14 @@ def _meeting(skin: Skin, chains: int) -> Stimulus:
     scan, byte = known.scan_clocks, 10 * known.bit_clocks
     hello_clocks = byte * (len(hello(known)) + 1)
     scans = math.ceil((2 * scan + 2 * hello_clocks) / scan) + 1
-    requests: list[int] = []
+    asked: list[int] = []
     for chain in range(1, chains + 1):
         mark = chain * scans * scan
         begin = mark - scan - 2 * hello_clocks - chain * hello_clocks // chains
-        requests += range(max(begin, 0), mark - hello_clocks, 3 * byte)
+        asked += range(max(begin, 0), mark - hello_clocks, 13 * byte)
     cycles = (chains + 1) * scans * scan
-    return Stimulus("meeting", Timeline(covering.stimulus(skin, cycles, 31).pieces, requests), cycles)
+    pieces = covering.stimulus(skin, cycles, 31).pieces
+    return Stimulus("meeting", Timeline(pieces, requests(asked, known.bit_clocks)), cycles)
 
 
 def _various_frames(skin: Skin) -> np.ndarray:

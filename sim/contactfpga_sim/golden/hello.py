@@ -1,0 +1,71 @@
+"""Hello: what a board says of itself, and the counters that it tells while it goes out (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import bisect
+import struct
+import zlib
+from collections.abc import Sequence
+
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.packet import Packet
+from contactfpga_sim.golden.request import Heard
+from contactfpga_sim.golden.scan import Scan
+
+KIND = 4
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, CHECK = 1, 2, 3, 4, 5, 6, 7, 255
+DIGITS = range(16, 32)
+"""Where the digits lie, counted from the delimiter in front."""
+
+
+def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
+    """A hello as on the wire, with a delimiter at either end."""
+    skin = facts.skin
+    assert skin.zone_capacity is not None
+    report = ("moments", "cells", "barycenter").index(skin.report)
+    fraction_bits = skin.barycenter_bits if facts.divided else 0
+    on_change, no_diodes = skin.send == "on_change", skin.diodes == "none"
+    head = (skin.rows, skin.columns, skin.connectivity, report, fraction_bits, on_change)
+    fixed = _field(SHEET, bytes(map(int, head)) + struct.pack("<HBB", skin.zone_capacity, no_diodes, 0))
+    rest = _field(PITCH, struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm))
+    if skin.radius_mm is not None:
+        rest += _field(RADIUS, struct.pack("<d", skin.radius_mm))
+    rest += _field(FINGERPRINT, facts.fingerprint) + _field(RATES, struct.pack("<II", skin.clock_hz, skin.baud))
+    if skin.name:
+        rest += _field(NAME, skin.name.encode("utf-8"))
+    checked = _field(CHECK, struct.pack("<I", zlib.crc32(fixed + rest)))
+    packet = Packet()
+    packet.push(fixed + _field(STATE, bytes(128 + digit for digit in digits)) + rest + checked + bytes([KIND << 4]))
+    return b"\0" + packet.wire()
+
+
+class State:
+    """The counters that a hello tells, by cycle."""
+
+    def __init__(self, facts: Facts, scanned: Sequence[Scan], heard: Heard):
+        self._facts = facts
+        self._scanned = scanned
+        self._heard = heard
+
+    def digit(self, place: int, cycle: int, sent: int, taken: int) -> int:
+        """The digit at a place of the state, if it is taken in ``cycle`` and the hello was in cycle ``taken``, when so
+        many frames had been sent."""
+        if place < 7:
+            return sent // 128**place % 128
+        if place < 11:
+            return self._epoch(taken) // 128 ** (place - 7) % 128
+        if place < 14:
+            return self._heard.number(cycle) // 128 ** (place - 11) % 128
+        return min(7, self._stuck(cycle)) if place == 14 else 0
+
+    def _epoch(self, taken: int) -> int:
+        late = 0 if self._facts.adaptive else self._facts.column_shift + (self._facts.rows - 1) * self._facts.row_clocks
+        return max(0, taken - 1 - late) // self._facts.clocks_per_us // 2**22
+
+    def _stuck(self, cycle: int) -> int:
+        index = bisect.bisect_right(self._scanned, cycle, key=lambda scan: scan.told)
+        return self._scanned[index - 1].stuck if index else 0
+
+
+def _field(kind: int, value: bytes) -> bytes:
+    return bytes([kind, len(value)]) + value

@@ -1,0 +1,82 @@
+"""Requests: what the host sends, which of it the board takes for one, and which number it repeats (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+from collections.abc import Iterable
+
+from contactfpga_sim.golden import serial
+from contactfpga_sim.golden.packet import Packet, check
+
+KIND = 5
+_STUFFED, _LENGTH = 5, 8
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """A request, taken in ``cycle``."""
+
+    cycle: int
+    number: int
+    hello: bool
+    """It asks for one."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Heard:
+    """What the board makes of the bytes at its receive pin."""
+
+    requests: list[Request]
+    numbers: list[tuple[int, int]]
+    """(cycle, number) of every change of the number that a hello repeats."""
+
+    def number(self, cycle: int) -> int:
+        """The number that a hello repeats whose digit is taken in ``cycle``."""
+        index = bisect.bisect_right(self.numbers, cycle, key=lambda change: change[0])
+        return self.numbers[index - 1][1] if index else 0
+
+
+def request(number: int, hello: bool = False) -> bytes:
+    """A request as on the wire, with a delimiter at either end."""
+    packet = Packet()
+    packet.push(bytes(128 + number // 128**place % 128 for place in range(3)) + bytes([KIND << 4 | hello]))
+    return b"\0" + packet.wire()
+
+
+def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
+    """A request at each cycle, numbered as a host does; every other one asks for a hello. Those that would begin within
+    the one before are left out."""
+    sent: list[tuple[int, bytes]] = []
+    number = 129 * 128 + 1
+    for cycle in cycles:
+        if sent and cycle < sent[-1][0] + 10 * bit_clocks * len(sent[-1][1]):
+            continue
+        sent.append((cycle, request(number, len(sent) % 2 == 0)))
+        number += 2 if number % 8 == 7 else 1
+    return sent
+
+
+def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int) -> Heard:
+    """Requests among (cycle, bytes), each of which begin at the pin back to back in that cycle."""
+    found = Heard([], [])
+    packet: list[int] | None = None  # bytes since the last delimiter
+    for byte in serial.received(received, bit_clocks):
+        if packet is not None and 1 <= len(packet) <= 3 and found.numbers and found.numbers[-1][1]:
+            found.numbers.append((byte.first_bit + 1, 0))
+        if byte.value == 0:
+            if packet is not None and _is_request(packet):
+                number = sum(digit % 128 * 128**place for place, digit in enumerate(packet[1:4]))
+                found.requests.append(Request(byte.stop, number, bool(packet[4] & 1)))
+                found.numbers.append((byte.stop + 1, number))
+            packet = []
+        elif packet is not None:
+            packet.append(byte.value)
+    return found
+
+
+def _is_request(packet: list[int]) -> bool:
+    if len(packet) != _LENGTH or packet[4] >> 4 != KIND:
+        return False
+    wanted, got = check(bytes(packet[:_STUFFED])), packet[_STUFFED:]
+    return (got[0] ^ wanted[0]) % 128 == (got[1] ^ wanted[1]) % 128 == (got[2] ^ wanted[2]) % 4 == 0
