@@ -2,10 +2,14 @@
 
 import dataclasses
 import struct
+import zlib
+from unittest import mock
 
 import pytest
 
 from contactfpga import Skin
+from contactfpga_hdl import link as link_module
+from contactfpga_hdl import odometer
 from contactfpga_hdl.link import Link
 
 SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000}  # a scan takes 20.004 ms
@@ -20,7 +24,7 @@ KEEP_ALIVE = {"on change": 4, "every scan": 1, "cells on change": 4}  # scans
 HELLO_EVERY = 24
 ITEM_BYTES = {"moments": 2, "cells": 1}  # 5 + 5 + 5 bits, 4 bits
 TRAILER_BYTES = 7  # 24 + 8 + 3 + 5 + 4 + 4 bits and the last byte
-TAG = {"time": 24, "stuck": 3, "requested": 1}
+TAG = {"time": 24, "stuck": 3, "heard": 3, "requested": 1}
 SUMMARY = {"cells": 5, "zones": 4, "overflow": 1, "mismatch": 1, "changed": 1}
 
 
@@ -35,10 +39,10 @@ def skin_of(name):
     return Skin(**SHEET, **SKINS[name])
 
 
-def sealed(plain):
-    """COBS, check bytes and delimiter for a packet without long blocks."""
+def sealed(plain, before=b""):
+    """COBS, check bytes and delimiter for a packet without long blocks; the check covers ``before`` as well."""
     stuffed = b"".join(bytes([len(block) + 1]) + block for block in plain.split(b"\0"))
-    crc = crc16(stuffed)
+    crc = crc16(before + stuffed)
     return stuffed + bytes([128 + crc % 128, 128 + crc // 128 % 128, 128 + crc // 128**2]) + b"\0"
 
 
@@ -52,23 +56,32 @@ def crc16(data):
     return crc
 
 
-def hello_of(skin):
-    options = (skin.connectivity == 4) | (skin.report == "cells") << 1 | (skin.send == "on_change") << 2
-    facts = (skin.rows, skin.columns, options, skin.zone_capacity, skin.pitch_x_mm, skin.pitch_y_mm, 0.0)
-    return sealed(struct.pack("<BBBHfff", *facts) + skin.fingerprint + bytes([1 << 5]))
+def hello_of(skin, digits=(0,) * 16):
+    """The hello; ``digits`` are those of its state."""
+
+    def field(kind, value):
+        return bytes([kind, len(value)]) + value
+
+    report = ["moments", "cells"].index(skin.report)
+    sheet = [skin.rows, skin.columns, skin.connectivity, report, 0, int(skin.send == "on_change")]
+    first = field(1, bytes(sheet) + struct.pack("<HBB", skin.zone_capacity, 0, 0))
+    rest = field(3, struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm)) + field(5, skin.fingerprint)
+    rest += field(6, struct.pack("<II", skin.clock_hz, skin.baud))
+    check = field(255, struct.pack("<I", zlib.crc32(first + rest)))
+    return b"\0" + sealed(first + field(2, bytes(128 + digit for digit in digits)) + rest + check + b"\x40")
 
 
-def frame_of(skin, frame, sequence, overwritten, requested):
-    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten, "requested": requested}
-    widths = {"time": 24, "sequence": 8, "stuck": 3, "cells": 5, "zones": 4, "overwritten": 4}
+def frame_of(skin, frame, sequence, overwritten):
+    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten, "fault": int(frame.facts["stuck"] > 0)}
+    widths = {"time": 24, "sequence": 8, "heard": 3, "cells": 5, "zones": 4, "overwritten": 4}
     word = offset = 0
-    for name, width in (widths | {"overflow": 1, "mismatch": 1, "requested": 1}).items():
+    for name, width in (widths | {"overflow": 1, "mismatch": 1, "fault": 1}).items():
         word |= facts[name] % (1 << width) << offset
         offset += width
     size = ITEM_BYTES[skin.report]
     items = b"".join(item.to_bytes(size, "little") for item in frame.items)
-    word |= (1 if skin.report == "moments" else 2) << offset | 1 << offset + 2
-    return sealed(items + word.to_bytes(7, "little"))
+    word |= (5 if skin.report == "moments" else 6) << offset + 1
+    return sealed(items + word.to_bytes(7, "little"), skin.fingerprint[:2])
 
 
 def random_frames(rng, skin, count, spacing=1):
@@ -91,7 +104,7 @@ def random_frames(rng, skin, count, spacing=1):
     return frames
 
 
-def run(bench_of_skin, skin, frames, ready, received=(), after=400):
+def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, after=400):
     """Puts the frames through; returns the bytes' sink and the items' source."""
     dut, sim = bench_of_skin
     size = ITEM_BYTES[skin.report]
@@ -110,7 +123,8 @@ def run(bench_of_skin, skin, frames, ready, received=(), after=400):
         sim.drive(dut.summary[name], described(name))
     for name in TAG:
         sim.drive(dut.tag[name], described(name))
-    sim.drive(dut.received, lambda cycle: int(cycle in received))
+    sim.drive(dut.asked, lambda cycle: int(cycle in asked))
+    sim.drive(dut.number, number)
     sink = sim.sink(dut.bytes, ready=ready)
     sim.run(frames[-1].not_before[-1] + after)
     assert source.transfers == [at for frame in frames for at in frame.not_before], "the link never stalls"
@@ -134,8 +148,9 @@ def decisions(skin, frames, keep_alive):
     return out
 
 
-def replay(skin, frames, delimiters, cycles, received=(), keep_alive=None):
-    """(cycle in which it is taken, packet) of every packet, given when each one's delimiter was transferred."""
+def replay(skin, frames, delimiters, cycles, asked=(), keep_alive=None):
+    """(cycle in which it is taken, packet) of every packet, None for a hello, given when each one's delimiter was
+    transferred."""
     decided = dict(zip([at for at, _ in decisions(skin, frames, keep_alive)], frames))
     assert len(decided) == len(frames)
     sends = dict(decisions(skin, frames, keep_alive))
@@ -149,7 +164,7 @@ def replay(skin, frames, delimiters, cycles, received=(), keep_alive=None):
             takes_frame = not takes_hello and waiting is not None and waiting[0] <= cycle
         if takes_hello:
             hello_from = [at for at in hello_from if at > cycle]
-            packets.append((cycle, hello_of(skin)))
+            packets.append((cycle, None))
         elif takes_frame:
             packets.append((cycle, waiting[1]))
             waiting, sent = None, sent + 1
@@ -160,14 +175,21 @@ def replay(skin, frames, delimiters, cycles, received=(), keep_alive=None):
             if ends % HELLO_EVERY == 0:
                 hello_from.append(cycle + 1)
             if sends[cycle]:
-                dropped_request = waiting is not None and waiting[2]
                 overwritten += waiting is not None
-                requested = bool(decided[cycle].facts["requested"] or dropped_request)
-                packet = frame_of(skin, decided[cycle], sent, overwritten, requested)
-                waiting = cycle + TRAILER_BYTES + 2, packet, requested
-        if cycle in received:
+                waiting = cycle + TRAILER_BYTES + 2, frame_of(skin, decided[cycle], sent, overwritten)
+        if cycle in asked:
             hello_from.append(cycle + 1)
     return packets, overwritten
+
+
+def hello_sent(skin, sink, begun, sent, number=lambda cycle: 0, stuck=lambda cycle: 0):
+    """The hello whose first byte was offered in a cycle, after so many frames: each digit is taken in the clock after the
+    transfer of the byte before it."""
+    first = sink.offered.index(begun)
+    taken = [sink.transfers[first + 15 + place][0] + 1 for place in range(16)]
+    digits = [sent >> 7 * place & 127 for place in range(7)] + [0] * 4
+    digits += [number(taken[11 + place]) >> 7 * place & 127 for place in range(3)] + [stuck(taken[14]), 0]
+    return hello_of(skin, digits)
 
 
 def packets_of(sink):
@@ -179,7 +201,7 @@ def packets_of(sink):
         else:
             assert offered - before <= 2, "bytes follow without a gap"
         current, before = current + bytes([byte]), cycle
-        if not byte:
+        if not byte and len(current) > 1:
             packets.append((begun, current))
             ends.append(cycle)
             current = b""
@@ -201,16 +223,27 @@ def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(be
     frames = random_frames(rng, skin, 130, spacing=2)
     cycles = frames[-1].not_before[-1] + 400
     ready = varying_stalls(rng, cycles + 1)
-    received = {cycle for cycle in range(cycles) if rng.random() < 0.002}
+    asked = {cycle for cycle in range(cycles) if rng.random() < 0.001}
+    numbers = [rng.randrange(1 << 21) for _ in range(cycles // 64 + 8)]
+
+    def number(cycle):
+        return numbers[cycle // 64]
+
     dut = Link(skin)
-    sink = run((dut, bench(dut)), skin, frames, lambda cycle: ready[cycle], received)
+    sim = bench(dut)
+    stuck = sim.watch(dut.tag.stuck)
+    sink = run((dut, sim), skin, frames, lambda cycle: ready[cycle], asked, number)
     packets, ends = packets_of(sink)
-    wanted, overwritten = replay(skin, frames, ends, cycles, received, KEEP_ALIVE.get(name))
-    assert [packet for _, packet in packets] == [packet for _, packet in wanted][: len(packets)]
-    assert [begun - 2 for begun, _ in packets] == [taken for taken, _ in wanted][: len(packets)]
+    wanted, overwritten = replay(skin, frames, ends, cycles, asked, KEEP_ALIVE.get(name))
+    sent = 0
+    for (begun, packet), (taken, expected) in zip(packets, wanted):
+        assert begun - 2 == taken
+        assert packet == (expected or hello_sent(skin, sink, begun, sent, number, stuck.__getitem__))
+        sent += expected is not None
     assert len(packets) >= len(wanted) - 1
     assert len(packets) > 40
     assert overwritten > 5
+    assert len({packet for _, packet in packets if packet[0] == 0}) > 3, "hellos differ in what they tell"
 
 
 @pytest.fixture(scope="module")
@@ -222,50 +255,78 @@ def link(bench):
 def test_the_wire_may_take_a_frame_until_the_very_clock_in_which_the_next_is_decided(link):
     skin = skin_of("always")
     facts = dict.fromkeys(TAG | SUMMARY, 1)
-    first = Frame([0x1234], facts, [40, 60])
-    second = Frame([0x2345, 0x3456], facts | {"requested": 0, "time": 2}, [100, 110, 120])
+    first = Frame([0x1234], facts, [190, 210])
+    second = Frame([0x2345, 0x3456], facts | {"requested": 0, "time": 2}, [250, 260, 270])
     (_, _), (decided, _) = decisions(skin, [first, second], None)
     idle_from = set()
     for release in range(decided - 20, decided + 5):
-        ready = [cycle < 50 or cycle >= release for cycle in range(1000)]
+        ready = [cycle < 150 or cycle >= release for cycle in range(1000)]
         sink = run(link, skin, [first, second], ready.__getitem__)
         packets, ends = packets_of(sink)
         wanted, _ = replay(skin, [first, second], ends, 10_000)
-        assert [packet for _, packet in packets] == [packet for _, packet in wanted]
+        assert [packet for _, packet in packets[1:]] == [packet for _, packet in wanted[1:]]
         assert [begun - 2 for begun, _ in packets] == [taken for taken, _ in wanted]
         idle_from.add(ends[0] + 1)
         in_time = ends[0] + 1 <= decided
         sequence = [(1, 0), (2, 0)] if in_time else [(2, 1)]
         assert [packet for _, packet in packets[1:]] == [
-            frame_of(skin, (first, second)[number - 1], number - 1 - over, over, requested=number == 1 or over)
-            for number, over in sequence
+            frame_of(skin, (first, second)[number - 1], number - 1 - over, over) for number, over in sequence
         ]
     assert {decided, decided + 1} <= idle_from
 
 
-def test_a_hello_goes_out_at_start_every_half_second_and_after_a_byte(link, rng):
+def test_a_hello_goes_out_at_start_every_half_second_and_when_asked_for(link, rng):
     skin = skin_of("always")
     frames = random_frames(rng, skin, 2 * HELLO_EVERY + 2, spacing=3)
-    received = {frames[10].not_before[0], frames[30].not_before[0], frames[30].not_before[0] + 1}
-    packets, _ = packets_of(run(link, skin, frames, lambda cycle: True, received))
-    kinds = [packet[-5] >> 3 & 3 for _, packet in packets]  # in front of check bytes and delimiter
-    hellos = [begun for begun, packet in packets if packet == hello_of(skin)]
-    assert kinds.count(0) == len(hellos)
-    assert len(hellos) in (5, 6), "two bytes in a row may share one hello"
+    asked = {frames[10].not_before[0], frames[30].not_before[0], frames[30].not_before[0] + 1}
+    sink = run(link, skin, frames, lambda cycle: True, asked)
+    packets, _ = packets_of(sink)
+    hellos = [begun for begun, packet in packets if packet[0] == 0]
+    assert len(hellos) in (5, 6), "two wishes in a row may share one hello"
     assert hellos[0] == 2
-    assert len(hello_of(skin)) <= 32
+    assert len(hello_of(skin)) <= 81
     for period in (1, 2):
         decided = decisions(skin, frames, None)[HELLO_EVERY * period - 1][0]
-        assert any(0 < begun - decided <= 3 + 2 * 40 for begun in hellos), "behind one frame at most"
+        assert any(0 < begun - decided <= 3 + 2 * 90 for begun in hellos), "after one frame at most"
 
 
-def test_a_request_survives_the_frame_that_is_dropped(link, rng):
-    skin = skin_of("always")
-    frames = random_frames(rng, skin, 6)
-    for index, frame in enumerate(frames):
-        frame.facts["requested"] = int(index == 1)
-    ends = frames[4].not_before[-1] - 5
-    packets, _ = packets_of(run(link, skin, frames, lambda cycle: cycle > ends))
-    sent = [packet for _, packet in packets[1:]]
-    assert sent[0] in [frame_of(skin, frames[index], 0, index, requested=True) for index in (3, 4)]
-    assert sent[-1] == frame_of(skin, frames[5], len(sent) - 1, 6 - len(sent), requested=False)
+def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
+    """The carry into the odometer's digits, and its own carries: 2^14 frames are too many to simulate, so the counters
+    begin just before."""
+    dut = Link(skin_of("cells"))
+    with mock.patch.object(link_module, "LIVE_DIGITS", 1), mock.patch.object(odometer, "LIVE_DIGITS", 1):
+        sim = bench(dut)
+        frames = [Frame([], dict.fromkeys(TAG | SUMMARY, 0), [40 * index + 1]) for index in range(300)]
+        asked = {40 * index + 20 for index in (2, 127, 128, 129, 255, 256, 257, 298)}
+        sink = run((dut, sim), dut.skin, frames, lambda cycle: True, asked)
+    packets, _ = packets_of(sink)
+    sent = told = 0
+    for begun, packet in packets:
+        if packet[0] == 0:
+            assert packet == hello_sent(dut.skin, sink, begun, sent)
+            told = max(told, sent)
+        else:
+            sent += 1
+    assert told > 128
+
+
+def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
+    dut = Link(skin_of("cells"))
+    sim = bench(dut)
+    sim.drive(dut.epoch, lambda cycle: int(cycle in epochs))
+    asked = {100, 400, 3000, 6000, 6500}
+    while_told = {150, 450, 3050, 6001, 6500, 6550}  # one per hello can wait
+    epochs = {cycle for cycle in range(300, 6500, 40) if not any(0 <= cycle - at < 200 for at in asked)} | while_told
+    frame = Frame([], dict.fromkeys(TAG | SUMMARY, 0), [1])
+    sink = run((dut, sim), dut.skin, [frame], lambda cycle: True, asked, after=7200)
+    packets, _ = packets_of(sink)
+    told = []
+    for begun, packet in packets:
+        if packet[0] == 0:
+            digits = packet[16 + 7 : 16 + 11]
+            taken = begun - 2
+            told.append((taken, sum((digit & 127) << 7 * place for place, digit in enumerate(digits))))
+    assert len(told) == 6
+    for taken, epoch in told:
+        assert epoch == sum(cycle < taken for cycle in epochs), taken
+    assert told[-1][1] > 128

@@ -39,15 +39,15 @@ class Frame:
 
     def plain(self, skin, verdict):
         _, area, zones = sizes(skin)
-        fields = self.trailer | verdict
-        widths = {"time": 24, "sequence": 8, "stuck": 3, "cells": area, "zones": zones}
+        fields = self.trailer | verdict | {"fault": int(self.trailer["stuck"] > 0)}
+        widths = {"time": 24, "sequence": 8, "heard": 3, "cells": area, "zones": zones}
         widths["overwritten"] = overwritten_width(area, zones)
-        widths |= {"overflow": 1, "mismatch": 1, "requested": 1}
+        widths |= {"overflow": 1, "mismatch": 1, "fault": 1}
         word = offset = 0
         for name, width in widths.items():
             word |= fields[name] << offset
             offset += width
-        word |= (1 if skin.report == "moments" else 2) << offset | 1 << offset + 2
+        word |= (5 if skin.report == "moments" else 6) << offset + 1
         return b"".join(self.items) + word.to_bytes((offset + 5) // 8, "little")
 
 
@@ -75,7 +75,7 @@ def stuffed(plain):
 
 def random_trailer(rng, skin):
     _, area, zones = sizes(skin)
-    widths = {"time": 24, "overflow": 1, "mismatch": 1, "stuck": 3, "cells": area, "zones": zones}
+    widths = {"time": 24, "overflow": 1, "mismatch": 1, "stuck": 3, "heard": 3, "cells": area, "zones": zones}
     return {name: rng.randrange(1 << width) for name, width in widths.items()}
 
 
@@ -96,7 +96,7 @@ def run(bench, skin, frames, rng, gap=0.0):
     words = [word for f in frames for word in [*(int.from_bytes(item, "little") for item in f.items), end]]
     source = sim.source(dut.items, words, rng, gap=gap)
     owner = [index for index, frame in enumerate(frames) for _ in range(len(frame.items) + 1)]
-    widths = {"sequence": 8, "overwritten": overwritten_width(*sizes(skin)[1:]), "requested": 1}
+    widths = {"sequence": 8, "overwritten": overwritten_width(*sizes(skin)[1:])}
     verdicts = [{name: rng.randrange(1 << width) for name, width in widths.items()} for _ in frames]
 
     def frame_now():
@@ -107,7 +107,7 @@ def run(bench, skin, frames, rng, gap=0.0):
 
     for name in ("cells", "zones", "overflow", "mismatch"):
         sim.drive(dut.summary[name], lambda cycle, name=name: frames[frame_now()[0]].trailer[name])
-    for name in ("time", "stuck"):
+    for name in ("time", "stuck", "heard"):
         sim.drive(dut.tag[name], lambda cycle, name=name: frames[frame_now()[0]].trailer[name])
     for name, width in widths.items():  # noise until the end mark is decided upon
 
@@ -189,7 +189,7 @@ def test_blocks_around_254_bytes_and_their_clocks(bench, rng, length):
 def test_a_frame_that_ends_with_a_full_block_has_no_empty_one_behind_it(bench, rng):
     skin = skin_of("zones of 5 bytes")
     # 5 * 49 + 9 bytes. The counters differ from frame to frame; in most of them they hold no zero.
-    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "stuck": 7, "cells": 1023, "zones": 255}
+    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "stuck": 7, "heard": 7, "cells": 1023, "zones": 255}
     frames = [Frame(random_items(rng, 5, 49, 0.0), largest) for _ in range(8)]
     got, source, verdicts = run(bench, skin, frames, rng)
     assert [written for _, written in got] == wanted(skin, frames, verdicts)

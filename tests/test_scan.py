@@ -1,6 +1,7 @@
 """The scanner: which row is driven when, and what it makes of the column pins (docs/timing.md, Scan)."""
 
 import dataclasses
+import types
 
 import pytest
 
@@ -31,11 +32,12 @@ class Expected:
     driven: list  # number of the driven row in each cycle, or None
     rows: list  # (cycle, cells) of each transfer
     contact: list  # level in each cycle
-    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested), there one clock later
+    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested, heard), there one clock later
 
 
-def expected(skin, pressed, requests=()):
-    """The rules of docs/timing.md for the pressed columns in each cycle, whatever row is driven."""
+def expected(skin, pressed, requests=types.MappingProxyType({})):
+    """The rules of docs/timing.md for the pressed columns in each cycle, whatever row is driven; ``requests``: cycle and
+    the bits that frames repeat."""
     megahertz = skin.clock_hz // 1_000_000
     S, L = round(skin.settle_us * megahertz), round(skin.release_us * megahertz)
     T, R, cycles = S + L, skin.rows, len(pressed)
@@ -46,7 +48,7 @@ def expected(skin, pressed, requests=()):
     result = Expected([], [], [], {})
     result.driven = [cycle // T % R if cycle % T < S else None for cycle in range(cycles)]
     contact = [False] * cycles
-    requests, level, scan, time, requested = sorted(requests), False, [], 0, False
+    level, scan, time, requested, heard, begun = False, [], 0, False, 0, 0
     for k in range(cycles // T + 1):
         strobe = k * T + S + 1
         if strobe + 1 >= cycles:
@@ -56,8 +58,9 @@ def expected(skin, pressed, requests=()):
         result.rows.append((strobe + 1, cells))
         if row == 0:
             scan, time = [], strobe // megahertz % 2**24
-            requested = any(x < strobe for x in requests)
-            requests = [x for x in requests if x >= strobe]
+            requested = any(begun <= x < strobe for x in requests)
+            heard = next((bits for x, bits in sorted(requests.items(), reverse=True) if x < strobe), 0)
+            begun = strobe
         scan.append(cells)
         if cells:
             level = True
@@ -69,12 +72,12 @@ def expected(skin, pressed, requests=()):
             for slot in range(k - R, k):  # slots fR - 1 to fR + R - 2
                 stuck |= pressed[(slot + 1) * T - 1] & anywhere if slot >= 0 else 0
             if strobe + 2 < cycles:
-                result.tags[strobe + 1] = (time, min(7, stuck.bit_count()), int(requested))
+                result.tags[strobe + 1] = (time, min(7, stuck.bit_count()), int(requested), heard)
     result.contact = [int(value) for value in contact]
     return result
 
 
-def run(bench, skin, pressed, requests=(), sink=None):
+def run(bench, skin, pressed, requests=types.MappingProxyType({}), sink=None):
     """Row pins, transfers, contact and tags of the gateware for the pressed columns in each cycle."""
     dut = Scanner(skin)
     sim = bench(dut)
@@ -82,9 +85,16 @@ def run(bench, skin, pressed, requests=(), sink=None):
     flip = all_columns if skin.diodes == "col2row" else 0
     sim.drive(dut.pins.columns, lambda cycle: (pressed[cycle] if cycle < len(pressed) else 0) ^ flip)
     sim.drive(dut.request, lambda cycle: int(cycle in requests))
+    heard = [0]
+
+    def last_heard(cycle):
+        heard.append(requests.get(cycle - 1, heard[-1]))
+        return heard[-1]
+
+    sim.drive(dut.heard, last_heard)
     rows = sim.sink(dut.rows)
     pins, contact = sim.watch(dut.pins.rows), sim.watch(dut.contact)
-    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested")]
+    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested", "heard")]
     sim.run(len(pressed))
     idle = (1 << skin.rows) - 1 if skin.diodes == "col2row" else 0
     mask = (1 << skin.columns) - 1
@@ -121,7 +131,7 @@ def test_every_output_follows_the_rules_for_columns_that_change_each_clock(bench
         if cycle % 97 == 0:
             quiet = rng.random() < 0.5  # long enough for whole scans of the small sheets without contact
         pressed.append(0 if quiet else sum(1 << c for c in range(skin.columns) if rng.random() < 0.3))
-    requests = {cycle for cycle in range(cycles) if rng.random() < 0.02}
+    requests = {cycle: rng.randrange(1, 8) for cycle in range(cycles) if rng.random() < 0.02}
     wanted = expected(skin, pressed, requests)
     assert {*wanted.contact} == {0, 1}
     assert_same(run(bench, skin, pressed, requests), wanted)

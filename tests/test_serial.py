@@ -17,14 +17,28 @@ def line(data, bit_clocks):
 
 
 def received(bench, bit_clocks, levels, idle=3):
-    """Cycles in which the receiver reports a byte, for levels that start in cycle ``idle``."""
+    """Cycles in which the receiver reports a good stop bit, for levels that start in cycle ``idle``."""
     dut = Receiver(bit_clocks)
     sim = bench(dut)
     levels = [1] * idle + levels + [1] * 12 * bit_clocks
     sim.drive(dut.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
-    pulse = sim.watch(dut.received)
+    pulse = sim.watch(dut.bits.good)
     sim.run(len(levels))
     return [cycle for cycle, value in enumerate(pulse.values) if value]
+
+
+def bits(bench, bit_clocks, levels, idle=3):
+    """(cycle, level) of each data bit, and cycles of bad stop bits."""
+    dut = Receiver(bit_clocks)
+    sim = bench(dut)
+    levels = [1] * idle + levels + [1] * 12 * bit_clocks
+    sim.drive(dut.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    bit, level, bad = (sim.watch(dut.bits[name]) for name in ("bit", "level", "bad"))
+    sim.run(len(levels))
+    return (
+        [(cycle, level[cycle]) for cycle, value in enumerate(bit.values) if value],
+        [cycle for cycle, value in enumerate(bad.values) if value],
+    )
 
 
 def moment(bit_clocks, start):
@@ -62,6 +76,27 @@ def test_a_byte_starts_one_clock_after_its_transfer_and_the_line_rests_high(benc
 def test_a_byte_is_received_in_the_middle_of_its_stop_bit(bench, bit_clocks):
     for byte in (0x00, 0xFF, 0x55, 0xAA):
         assert received(bench, bit_clocks, line([byte], bit_clocks), idle=5) == [moment(bit_clocks, 5)]
+
+
+@pytest.mark.parametrize("bit_clocks", BIT_CLOCKS)
+def test_every_data_bit_is_told_in_its_middle(bench, rng, bit_clocks):
+    data = [rng.randrange(256) for _ in range(6)]
+    told, bad = bits(bench, bit_clocks, line(data, bit_clocks), idle=5)
+    first = 5 + 2 + bit_clocks // 2
+    assert told == [
+        (first + (10 * index + 1 + place) * bit_clocks, byte >> place & 1)
+        for index, byte in enumerate(data)
+        for place in range(8)
+    ]
+    assert bad == []
+
+
+@pytest.mark.parametrize("bit_clocks", BIT_CLOCKS)
+def test_a_low_stop_bit_is_told_as_bad(bench, bit_clocks):
+    levels = line([0x33], bit_clocks)
+    told, bad = bits(bench, bit_clocks, levels[:-bit_clocks] + [0] * (bit_clocks // 2 + 1), idle=5)
+    assert bad == [moment(bit_clocks, 5)]
+    assert [level for _, level in told] == [1, 1, 0, 0, 1, 1, 0, 0]
 
 
 @pytest.mark.parametrize("bit_clocks", BIT_CLOCKS)

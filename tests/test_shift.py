@@ -65,7 +65,7 @@ class Run:
 
     driven: list  # rows that are selected
     rows: list  # (cycle, cells) of each transfer
-    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested), there one clock later
+    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested, heard), there one clock later
     pins: dict  # levels of each of its output pins
 
 
@@ -94,8 +94,9 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
 
     sim.drive(getattr(dut.pins, sheet.drives), levels, Cat(ports))
     sim.drive(dut.request, lambda cycle: int(cycle in requests))
+    sim.drive(dut.heard, lambda cycle: 5 * any(at < cycle for at in requests))
     rows = sim.sink(dut.rows)
-    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested")]
+    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested", "heard")]
     sim.run(len(cells))
     lasts = [cycle for cycle, payload in rows.transfers if payload >> skin.columns]
     mask = (1 << skin.columns) - 1
@@ -321,6 +322,7 @@ def test_a_request_while_columns_are_loaded_or_shifted_asks_for_the_next_frame(b
     for at, frame in ((load - 1, 1), (load, 2), (load + 1, 2), (strobe - 1, 2), (strobe, 2), (strobe + 1, 2)):
         tags = run(bench, skin, cells, requests={at}).tags
         assert [tag[2] for tag in tags.values()] == [int(index == frame) for index in range(4)], at
+        assert [tag[3] for tag in tags.values()] == [5 * (index >= frame) for index in range(4)], at
         assert [tag[0] for tag in tags.values()] == [
             (t.first + 2 * index * t.slot + t.settle + 1) // 12 for index in range(4)
         ]
