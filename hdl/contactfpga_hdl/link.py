@@ -213,7 +213,8 @@ class Link(wiring.Component):
             odometer.hold.eq(self._sends_hello & ~self._idle),
             odometer.place.eq(place),
         ]
-        live, digit = Signal(protocol.DIGIT_BITS), Signal(protocol.DIGIT_BITS)
+        digit = Signal(protocol.DIGIT_BITS)
+        live = Signal(protocol.DIGIT_BITS)
         number = [self.number.word_select(index, protocol.DIGIT_BITS) for index in range(protocol.HEARD_DIGITS)]
         sent = [self._sent.word_select(index, protocol.DIGIT_BITS) for index in range(LIVE_DIGITS)]
         first_of_number = protocol.SENT_DIGITS + protocol.EPOCH_DIGITS

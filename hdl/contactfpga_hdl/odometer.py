@@ -10,6 +10,7 @@ LIVE_DIGITS = 2
 """Low digits of the count of sent frames, which the link keeps itself: more than a frame's sequence number has."""
 
 _EPOCH = SENT_DIGITS
+_LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
 
 
 class Odometer(wiring.Component):
@@ -35,7 +36,8 @@ class Odometer(wiring.Component):
         m = Module()
         m.submodules.digits = digits = memory.Memory(shape=DIGIT_BITS, depth=STATE_DIGITS, init=[])
         read, write = digits.read_port(), digits.write_port()
-        sent_waits, epoch_waits = Signal(), Signal()
+        sent_waits = Signal()
+        epoch_waits = Signal()
         at = Signal.like(self.place)
         m.d.comb += [
             self.digit.eq(read.data),
@@ -56,7 +58,7 @@ class Odometer(wiring.Component):
                 m.d.comb += write.en.eq(1)
                 m.d.sync += at.eq(at + 1)
                 m.next = "REST"
-                with m.If(read.data.all()):
+                with m.If(read.data.all() & (at != _LAST[0]) & (at != _LAST[1])):
                     m.next = "READ"
         with m.If(self.sent):
             m.d.sync += sent_waits.eq(1)

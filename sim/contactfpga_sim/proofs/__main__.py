@@ -10,6 +10,7 @@ from contactfpga_sim.proofs import (
     label,
     label_serial,
     link,
+    odometer,
     pack,
     records,
     scan,
@@ -30,6 +31,7 @@ CASES: tuple[Case, ...] = (
     *divide.CASES,
     *pack.CASES,
     *link.CASES,
+    *odometer.CASES,
     *serial.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)

@@ -4,7 +4,6 @@ from functools import partial
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
 
-from contactfpga import protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_hdl.pack import Packer
@@ -53,7 +52,7 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
 
 def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> None:
     verdict = dut.verdict
-    numbers = Cat(verdict.sequence, verdict.overwritten, verdict.requested, dut.summary)
+    numbers = Cat(verdict.sequence, verdict.overwritten, dut.summary)
     tag_before, numbers_before = proof.before(dut.tag), proof.before(numbers)
     with proof.m.If(plain.closing):
         proof.given(dut.tag.as_value() == tag_before)
@@ -93,19 +92,19 @@ class _PlainBytes:
 def _trailer(derived: Derived, dut: Packer):
     """As docs/protocol.md has it."""
     summary, verdict = dut.summary, dut.verdict
-    kind = {"moments": protocol.KIND_ZONES, "cells": protocol.KIND_CELLS}[derived.skin.report]
+    kind = {"moments": 5, "cells": 6}[derived.skin.report]
     return Cat(
         dut.tag.time,
         verdict.sequence,
-        dut.tag.stuck,
+        dut.tag.heard,
         summary.cells,
         summary.zones,
         verdict.overwritten,
         summary.overflow,
         summary.mismatch,
-        verdict.requested,
-        Const(kind, 2),
-        Const(protocol.VERSION, 3),
+        dut.tag.stuck != 0,
+        Const(0, 1),
+        Const(kind, 4),
     )
 
 
