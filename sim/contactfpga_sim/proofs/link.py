@@ -184,14 +184,10 @@ _BUGS = (
     Bug("a check byte short", Link, "_send", "tail == CHECK_BYTES", "tail == CHECK_BYTES - 1"),
     Bug("a loss is not counted", Link, "_decide", "overwritten + drops", "overwritten"),
 )  # fmt: skip
-_STATE_BUGS = (
-    Bug("a digit does not stand", Link, "_say_state", "m.If(self._fetches)", "m.If(1)"),
-)
 _HELLO = protocol.encode_hello(_SKIN)
 _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames behind it
 CASES = (
-    Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3,
-         _STATE_BUGS, bug_clocks=60),
+    Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3),
     Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
          _BUGS, bug_clocks=40),
 )  # fmt: skip
