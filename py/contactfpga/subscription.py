@@ -1,0 +1,136 @@
+"""A queue of frames, and what can be done with one."""
+
+from __future__ import annotations
+
+import asyncio
+import collections
+import contextlib
+import math
+from collections.abc import AsyncIterator, Iterator
+from typing import TYPE_CHECKING
+
+from contactfpga.batch import Batch
+from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
+from contactfpga.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.board import Board
+
+
+class Subscription:
+    """Every frame of a board from a moment on: in ``for``, in ``async for``, or one by one.
+
+    ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`.
+    """
+
+    def __init__(self, board: Board, maxsize: int):
+        if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
+            raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
+        self.maxsize = maxsize
+        self.dropped = 0
+        """Frames that were not taken in time."""
+        self._board = board
+        self._items: collections.deque[Zones | ContactFPGAError] = collections.deque()
+        self._closed = False
+
+    def next(self, timeout: float = 1.0) -> Zones:
+        """The next frame, in order; errors as for :meth:`Board.next`."""
+        timeout = checked(timeout)
+        item: Zones | ContactFPGAError = self._board._wait_for(self._pop, self._board.clock() + timeout, timeout)
+        if isinstance(item, ContactFPGAError):
+            raise item
+        return item
+
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
+        """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
+        board, until = self._board, self._board.clock() + max_s
+        self._wait(timeout)
+        if board._transport.live:  # of a recording, what was read at once
+            with contextlib.suppress(ReadTimeout, PortLost):  # whatever is lost, the next call says so
+                board._wait_for(lambda: None, until, max_s)
+        with board._changed:
+            frames = []
+            while self._items and isinstance(item := self._items[0], Zones):
+                frames.append(item)
+                self._items.popleft()
+        return Batch.of(frames or [self.next(timeout)])
+
+    def close(self) -> None:
+        """Take no more frames."""
+        with self._board._changed:
+            self._closed = True
+            self._board._subscriptions.discard(self)
+            self._items.clear()
+            self._board._changed.notify_all()
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Zones]:
+        while True:
+            try:
+                yield self.next()
+            except ReplayEnded:
+                return
+
+    async def __aiter__(self) -> AsyncIterator[Zones]:
+        while True:
+            try:
+                if self._items:
+                    await asyncio.sleep(0)  # others get their turn
+                else:
+                    await asyncio.to_thread(self._wait, 1.0)
+                yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
+            except ReplayEnded:
+                return
+
+    def _wait(self, timeout: float) -> None:
+        timeout = checked(timeout)
+        self._board._wait_for(lambda: True if self._items else None, self._board.clock() + timeout, timeout)
+
+    def _pop(self) -> Zones | ContactFPGAError | None:
+        if self._closed:
+            raise BoardClosed(f"{self._board.port}: this subscription was closed; subscribe again")
+        return self._items.popleft() if self._items else None
+
+    # ---- for the board
+
+    def put(self, item: Zones | ContactFPGAError) -> None:
+        """Add what came; the board's lock is held."""
+        self._items.append(item)
+        while len(self._items) > self.maxsize:
+            self.dropped += isinstance(self._items.popleft(), Zones)
+
+    def put_back(self, zones: Zones) -> None:
+        """Have this frame come next."""
+        with self._board._changed:
+            self._items.appendleft(zones)
+
+    def skip_to(self, zones: Zones) -> None:
+        """Drop this frame and all that came before it."""
+        with self._board._changed:
+            while zones in self._items:
+                self._items.popleft()
+
+    def keep_last(self) -> None:
+        """Drop all frames but the last one; raises what a hello gave cause for."""
+        with self._board._changed:
+            while len(self._items) > 1:
+                if isinstance(item := self._items.popleft(), ContactFPGAError):
+                    raise item
+
+    def raise_first(self) -> None:
+        """Raise what a hello gave cause for before the first frame."""
+        with self._board._changed:
+            if self._items and isinstance(item := self._items[0], ContactFPGAError):
+                raise item
+
+
+def checked(timeout: float) -> float:
+    """A timeout in seconds as a float; raises ValueError unless it is positive and finite."""
+    if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0 < timeout < math.inf:
+        raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
+    return float(timeout)
