@@ -93,9 +93,8 @@ class Timeline:
             if before.heard and not frame.heard:
                 self._restarted = True
                 return None
-            of_old = frame.heard and frame.heard == before.heard
-            if self._gap(frame) and frame.time_us < BEGUN_US and not of_old:
-                return None  # a frame was lost, or it is one of the first since a restart
+            if self._gap(frame) and frame.time_us < BEGUN_US and frame.heard != before.heard:
+                return None  # a frame was lost, or this is one of the first since a restart
         if self._time_us is None:  # from one epoch before the hello's to three after it
             first_us = (self._epoch - 1) * _EPOCH_US
             time_us = first_us + (frame.time_us - first_us) % _WRAP_US
