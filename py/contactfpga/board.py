@@ -8,7 +8,6 @@ import threading
 import weakref
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import TypeVar
 
 from contactfpga.batch import Batch
 from contactfpga.conversation import Arrival, Conversation, Event
@@ -24,7 +23,7 @@ from contactfpga.protocol import Hello
 from contactfpga.sheet import Sheet
 from contactfpga.skin import Skin
 from contactfpga.stats import Stats
-from contactfpga.subscription import Subscription, checked
+from contactfpga.subscription import Subscription, checked, frame_of
 from contactfpga.transport import Transport
 from contactfpga.zone import Zones
 
@@ -37,7 +36,8 @@ TURN_S = 0.05
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, during which :meth:`Board.close` has to wait."""
 
-T = TypeVar("T")
+Found = Zones | ContactFPGAError | Hello | bool
+"""What is waited for."""
 
 
 class _Waiter:
@@ -46,6 +46,10 @@ class _Waiter:
     def __init__(self, ticket: int):
         self.ticket = ticket
         self.found: Zones | ContactFPGAError | None = None
+
+    def look(self) -> Zones | ContactFPGAError | None:
+        """What has been found by now."""
+        return self.found
 
 
 class Board:
@@ -160,14 +164,13 @@ class Board:
             self._waiters.append(waiter)
         try:
             self._send()
-            found: Zones | ContactFPGAError = self._wait_for(lambda: waiter.found, deadline, timeout)
+            found = self._wait_for(waiter.look, deadline, timeout)
         finally:
             with self._changed:
                 self._waiters.remove(waiter)
-        if isinstance(found, ContactFPGAError):
-            raise found
-        self._frames.skip_to(found)
-        return found
+        zones = frame_of(found)
+        self._frames.skip_to(zones)
+        return zones
 
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`.
@@ -248,7 +251,7 @@ class Board:
         if self._closing:
             raise BoardClosed(f"{self.port} was closed; open it again")
 
-    def _wait_for(self, found: Callable[[], T | None], deadline: float, timeout: float) -> T:
+    def _wait_for(self, found: Callable[[], Found | None], deadline: float, timeout: float) -> Found:
         """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline.
 
         A port's bytes are read by a thread of its own. Where time passes only while it is read (``sim://``) or all is

@@ -10,8 +10,8 @@ from contactfpga import protocol
 from contactfpga.widths import HEARD_BITS
 
 MOST_APART = 5
-"""Steps between the last number that a frame repeated and the last one sent with which another one may be sent: frames on
-their way carry at most six numbers then, and the next one is the seventh."""
+"""Steps between the last number that a frame repeated and the last one sent with which another one may be sent: frames
+on their way carry at most six numbers then, and the next one is the seventh."""
 
 _LOWS = (1 << HEARD_BITS) - 1
 """A number's lowest bits go round through 1 to this."""

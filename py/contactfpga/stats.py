@@ -13,8 +13,8 @@ class Stats:
     frames: int = 0
     """Frames received whole and passed on."""
     lost: int = 0
-    """Frames the board sent that did not arrive whole: from the gaps in their sequence numbers, and exact at each hello,
-    which tells how many frames the board has sent."""
+    """Frames the board sent that did not arrive whole: from the gaps in their sequence numbers, and exact at each
+    hello, which tells how many frames the board has sent."""
     unexplained: int = 0
     """Frames received whole and not passed on, as their times could not be known before the next hello: those after a
     pause of the line, or of a board whose restart nothing has told of yet."""

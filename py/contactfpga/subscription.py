@@ -36,10 +36,7 @@ class Subscription:
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order; errors as for :meth:`Board.next`."""
         timeout = checked(timeout)
-        item: Zones | ContactFPGAError = self._board._wait_for(self._pop, self._board.clock() + timeout, timeout)
-        if isinstance(item, ContactFPGAError):
-            raise item
-        return item
+        return frame_of(self._board._wait_for(self._pop, self._board.clock() + timeout, timeout))
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
@@ -127,6 +124,14 @@ class Subscription:
         with self._board._changed:
             if self._items and isinstance(item := self._items[0], ContactFPGAError):
                 raise item
+
+
+def frame_of(found: object) -> Zones:
+    """The frame that was waited for; raises the error that came in its place."""
+    if isinstance(found, ContactFPGAError):
+        raise found
+    assert isinstance(found, Zones)
+    return found
 
 
 def checked(timeout: float) -> float:

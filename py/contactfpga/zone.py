@@ -135,6 +135,7 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def suspects(self) -> list[bool]:
+        """:attr:`Zone.ghost` of each of :attr:`records`."""
         if not self.sheet.ghosts:
             return [False] * len(self)
         if self._labels is None:
@@ -208,6 +209,7 @@ class Zones(Sequence[Zone]):
 
     @functools.cached_property
     def records(self) -> np.ndarray:
+        """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
         if self._labels is not None:
             return labels.moments(self._labels)
         return self.frame.moments if self.frame.barycenters is None else self.frame.barycenters

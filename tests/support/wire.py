@@ -65,7 +65,7 @@ def undigits(data) -> int:
 
 
 def fingerprint(skin) -> bytes:
-    """Of the fields that differ from their defaults, but for the name and a capacity that is the default of the sheet."""
+    """Of the fields that differ from their defaults, but for the name and a capacity that is the sheet's default."""
     values = asdict(skin)
     changed = {
         field.name: values[field.name]
