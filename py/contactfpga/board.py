@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import threading
-import weakref
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
 
 from contactfpga.batch import Batch
-from contactfpga.conversation import Arrival, Conversation, Event
-from contactfpga.errors import (
-    BoardClosed,
-    BoardSilent,
-    ContactFPGAError,
-    OnlyNoise,
-    ReadTimeout,
-    ReplayEnded,
-)
-from contactfpga.protocol import Hello
+from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.hello import Hello
+from contactfpga.link import Link
 from contactfpga.sheet import Sheet
 from contactfpga.skin import Skin
 from contactfpga.stats import Stats
@@ -29,27 +19,6 @@ from contactfpga.zone import Zones
 
 QUEUE = 16_384
 """Frames that wait for :meth:`Board.next` at most."""
-
-TURN_S = 0.05
-"""The reader looks this often whether the board was closed."""
-
-SIMULATED_TURN_S = 0.002
-"""The most simulated time that passes in one turn, during which :meth:`Board.close` has to wait."""
-
-Found = Zones | ContactFPGAError | Hello | bool
-"""What is waited for."""
-
-
-class _Waiter:
-    """A call of :meth:`Board.read` that waits for its frame."""
-
-    def __init__(self, ticket: int):
-        self.ticket = ticket
-        self.found: Zones | ContactFPGAError | None = None
-
-    def look(self) -> Zones | ContactFPGAError | None:
-        """What has been found by now."""
-        return self.found
 
 
 class Board:
@@ -61,37 +30,30 @@ class Board:
     """
 
     def __init__(self, transport: Transport, skin: Skin | None = None):
-        self._transport = transport
         self._expected = skin
-        self._conversation = Conversation(transport.name, skin, transport.live)
-        self._changed = threading.Condition()
-        self._sending = threading.Lock()
-        self._subscriptions: weakref.WeakSet[Subscription] = weakref.WeakSet()
-        self._waiters: list[_Waiter] = []
-        self._failure: BaseException | None = None
-        self._closing = False
-        self._turning: int | None = None  # the thread that reads
-        self._frames = Subscription(self, QUEUE)
-        self._subscriptions.add(self._frames)
-        if transport.threaded:
-            threading.Thread(
-                target=_read_all, args=(weakref.ref(self), transport), name=f"reader of {transport.name}", daemon=True
-            ).start()
+        self._live = transport.live
+        self._threaded = transport.threaded
+        self._link = Link(transport, skin)
+        self._frames = Subscription(self._link, QUEUE)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_link"):
+            self._link.abandon()
 
     # ---- what is known of the board
 
     @property
     def port(self) -> str:
         """Name of the port."""
-        return self._transport.name
+        return self._link.transport.name
 
     @property
     def hello(self) -> Hello:
         """What the board said of itself last; it does so twice a second."""
-        self._check_open()
-        if self._conversation.hello is None:
+        self._link.check_open()
+        if self._link.conversation.hello is None:
             raise ContactFPGAError(f"{self.port}: no hello has come yet")
-        return self._conversation.hello
+        return self._link.conversation.hello
 
     @property
     def sheet(self) -> Sheet:
@@ -137,14 +99,13 @@ class Board:
     @property
     def stats(self) -> Stats:
         """Counters since the port was opened."""
-        stats = self._conversation.stats
+        stats = self._link.conversation.stats
         stats.dropped = self._frames.dropped
         return stats
 
     def clock(self) -> float:
         """Seconds on the clock that timeouts run on: ``time.monotonic``; of ``sim://`` the simulated one."""
-        self._check_open()
-        return self._transport.clock()
+        return self._link.clock()
 
     # ---- frames
 
@@ -155,20 +116,9 @@ class Board:
         :class:`SkinMismatch`, :class:`VersionMismatch`.
         """
         timeout = checked(timeout)
-        if not self._transport.live:
+        if not self._live:
             return self.next(timeout)
-        deadline = self.clock() + timeout
-        with self._changed:
-            self._check_open()
-            waiter = _Waiter(self._conversation.ask(self._transport.clock(), deadline))
-            self._waiters.append(waiter)
-        try:
-            self._send()
-            found = self._wait_for(waiter.look, deadline, timeout)
-        finally:
-            with self._changed:
-                self._waiters.remove(waiter)
-        zones = frame_of(found)
+        zones = frame_of(self._link.read(timeout))
         self._frames.skip_to(zones)
         return zones
 
@@ -184,9 +134,9 @@ class Board:
 
         Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
         """
-        if self._transport.live:
-            if not self._transport.threaded:
-                self._take_what_came()
+        if self._live:
+            if not self._threaded:
+                self._link.take_what_came()
             self._frames.keep_last()
         return self._frames.next(timeout)
 
@@ -199,19 +149,17 @@ class Board:
 
     def subscribe(self, maxsize: int = 1024) -> Subscription:
         """A queue of its own for every frame from now on; see :class:`Subscription`."""
-        self._check_open()
-        subscription = Subscription(self, maxsize)
-        with self._changed:
-            self._subscriptions.add(subscription)
-        return subscription
+        self._link.check_open()
+        return Subscription(self._link, maxsize, self)
 
     def __iter__(self) -> Iterator[Zones]:
         """Every frame, for ever; a recording ends."""
-        return iter(self._frames)
+        yield from self._frames
 
-    def __aiter__(self) -> AsyncIterator[Zones]:
+    async def __aiter__(self) -> AsyncIterator[Zones]:
         """The same in ``async for``."""
-        return aiter(self._frames)
+        async for zones in self._frames:
+            yield zones
 
     # ---- its end
 
@@ -225,144 +173,15 @@ class Board:
 
     def close(self) -> None:
         """Give the port back; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
-        with self._changed:
-            self._closing = True
-            self._changed.notify_all()
-            if self._turning != threading.get_ident():  # else a scene's callback closes, and its turn does the rest
-                while self._turning is not None:
-                    self._changed.wait(1.0)
-                with self._sending:
-                    self._transport.close()
+        self._link.close()
 
     def greet(self, timeout: float) -> None:
         """Wait for the hello without which no frame can be read; keep the frame that answers for :meth:`next`."""
-        if self._transport.live:
+        if self._live:
             self._frames.put_back(self.read(timeout))
             return
         try:
-            self._wait_for(lambda: self._conversation.hello, math.inf, timeout)
+            self._link.wait_for(lambda: self._link.conversation.hello, math.inf, timeout)
         except ReplayEnded:
             raise ContactFPGAError(f"{self.port} holds no hello; its frames cannot be read") from None
         self._frames.raise_first()
-
-    # ---- the reader
-
-    def _check_open(self) -> None:
-        if self._closing:
-            raise BoardClosed(f"{self.port} was closed; open it again")
-
-    def _wait_for(self, found: Callable[[], Found | None], deadline: float, timeout: float) -> Found:
-        """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline.
-
-        A port's bytes are read by a thread of its own. Where time passes only while it is read (``sim://``) or all is
-        there (``replay://``), one of the threads that wait reads for all.
-        """
-        start = self.stats.bytes
-        with self._changed:
-            while True:
-                self._check_open()
-                if (result := found()) is not None:
-                    return result
-                if self._failure is not None:
-                    raise self._failure.with_traceback(None)
-                left = deadline - self._transport.clock()
-                if left <= 0:
-                    raise self._timed_out(timeout, start)
-                if self._transport.threaded or self._turning is not None:
-                    self._changed.wait(min(left, 1.0) if self._transport.threaded else TURN_S)
-                else:
-                    self._turn(min(left, SIMULATED_TURN_S))
-
-    def _turn(self, seconds: float) -> int:
-        """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
-        self._turning = threading.get_ident()
-        self._changed.release()
-        try:
-            data = self._transport.read(seconds)
-        finally:
-            self._changed.acquire()
-            self._turning = None
-            self._changed.notify_all()
-            if self._closing:
-                self._transport.close()
-        self._check_open()
-        self._take(data)
-        return len(data)
-
-    def _take(self, data: bytes) -> None:
-        for event in self._conversation.receive(data, self._transport.clock()):
-            self._pass_on(event)
-        self._changed.notify_all()
-        if not self._transport.threaded:
-            self._send()
-
-    def _take_what_came(self) -> None:
-        with self._changed:
-            self._check_open()
-            while self._turning is None and self._turn(0.0):
-                pass
-
-    def _pass_on(self, event: Event) -> None:
-        if isinstance(event, Hello):
-            return
-        item = event.zones if isinstance(event, Arrival) else event
-        for subscription in self._subscriptions:
-            subscription.put(item)
-        for waiter in self._waiters:
-            if waiter.found is not None:
-                continue
-            if isinstance(event, Arrival):
-                waiter.found = event.zones if event.answers >= waiter.ticket else None
-            elif self._conversation.sheet is None:  # another Skin that can be read is no trouble for a new frame
-                waiter.found = event
-
-    def _send(self) -> None:
-        with self._changed:
-            data = self._conversation.data_to_send()
-        if data:
-            with self._sending:
-                self._check_open()
-                self._transport.write(data)
-
-    def _timed_out(self, timeout: float, start: int) -> ReadTimeout:
-        stats = self._conversation.stats
-        head = f"{self.port}: no frame within {timeout:g} s"
-        if stats.bytes == start:
-            return BoardSilent(
-                f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
-                f"`contactfpga doctor {self.port}` checks"
-            )
-        seen = f"{stats.bytes - start} bytes came"
-        if not stats.frames and not stats.hellos:
-            damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
-            return OnlyNoise(
-                f"{head}; {seen}, but no valid packet ({damaged}); is the baud rate the Skin's, "
-                "and is this a contactfpga board?"
-            )
-        return ReadTimeout(
-            f"{head}; {seen}, {stats.hellos} hellos and {stats.frames} frames since the port was opened; "
-            "give it a longer timeout, or send less to the board"
-        )
-
-
-def _read_all(board: weakref.ref[Board], transport: Transport) -> None:
-    """What the reader thread of a port does, until the board is closed or nobody holds it any more."""
-    while True:
-        held = board()
-        if held is None:
-            transport.close()
-            return
-        with held._changed:
-            if held._closing:
-                return
-            try:
-                held._turn(TURN_S)
-            except BoardClosed:
-                return
-            except BaseException as error:  # whoever calls next gets it
-                held._failure = error
-                held._changed.notify_all()
-                return
-        with contextlib.suppress(ContactFPGAError):  # the next read says so
-            held._send()
-        del held

@@ -15,6 +15,7 @@ from contactfpga.zone import Zones
 
 if TYPE_CHECKING:
     from contactfpga.board import Board
+    from contactfpga.link import Link
 
 
 class Subscription:
@@ -23,29 +24,32 @@ class Subscription:
     ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`.
     """
 
-    def __init__(self, board: Board, maxsize: int):
+    def __init__(self, link: Link, maxsize: int, board: Board | None = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
         self.maxsize = maxsize
         self.dropped = 0
         """Frames that were not taken in time."""
-        self._board = board
+        self._link = link
+        self._board = board  # stays open as long as someone may take frames here
         self._items: collections.deque[Zones | ContactFPGAError] = collections.deque()
         self._closed = False
+        with link.changed:
+            link.subscriptions.add(self)
 
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order; errors as for :meth:`Board.next`."""
         timeout = checked(timeout)
-        return frame_of(self._board._wait_for(self._pop, self._board.clock() + timeout, timeout))
+        return frame_of(self._link.wait_for(self._pop, self._link.clock() + timeout, timeout))
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
-        board, until = self._board, self._board.clock() + max_s
+        link, until = self._link, self._link.clock() + max_s
         self._wait(timeout)
-        if board._transport.live:  # of a recording, what was read at once
+        if link.transport.live:  # of a recording, what was read at once
             with contextlib.suppress(ReadTimeout, PortLost):  # whatever is lost, the next call says so
-                board._wait_for(lambda: None, until, max_s)
-        with board._changed:
+                link.wait_for(lambda: None, until, max_s)
+        with link.changed:
             frames = []
             while self._items and isinstance(item := self._items[0], Zones):
                 frames.append(item)
@@ -54,11 +58,11 @@ class Subscription:
 
     def close(self) -> None:
         """Take no more frames."""
-        with self._board._changed:
+        with self._link.changed:
             self._closed = True
-            self._board._subscriptions.discard(self)
+            self._link.subscriptions.discard(self)
             self._items.clear()
-            self._board._changed.notify_all()
+            self._link.changed.notify_all()
 
     def __enter__(self) -> Subscription:
         return self
@@ -86,11 +90,11 @@ class Subscription:
 
     def _wait(self, timeout: float) -> None:
         timeout = checked(timeout)
-        self._board._wait_for(lambda: True if self._items else None, self._board.clock() + timeout, timeout)
+        self._link.wait_for(lambda: True if self._items else None, self._link.clock() + timeout, timeout)
 
     def _pop(self) -> Zones | ContactFPGAError | None:
         if self._closed:
-            raise BoardClosed(f"{self._board.port}: this subscription was closed; subscribe again")
+            raise BoardClosed(f"{self._link.transport.name}: this subscription was closed; subscribe again")
         return self._items.popleft() if self._items else None
 
     # ---- for the board
@@ -103,25 +107,25 @@ class Subscription:
 
     def put_back(self, zones: Zones) -> None:
         """Have this frame come next."""
-        with self._board._changed:
+        with self._link.changed:
             self._items.appendleft(zones)
 
     def skip_to(self, zones: Zones) -> None:
         """Drop this frame and all that came before it."""
-        with self._board._changed:
+        with self._link.changed:
             while zones in self._items:
                 self._items.popleft()
 
     def keep_last(self) -> None:
         """Drop all frames but the last one; raises what a hello gave cause for."""
-        with self._board._changed:
+        with self._link.changed:
             while len(self._items) > 1:
                 if isinstance(item := self._items.popleft(), ContactFPGAError):
                     raise item
 
     def raise_first(self) -> None:
         """Raise what a hello gave cause for before the first frame."""
-        with self._board._changed:
+        with self._link.changed:
             if self._items and isinstance(item := self._items[0], ContactFPGAError):
                 raise item
 
