@@ -8,11 +8,25 @@ import pytest
 from cobs import cobs
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wire import HELLO, Wire, check, last_byte, seal
+from wire import (
+    FINGERPRINT,
+    HELLO,
+    NAME,
+    PITCH,
+    RATES,
+    SHEET,
+    STATE,
+    Wire,
+    check,
+    field,
+    last_byte,
+    old_frame,
+    old_hello,
+)
 
 from contactfpga import Skin, protocol
-from contactfpga.derived import Derived
-from contactfpga.protocol import PacketError
+from contactfpga.protocol import HelloReader, OldPacket, PacketError
+from contactfpga.widths import LONGEST_PACKET, Widths
 
 SLOW = {"settle_us": 1000.0}
 REFERENCE = Skin()
@@ -44,8 +58,8 @@ TRAILERS = st.fixed_dictionaries(
         "time": st.integers(0, (1 << 24) - 1),
         "sequence": st.integers(0, 255),
         "overwritten": st.integers(0, 15),
-        "stuck": st.integers(0, 7),
-        "flags": st.sampled_from([(), ("requested",)]),
+        "heard": st.integers(0, 7),
+        "flags": st.sampled_from([(), ("fault",)]),
     }
 )
 
@@ -53,7 +67,11 @@ TRAILERS = st.fixed_dictionaries(
 def decoded(packet, skin):
     assert packet.endswith(b"\0")
     assert packet.count(b"\0") == 1
-    return protocol.decode_frame(protocol.unseal(packet[:-1]), Derived(skin))
+    return protocol.decode_frame(unsealed(packet, skin), Widths(skin.sheet))
+
+
+def unsealed(packet, skin):
+    return protocol.unseal(packet.strip(b"\0"), protocol.check_prefix(skin))
 
 
 def fields(frame):
@@ -61,7 +79,7 @@ def fields(frame):
         "time": frame.time_us,
         "sequence": frame.sequence,
         "overwritten": frame.overwritten,
-        "stuck": frame.stuck,
+        "heard": frame.heard,
         "flags": tuple(sorted(frame.flags)),
     }
 
@@ -111,35 +129,72 @@ def test_bitmaps_arrive_exactly(data, skin, trailer):
     assert len(frame.moments) == 0
 
 
+NAMES = st.text(max_size=8).filter(lambda name: name.isprintable() and name == name.strip())
+
+
 @given(
-    skins() | skins(report="barycenter", barycenter_bits=0) | skins(report="barycenter", barycenter_bits=7),
+    skins() | skins(report="barycenter", barycenter_bits=0) | skins(report="cells", diodes="none"),
     st.sampled_from(["always", "on_change"]),
-    st.floats(0.015625, 1000.0, width=32),
+    st.floats(0.01, 1000.0),
+    NAMES,
+    st.fixed_dictionaries(
+        {"sent": st.integers(0, 2**49 - 1), "epoch": st.integers(0, 2**28 - 1), "stuck": st.integers(0, 7)}
+        | {"heard": st.integers(0, 2**21 - 1)}
+    ),
 )
-@settings(max_examples=100, deadline=None)
-def test_hellos_arrive(skin, send, pitch_y_mm):
-    skin = skin.replace(pitch_y_mm=pitch_y_mm)
-    if send == "on_change" and Derived(skin).frame_clocks < 100_000 * 12:
+@settings(max_examples=150, deadline=None)
+def test_hellos_arrive(skin, send, pitch_y_mm, name, state):
+    skin = skin.replace(pitch_y_mm=pitch_y_mm, name=name)
+    if send == "on_change" and skin.rows < 60:
         skin = skin.replace(send=send)
-    packet = Wire(skin).hello()
-    assert packet == protocol.encode_hello(skin)
-    assert len(packet) <= 32
-    hello = protocol.decode_hello(protocol.unseal(packet[:-1]))
-    assert hello.fingerprint == skin.fingerprint
-    told = hello.skin()
-    told_exactly = ("rows", "columns", "connectivity", "report", "barycenter_bits", "zone_capacity")
-    for name in (*told_exactly, "pitch_x_mm", "radius_mm"):
-        assert getattr(told, name) == getattr(skin, name)
-    assert told.pitch_y_mm == pytest.approx(skin.pitch_y_mm, rel=1e-6)
-    for name in ("area_bits", "sum_x_bits", "sum_y_bits", "zones_bits", "record_bytes", "trailer_bytes"):
-        assert getattr(Derived(told), name) == getattr(Derived(skin), name)
+    packet = Wire(skin).hello(**state)
+    assert packet == protocol.encode_hello(skin, **state)
+    hello = HelloReader().take(unsealed(packet, skin))
+    assert hello.sheet == skin.sheet
+    told = (hello.fingerprint, hello.name, hello.clock_hz, hello.baud, hello.send)
+    assert told == (skin.fingerprint, name, skin.clock_hz, skin.baud, skin.send)
+    assert {key: getattr(hello, key) for key in state} == state
 
 
-def test_a_cylinder_says_its_radius():
-    skin = Skin(surface="cylinder", radius_mm=123.4)
-    hello = protocol.decode_hello(protocol.unseal(protocol.encode_hello(skin)[:-1]))
-    assert hello.radius_mm == 123.4
-    assert hello.skin().surface == "cylinder"
+def test_a_hello_of_the_reference_skin_takes_81_bytes():
+    assert len(protocol.encode_hello(REFERENCE)) == 81
+
+
+def test_a_cylinder_says_its_radius_to_the_last_bit():
+    """A Skin whose columns nearly meet around the link, which a rounded radius would make meet."""
+    skin = Skin(rows=2, surface="cylinder", radius_mm=25.464791)
+    assert HelloReader().take(unsealed(protocol.encode_hello(skin), skin)).sheet.radius_mm == 25.464791
+
+
+def test_later_boards_can_say_more():
+    facts = WIRE.facts()
+    facts[SHEET] += b"more"
+    facts[RATES] += b"\0"
+    facts[99] = b"unheard of"
+    hello = HelloReader().take(WIRE.plain_hello(facts=facts, sent=7))
+    assert (hello.sheet, hello.sent, hello.fingerprint) == (REFERENCE.sheet, 7, REFERENCE.fingerprint)
+
+
+def test_a_hello_may_come_in_several_packets():
+    parts = WIRE.hello_fields(sent=300, facts=WIRE.facts() | {NAME: b"arm"})
+    for cut in range(1, len(parts)):
+        reader = HelloReader()
+        assert reader.take(b"".join(parts[:cut]) + last_byte(HELLO)) is None
+        hello = reader.take(b"".join(parts[cut:]) + last_byte(HELLO))
+        assert (hello.name, hello.sent) == ("arm", 300)
+
+
+def test_a_hello_whose_middle_was_lost_is_refused_and_the_next_one_is_taken():
+    parts = WIRE.hello_fields()
+    reader = HelloReader()
+    reader.take(b"".join(parts[:2]) + last_byte(HELLO))
+    with pytest.raises(PacketError) as caught:
+        reader.take(parts[-1] + last_byte(HELLO))
+    assert caught.value.reason == "crc"
+    with pytest.raises(PacketError, match="without its beginning"):
+        reader.take(parts[-1] + last_byte(HELLO))
+    reader.take(parts[0] + last_byte(HELLO))
+    assert reader.take(WIRE.plain_hello()).sheet == REFERENCE.sheet
 
 
 @given(st.binary(max_size=700) | st.lists(st.sampled_from([b"\0", b"a" * 253, b"b" * 254, b"c"])).map(b"".join))
@@ -178,7 +233,7 @@ def test_bytes_of_a_barycenter_on_the_wire(size, zone_bytes):
 
 def refusal(plain, skin=REFERENCE):
     with pytest.raises(PacketError) as caught:
-        protocol.decode_frame(protocol.unseal(seal(plain)[:-1]), Derived(skin))
+        protocol.decode_frame(plain, Widths(skin.sheet))
     return caught.value
 
 
@@ -204,7 +259,7 @@ def unused_bits(plain, index):
         (WIRE.plain_zones(ONE)[1:], REFERENCE, "length"),
         (b"\0" + WIRE.plain_zones(ONE), REFERENCE, "length"),
         (WIRE.plain_zones([])[1:], REFERENCE, "length"),
-        (last_byte(1), REFERENCE, "length"),
+        (last_byte(5), REFERENCE, "length"),
         (WIRE.plain_zones(ONE, flags=["overflow"]), REFERENCE, "length"),
         (Wire(FULL).plain_zones(ONE * 2, zones=3, cells=12), FULL, "length"),
         (Wire(FULL).plain_zones(ONE, zones=3, cells=12, flags=["overflow"]), FULL, "length"),
@@ -222,7 +277,7 @@ def unused_bits(plain, index):
         (unused_bits(WIRE.plain_zones(ONE), 3), REFERENCE, "content"),
         (WIRE.plain_cells([[0] * 16] * 16), REFERENCE, "kind"),
         (WIRE.plain_hello(), REFERENCE, "kind"),
-        (WIRE.plain_zones(ONE)[:-1] + last_byte(3), REFERENCE, "kind"),
+        (WIRE.plain_zones(ONE)[:-1] + last_byte(9), REFERENCE, "kind"),
         (Wire(DIVIDED).plain_zones([(16, 0, 0)], cells=0), DIVIDED, "content"),
         (Wire(DIVIDED).plain_zones([(1, 9, 0)]), DIVIDED, "content"),
         (Wire(DIVIDED).plain_zones([(1, 0, 5)]), DIVIDED, "content"),
@@ -253,68 +308,97 @@ def test_all_cells_of_a_sheet_are_sent_as_0_where_that_saves_a_bit():
         skin = Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=0, **SLOW)
         area = rows * columns
         plain = Wire(skin).plain_zones([(area, columns - 1, 0)])
-        assert plain[0] & (1 << Derived(skin).record_bits[0]) - 1 == record
-        assert decoded(seal(plain), skin).barycenters.tolist() == [[area, columns - 1, 0]]
+        assert plain[0] & (1 << Widths(skin.sheet).record_bits[0]) - 1 == record
+        assert decoded(Wire(skin).seal(plain), skin).barycenters.tolist() == [[area, columns - 1, 0]]
 
 
-@pytest.mark.parametrize("version", [0, 2, 7])
-def test_another_version_says_which(version):
-    error = refusal(WIRE.plain_zones(ONE, version=version))
-    assert (error.reason, error.version) == ("version", version)
-    assert f"version {version}" in str(error)
+@pytest.mark.parametrize(("packet", "hello"), [(old_hello(), True), (old_frame(), False)])
+def test_packets_of_protocol_1_say_so(packet, hello):
+    with pytest.raises(OldPacket) as caught:
+        protocol.unseal(packet[:-1], protocol.check_prefix(REFERENCE))
+    assert caught.value.hello == hello
 
 
-UNKNOWN = (0x0A, 0x50, 0xD0, 0xFF)
-"""Options that no board says: divided cells, 9 fraction bits, and bits without meaning."""
+def test_frames_of_a_board_with_another_skin_fail_their_check():
+    other = REFERENCE.replace(pitch_x_mm=20.0)
+    with pytest.raises(PacketError) as caught:
+        protocol.unseal(Wire(other).zones(ONE)[:-1], protocol.check_prefix(REFERENCE))
+    assert caught.value.reason == "crc"
+
+
+def changed(kind, value):
+    return WIRE.plain_hello(facts=WIRE.facts() | {kind: value})
+
+
+def without(kind):
+    return WIRE.plain_hello(facts={key: value for key, value in WIRE.facts().items() if key != kind})
+
+
+def with_byte(data, index, value):
+    return data[:index] + bytes([value]) + data[index + 1 :]
+
+
+SIZES = WIRE.facts()[SHEET]
+STATE_DIGIT = len(field(SHEET, SIZES)) + 2
 
 
 @pytest.mark.parametrize(
     ("plain", "reason"),
     [
-        (WIRE.plain_hello()[1:], "length"),
-        (WIRE.plain_hello() + last_byte(HELLO), "length"),
-        *((WIRE.plain_hello()[:2] + bytes([options]) + WIRE.plain_hello()[3:], "content") for options in UNKNOWN),
+        (WIRE.plain_hello()[:-2] + last_byte(HELLO), "length"),
+        (WIRE.plain_hello()[:-1] + b"\x07\x01x" + last_byte(HELLO), "length"),
+        (WIRE.plain_hello()[:-1] + b"\x07" + last_byte(HELLO), "length"),
+        (WIRE.plain_hello()[1:], "content"),
+        (last_byte(HELLO), None),
+        *((with_byte(WIRE.plain_hello(), index, 0x42), "crc") for index in (9, 35, 50, -3)),
+        *((without(kind), "content") for kind in (PITCH, FINGERPRINT, RATES)),
+        (b"".join(part for part in WIRE.hello_fields() if part[0] != STATE) + last_byte(HELLO), "content"),
+        (with_byte(WIRE.plain_hello(), STATE_DIGIT, 0x42), "content"),
+        (changed(SHEET, SIZES[:-1]), "content"),
+        (changed(FINGERPRINT, b"short"), "content"),
+        *((changed(SHEET, with_byte(SIZES, 0, rows)), "content") for rows in (0, 65, 255)),
+        *((changed(SHEET, with_byte(SIZES, 1, columns)), "content") for columns in (0, 65, 255)),
+        *((changed(SHEET, with_byte(SIZES, 2, connectivity)), "content") for connectivity in (0, 6)),
+        *((changed(SHEET, with_byte(SIZES, 3, report)), "content") for report in (3, 255)),
+        *((changed(SHEET, with_byte(SIZES, 4, bits)), "content") for bits in (4, 255)),
+        *((changed(SHEET, with_byte(SIZES, index, 2)), "content") for index in (5, 8)),
+        *((changed(SHEET, with_byte(SIZES, 6, capacity)), "content") for capacity in (0, 65)),
+        *((changed(PITCH, struct.pack("<dd", pitch, 1.0)), "content") for pitch in (float("nan"), np.inf, 0.0, -1.0)),
+        (changed(4, struct.pack("<d", -40.0)), "content"),
+        (changed(RATES, struct.pack("<II", 0, 9600)), "content"),
+        (changed(NAME, b"\xff"), "content"),
     ],
 )
 def test_hellos_that_cannot_be(plain, reason):
+    if reason is None:
+        assert HelloReader().take(plain) is None
+        return
     with pytest.raises(PacketError) as caught:
-        protocol.decode_hello(protocol.unseal(seal(plain)[:-1]))
+        HelloReader().take(plain)
     assert caught.value.reason == reason
 
 
-@pytest.mark.parametrize("rows", [0, 65, 255])
-def test_a_hello_of_an_impossible_skin_is_refused_by_the_receiver(rows):
-    from contactfpga.receiver import Receiver
-
-    plain = bytes([rows]) + WIRE.plain_hello()[1:]
-    receiver = Receiver("x")
-    receiver.feed(WIRE.zones([]) + seal(plain), 0.0)
-    assert receiver.hello is None
-    assert receiver.stats.damaged == {"content": 1}
-
-
-@pytest.mark.parametrize("pitch", [float("nan"), float("inf"), 0.0, -1.0])
-def test_a_hello_without_a_usable_pitch_is_refused(pitch):
-    from contactfpga.receiver import Receiver
-
-    plain = WIRE.plain_hello()
-    receiver = Receiver("x")
-    receiver.feed(WIRE.zones([]) + seal(plain[:5] + struct.pack("<f", pitch) + plain[9:]), 0.0)
-    assert receiver.hello is None
-    assert receiver.stats.damaged == {"content": 1}
+def test_no_packet_is_longer_than_the_reader_expects():
+    longest = 0
+    for rows, columns in ((64, 64), (64, 63), (1, 64), (33, 64)):
+        for report in ("moments", "cells", "barycenter"):
+            skin = Skin(rows=rows, columns=columns, connectivity=4, report=report, settle_us=10_000.0)
+            capacity = skin.max_zones() if report != "cells" else None
+            longest = max(longest, Widths(skin.replace(zone_capacity=capacity).sheet).max_frame_bytes)
+    assert longest == LONGEST_PACKET
 
 
 @pytest.mark.parametrize("packet", [b"", b"\x01", b"\x80\x80\x80", b"\x01\x80\x80\x80"])
 def test_packets_too_short_to_be_one(packet):
     with pytest.raises(PacketError) as caught:
-        protocol.unseal(packet)
+        protocol.unseal(packet, b"")
     assert caught.value.reason == "framing"
 
 
-@pytest.mark.parametrize("stuffed", [b"\x05abc", b"\x01\x01\x09", b"\xff" + b"a" * 253])
+@pytest.mark.parametrize("stuffed", [b"\x05ab\x40", b"\x01\x01\x49", b"\xff" + b"A" * 253])
 def test_blocks_that_do_not_fit(stuffed):
     with pytest.raises(PacketError) as caught:
-        protocol.unseal(stuffed + check(stuffed))
+        protocol.unseal(stuffed + check(stuffed), b"")
     assert caught.value.reason == "framing"
 
 
@@ -324,5 +408,5 @@ def test_a_wrong_check_byte_is_told_apart():
         wrong = bytearray(packet)
         wrong[index] ^= 0x40
         with pytest.raises(PacketError) as caught:
-            protocol.unseal(bytes(wrong))
+            protocol.unseal(bytes(wrong), WIRE.prefix)
         assert caught.value.reason == "crc"

@@ -1,7 +1,10 @@
 """Contact zones of a switch-matrix skin, from an FPGA to Python."""
 
-from contactfpga.driver import Board, open, read_zones
+from contactfpga.batch import Batch
+from contactfpga.board import Board
+from contactfpga.driver import open, read_zones
 from contactfpga.errors import (
+    BoardClosed,
     BoardSilent,
     ContactFPGAError,
     MissingExtra,
@@ -14,14 +17,20 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
-from contactfpga.receiver import Stats
+from contactfpga.hello import Hello
+from contactfpga.sheet import Sheet
 from contactfpga.skin import Skin, SkinError
+from contactfpga.stats import Stats
+from contactfpga.subscription import Subscription
 from contactfpga.zone import Zone, Zones
 
 __all__ = [
+    "Batch",
     "Board",
+    "BoardClosed",
     "BoardSilent",
     "ContactFPGAError",
+    "Hello",
     "MissingExtra",
     "MissingTool",
     "OnlyNoise",
@@ -29,10 +38,12 @@ __all__ = [
     "PortNotFound",
     "ReadTimeout",
     "ReplayEnded",
+    "Sheet",
     "Skin",
     "SkinError",
     "SkinMismatch",
     "Stats",
+    "Subscription",
     "VersionMismatch",
     "Zone",
     "Zones",

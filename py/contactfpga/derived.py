@@ -6,30 +6,30 @@ import functools
 import math
 from typing import TYPE_CHECKING
 
+from contactfpga.framing import CHECK_BYTES as CHECK_BYTES
+from contactfpga.widths import HEARD_BITS as HEARD_BITS
+from contactfpga.widths import SEQUENCE_BITS as SEQUENCE_BITS
+from contactfpga.widths import TIME_BITS as TIME_BITS
+from contactfpga.widths import Widths
+
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can be late behind a frame and still come every second."""
 
-TIME_BITS = 24
-SEQUENCE_BITS = 8
-HEARD_BITS = 3
-"""Of a request's number, in each frame."""
 EPOCH_BITS = 22
 """The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
 STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
 """The stuck-line counter stops here."""
 
-MIN_OVERWRITTEN_BITS = 4
-CHECK_BYTES = 3
 
-
-class Derived:
+class Derived(Widths):
     """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
 
     def __init__(self, skin: Skin):
+        super().__init__(skin.sheet)
         self.skin = skin
 
     # ---- times, in clocks unless named otherwise
@@ -197,51 +197,6 @@ class Derived:
         """Of a count of row times in which a debounce time, and two frames more, can be told."""
         return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
 
-    @functools.cached_property
-    def cells(self) -> int:
-        return self.skin.rows * self.skin.columns
-
-    @functools.cached_property
-    def zone_capacity(self) -> int:
-        assert self.skin.zone_capacity is not None
-        return self.skin.zone_capacity
-
-    @functools.cached_property
-    def area_bits(self) -> int:
-        return self.cells.bit_length()
-
-    @functools.cached_property
-    def sum_x_bits(self) -> int:
-        return max(1, (self.skin.rows * math.comb(self.skin.columns, 2)).bit_length())
-
-    @functools.cached_property
-    def sum_y_bits(self) -> int:
-        return max(1, (self.skin.columns * math.comb(self.skin.rows, 2)).bit_length())
-
-    @functools.cached_property
-    def zones_bits(self) -> int:
-        return self.skin.max_zones().bit_length()
-
-    @functools.cached_property
-    def record_bits(self) -> tuple[int, int, int]:
-        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter.
-
-        An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
-        sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
-        """
-        if self.skin.report != "barycenter":
-            return self.area_bits, self.sum_x_bits, self.sum_y_bits
-        x_bits, y_bits = (
-            max(1, (lines - 1 << self.skin.barycenter_bits).bit_length())
-            for lines in (self.skin.columns, self.skin.rows)
-        )
-        return max(1, (self.cells - 1).bit_length()), x_bits, y_bits
-
-    @functools.cached_property
-    def record_bytes(self) -> int:
-        """Bytes of one zone on the wire."""
-        return math.ceil(sum(self.record_bits) / 8)
-
     @property
     def cell_bits(self) -> int:
         """Of a whole number of cells that a barycenter can be away from the origin, along the longer side."""
@@ -257,45 +212,6 @@ class Derived:
         """The most clocks from an item to the next while many wait."""
         divided = self.quotient_bits + 1 if self.skin.report == "barycenter" else 0
         return max(self.item_bytes, divided)
-
-    @functools.cached_property
-    def bitmap_row_bytes(self) -> int:
-        """Bytes of one row on the wire with ``report = "cells"``."""
-        return math.ceil(self.skin.columns / 8)
-
-    @functools.cached_property
-    def trailer_bytes(self) -> int:
-        """Bytes that close a frame, its kind byte among them."""
-        return math.ceil((self._counted_bits + MIN_OVERWRITTEN_BITS) / 8) + 1
-
-    @functools.cached_property
-    def overwritten_bits(self) -> int:
-        """What the other fields leave of the trailer: four bits or more."""
-        return 8 * (self.trailer_bytes - 1) - self._counted_bits
-
-    @property
-    def _counted_bits(self) -> int:
-        return TIME_BITS + SEQUENCE_BITS + HEARD_BITS + self.area_bits + self.zones_bits
-
-    @functools.cached_property
-    def item_bytes(self) -> int:
-        """Bytes of one item of a frame: a zone or a bitmap row."""
-        return self.bitmap_row_bytes if self.skin.report == "cells" else self.record_bytes
-
-    @functools.cached_property
-    def max_items(self) -> int:
-        return self.skin.rows if self.skin.report == "cells" else self.zone_capacity
-
-    @functools.cached_property
-    def max_stored_bytes(self) -> int:
-        """The longest frame as the board keeps it: items and trailer, stuffed."""
-        plain = self.max_items * self.item_bytes + self.trailer_bytes
-        return plain + math.ceil(plain / 254)
-
-    @functools.cached_property
-    def max_frame_bytes(self) -> int:
-        """The longest frame on the wire: with its check bytes and its delimiter."""
-        return self.max_stored_bytes + CHECK_BYTES + 1
 
     # ---- sizes of tables and chains
 

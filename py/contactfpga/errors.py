@@ -19,6 +19,10 @@ class PortLost(ContactFPGAError):
     """The port was there and is gone: unplugged, or its other end closed it."""
 
 
+class BoardClosed(ContactFPGAError):
+    """A board was used after it was closed."""
+
+
 class ReadTimeout(ContactFPGAError, TimeoutError):
     """The board answered, but no complete frame came in time."""
 

@@ -23,11 +23,13 @@ missed as long as no switch changes twice between two frames.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import Counter
 
 import numpy as np
 
+from contactfpga import labels
 from contactfpga.protocol import Frame
 
 
@@ -57,6 +59,26 @@ def zones(frame: Frame, before: Frame | None = None) -> list[bool]:
         return [len(moments) > 1] * len(moments)
     xs, ys = _middles(moments)
     return [ys[_reduced(y, area)] > 1 and xs[_reduced(x, area)] > 1 for area, x, y in moments]
+
+
+def labelled(frame: Frame, before: Frame | None, numbers: np.ndarray) -> list[bool]:
+    """For each zone of a frame with ``report = "cells"`` whether it may be wholly made of ghosts; ``numbers``: those of
+    the zones, cell by cell, from 1.
+
+    With 8-connectivity a zone may hold several parts that share no edge, and it may be so made if all of these may.
+    """
+    assert frame.bitmap is not None
+    parts = labels.label(frame.bitmap, 4)
+    found = zones(_as_moments(frame, parts), None if before is None else _as_moments(before))
+    real = ~np.array([False, *found])[parts] & (numbers > 0)
+    return [not real[numbers == number].any() for number in range(1, int(numbers.max(initial=0)) + 1)]
+
+
+def _as_moments(frame: Frame, parts: np.ndarray | None = None) -> Frame:
+    """The same with the zones of 4-connectivity, which its bitmap tells."""
+    if frame.bitmap is None:
+        return frame
+    return dataclasses.replace(frame, moments=labels.moments(labels.label(frame.bitmap, 4) if parts is None else parts))
 
 
 def spread(frame: Frame, before: Frame | None = None) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import math
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from contactfpga import limits
 from contactfpga.cover import Cover, CoverError, table
 from contactfpga.errors import SkinError
+from contactfpga.sheet import Sheet, max_zones
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -24,8 +24,8 @@ class Skin:
     """
 
     name: str = ""
-    """What the board calls itself: at most 32 bytes of UTF-8. It tells boards of one Skin apart and is in the bitstream,
-    but not in the fingerprint."""
+    """What the board calls itself: at most 32 bytes of UTF-8. It tells boards of one Skin apart and is in the
+    bitstream, but not in the fingerprint."""
 
     rows: int = 16
     """Driven lines, 1 to 64."""
@@ -157,12 +157,16 @@ class Skin:
         They are made of the fields that differ from their defaults, so that a new field with a default changes no
         fingerprint (docs/protocol.md).
         """
+        return hashlib.sha256(json.dumps(self.changed, sort_keys=True).encode()).digest()[:8]
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """The fields that differ from their defaults, but for the name."""
         defaults = {field.name: field.default for field in dataclasses.fields(self)}
         defaults["zone_capacity"] = self._default_capacity()
         fields = dataclasses.asdict(self)
         del fields["name"]
-        changed = {name: value for name, value in fields.items() if value != defaults[name]}
-        return hashlib.sha256(json.dumps(changed, sort_keys=True).encode()).digest()[:8]
+        return {name: value for name, value in fields.items() if value != defaults[name]}
 
     @property
     def selects_low(self) -> bool:
@@ -174,15 +178,26 @@ class Skin:
         """Pressed switches can make others read pressed."""
         return self.diodes == "none"
 
-    def max_zones(self) -> int:
-        """The most zones a frame of this sheet can hold.
+    @property
+    def sheet(self) -> Sheet:
+        """What frames of this Skin's board cannot be read without."""
+        assert self.zone_capacity is not None
+        return Sheet(
+            rows=self.rows,
+            columns=self.columns,
+            connectivity=self.connectivity,
+            report=self.report,
+            barycenter_bits=self.barycenter_bits if self.report == "barycenter" else 0,
+            zone_capacity=self.zone_capacity,
+            pitch_x_mm=self.pitch_x_mm,
+            pitch_y_mm=self.pitch_y_mm,
+            radius_mm=self.radius_mm,
+            ghosts=self.ghosts,
+        )
 
-        With 8-connectivity every 2x2 block holds cells of one zone at most; with 4-connectivity the
-        checkerboard is the worst.
-        """
-        if self.connectivity == 8:
-            return math.ceil(self.rows / 2) * math.ceil(self.columns / 2)
-        return math.ceil(self.rows * self.columns / 2)
+    def max_zones(self) -> int:
+        """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""
+        return max_zones(self.rows, self.columns, self.connectivity)
 
     def _keep(self, **values: Any) -> None:
         for name, value in values.items():

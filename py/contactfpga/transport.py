@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from pathlib import Path
-from typing import Any, Protocol
+from typing import BinaryIO, Protocol
 from urllib.parse import parse_qsl, urlsplit
 
+from contactfpga.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
 from contactfpga.skin import Skin
 
@@ -22,6 +24,9 @@ class Transport(Protocol):
     """What the user called it."""
     live: bool
     """Whether a board is at the other end that can be asked."""
+    threaded: bool
+    """Whether bytes come by themselves, so that a thread of its own has to read them; else time passes, or the
+    recording goes on, only while it is read."""
 
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
@@ -42,7 +47,7 @@ class Transport(Protocol):
 class SerialTransport:
     """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
 
-    live = True
+    live = threaded = True
 
     def __init__(self, name: str, baud: int):
         from serialx import (
@@ -90,13 +95,34 @@ class SerialTransport:
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
 
 
+class SimulatedPort(Protocol):
+    """A board in simulated time, such as :class:`contactfpga_sim.board.VirtualBoard`."""
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+
+    def close(self) -> None:
+        """Free the board."""
+
+
 class SimTransport:
-    """The virtual board, simulated while it is read: ``sim://?scene=NAME&skin=FILE``."""
+    """A virtual board, simulated while it is read."""
 
-    live = True
+    live, threaded = True, False
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, board: SimulatedPort):
         self.name = name
+        self._board = board
+
+    @classmethod
+    def named(cls, name: str) -> SimTransport:
+        """``sim://?scene=NAME&skin=FILE``"""
         options = dict(parse_qsl(urlsplit(name).query, keep_blank_values=True))
         unknown = sorted(set(options) - {"scene", "skin"})
         if unknown or urlsplit(name).netloc or urlsplit(name).path:
@@ -105,7 +131,7 @@ class SimTransport:
         try:
             from contactfpga_sim.board import VirtualBoard
 
-            self._board: Any = VirtualBoard(skin=skin, scene=options.get("scene"))
+            return cls(name, VirtualBoard(skin=skin, scene=options.get("scene")))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -126,32 +152,88 @@ class SimTransport:
 
 
 class ReplayTransport:
-    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``."""
+    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``, as fast as it is read, or
+    ``replay://FILE?pace=1`` in the time in which it was recorded."""
 
-    live = False
+    live = threaded = False
 
     def __init__(self, name: str):
         self.name = name
-        path = Path(name.removeprefix("replay://")).expanduser()
+        location, _, pace = name.removeprefix("replay://").partition("?pace=")
+        path = Path(location).expanduser()
+        self._pace = _pace(name, pace) if pace else None
         try:
             self._file = open(path, "rb")  # noqa: SIM115 - closed by close()
         except OSError as error:
             raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; is the path right?") from None
 
     def read(self, timeout_s: float) -> bytes:
-        data = self._file.read(4096)
-        if not data:
-            raise ReplayEnded(f"{self.name} ends here")
-        return data
+        if self._pace is not None:
+            return self._pace.read(self._file, timeout_s)
+        return _more(self._file, 4096, self.name)
 
     def write(self, data: bytes) -> None:
         raise ContactFPGAError(f"{self.name} is a recording; it cannot be asked for anything")
 
     def clock(self) -> float:
-        return 0.0  # a recording has no times of its own, and nothing in it is waited for
+        # A recording has no times of its own, and nothing in it is waited for unless it is paced.
+        return 0.0 if self._pace is None else time.monotonic()
 
     def close(self) -> None:
         self._file.close()
+
+
+class _Pace:
+    """Holds back the packets of a recording until their time has come."""
+
+    def __init__(self, name: str, factor: float):
+        self._name = name
+        self._factor = factor
+        self._conversation = Conversation(name, live=False)
+        self._held = b""
+        self._due_s = -math.inf
+        self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
+        self._last_us = 0
+
+    def read(self, file: BinaryIO, timeout_s: float) -> bytes:
+        if not self._held:
+            self._held = _more(file, 1, self._name)
+            while not self._held.endswith(b"\0") and (more := file.read(1)):
+                self._held += more
+            for event in self._conversation.receive(self._held, 0.0):
+                if isinstance(event, Arrival):
+                    self._schedule(event.zones.time_us)
+        wait_s = self._due_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(min(wait_s, max(0.0, timeout_s)))
+        if wait_s > timeout_s:
+            return b""
+        data, self._held = self._held, b""
+        return data
+
+    def _schedule(self, time_us: int) -> None:
+        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins anew
+            self._begun = time.monotonic(), time_us
+        moment_s, begun_us = self._begun
+        self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor
+        self._last_us = time_us
+
+
+def _pace(name: str, text: str) -> _Pace:
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 0 < factor < math.inf:
+        raise PortNotFound(f"{name}: pace is {text!r}; it must be a positive number, 1 for the time of the recording")
+    return _Pace(name, factor)
+
+
+def _more(file: BinaryIO, count: int, name: str) -> bytes:
+    data = file.read(count)
+    if not data:
+        raise ReplayEnded(f"{name} ends here")
+    return data
 
 
 class Recorder:
@@ -160,7 +242,7 @@ class Recorder:
     def __init__(self, transport: Transport, path: str | Path):
         self._transport = transport
         self.name = transport.name
-        self.live = transport.live
+        self.live, self.threaded = transport.live, transport.threaded
         self.write = transport.write
         self.clock = transport.clock
         try:
@@ -178,10 +260,12 @@ class Recorder:
         self._transport.close()
 
 
-def connect(name: str, baud: int) -> Transport:
-    """Open the transport that ``name`` asks for."""
+def connect(name: str | SimulatedPort, baud: int) -> Transport:
+    """Open the transport that ``name`` asks for, or that a virtual board is."""
+    if not isinstance(name, str):
+        return SimTransport("the virtual board", name)
     if name.startswith("sim:"):
-        return SimTransport(name)
+        return SimTransport.named(name)
     if name.startswith("replay:"):
         return ReplayTransport(name)
     return SerialTransport(name, baud)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactfpga.derived import Derived
+from contactfpga.errors import BoardClosed
 from contactfpga.skin import Skin
 from contactfpga_sim import native, scenes
 from contactfpga_sim.cells import to_words
@@ -42,19 +44,27 @@ class Board:
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
         self.skin = skin
         self._library = _library(model or model_of(skin))
-        self._board = ctypes.c_void_p(self._library.board_new())
+        self._lock = threading.RLock()  # a call of another thread would free or run the model under this one's feet
+        self._board: ctypes.c_void_p | None = ctypes.c_void_p(self._library.board_new())
         captured = sum(1 << BOUNDARIES.index(name) for name in set(capture))
-        self._library.board_capture(self._board, ctypes.c_uint(captured))
+        self._call("capture", ctypes.c_uint(captured))
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        """The driver's function of this name; raises :class:`BoardClosed` where there is no model any more."""
+        with self._lock:
+            if self._board is None:
+                raise BoardClosed("the virtual board was closed; make another one")
+            return getattr(self._library, f"board_{name}")(self._board, *arguments)
 
     @property
     def cycle(self) -> int:
         """The cycle that runs next."""
-        return self._library.board_cycle(self._board)
+        return self._call("cycle")
 
     @property
     def broken(self) -> int:
         """Bytes on the line that came without a stop bit."""
-        return self._library.board_broken(self._board)
+        return self._call("broken")
 
     def press(self, cells: np.ndarray) -> None:
         """From the next cycle on these (rows, columns) bool cells are pressed."""
@@ -62,30 +72,30 @@ class Board:
 
     def restart(self, mutant: int = 0) -> None:
         """Power up anew, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
-        self._library.board_restart(self._board, ctypes.c_uint(mutant))
+        self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
         """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
         word = 0 if columns is None else int(to_words(np.asarray(columns, bool)))
-        self._library.board_stick(self._board, ctypes.c_uint64(word))
+        self._call("stick", ctypes.c_uint64(word))
 
     def settle(self, line: Line) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none."""
         shares = (line.share(seconds, 1 / self.skin.clock_hz) for seconds in (line.press_s, line.release_s))
         values = (*shares, line.pulled, line.threshold)
-        self._library.board_settle(self._board, *map(ctypes.c_double, values))
+        self._call("settle", *map(ctypes.c_double, values))
 
     def run(self, cycles: int) -> None:
-        """Run this many clock cycles. Other Python threads run meanwhile."""
-        self._library.board_run(self._board, ctypes.c_uint64(cycles))
+        """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
+        self._call("run", ctypes.c_uint64(cycles))
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
         """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
         if frames.shape[1:] != (self.skin.rows, self.skin.columns):
             raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
         words = np.ascontiguousarray(to_words(frames))
-        self._library.board_hold(
-            self._board,
+        self._call(
+            "hold",
             words.ctypes.data_as(ctypes.c_void_p),
             ctypes.c_size_t(len(words)),
             ctypes.c_uint64(Derived(self.skin).frame_clocks if cycles is None else cycles),
@@ -93,19 +103,20 @@ class Board:
 
     def send(self, data: bytes) -> None:
         """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
-        self._library.board_send(self._board, data, ctypes.c_size_t(len(data)))
+        self._call("send", data, ctypes.c_size_t(len(data)))
 
     def pull_low(self, cycles: int) -> None:
         """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
-        self._library.board_pull_low(self._board, ctypes.c_uint64(cycles))
+        self._call("pull_low", ctypes.c_uint64(cycles))
 
     def take(self, boundary: str) -> np.ndarray:
         """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
         index = ctypes.c_uint(BOUNDARIES.index(boundary))
         count = ctypes.c_size_t()
-        address = self._library.board_events(self._board, index, ctypes.byref(count))
-        events = native.array_at(address, count.value, EVENT)
-        self._library.board_forget(self._board, index)
+        with self._lock:  # the address holds until the model runs on
+            address = self._call("events", index, ctypes.byref(count))
+            events = native.array_at(address, count.value, EVENT)
+            self._call("forget", index)
         return events
 
     def receive(self) -> bytes:
@@ -113,10 +124,11 @@ class Board:
         return self.take("received")["data"].astype(np.uint8).tobytes()
 
     def close(self) -> None:
-        """Free the model; the board cannot be used any more."""
-        if self._board:
-            self._library.board_free(self._board)
-            self._board = ctypes.c_void_p()
+        """Free the model; every later call raises :class:`BoardClosed`. May be called twice."""
+        with self._lock:
+            if self._board is not None:
+                self._call("free")
+                self._board = None
 
     def __enter__(self) -> Board:
         return self
@@ -128,7 +140,9 @@ class Board:
 class VirtualBoard:
     """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
 
-    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes.
+    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes, among it a function
+    of the simulated time in s that returns the pressed cells, (rows, columns) bool. ``contactfpga.open(VirtualBoard())``
+    makes a board of it as of any port; what the function raises comes out of the call that waits for a frame.
     """
 
     def __init__(self, skin: Skin | None = None, scene: scenes.Source = None):

@@ -95,8 +95,11 @@ def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | Non
         packet.append((cycle, value))
         if value != protocol.DELIMITER:
             continue
-        plain = protocol.unseal(bytes(value for _, value in packet[:-1]))
-        if protocol.kind_of(plain) == protocol.KIND_ZONES:
+        if len(packet) == 1:  # in front of a hello
+            packet = []
+            continue
+        plain = protocol.unseal(bytes(value for _, value in packet[:-1]), protocol.check_prefix(skin))
+        if protocol.kind_of(plain) != protocol.KIND_HELLO:
             frame = protocol.decode_frame(plain, Derived(skin))
             if frame.cells:
                 return packet[0][0] + 1, cycle + 1 + 10 * Derived(skin).bit_clocks, len(packet), frame

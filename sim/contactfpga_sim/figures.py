@@ -118,8 +118,9 @@ def _first_frame_with_cells(board: Board, skin: Skin) -> tuple[int, int]:
     start = 0
     for end in map(int, ends):
         packet = received[start:end]["data"].astype(np.uint8).tobytes()
-        plain = protocol.unseal(packet)
-        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, Derived(skin)).cells:
+        plain = protocol.unseal(packet, protocol.check_prefix(skin)) if packet else b""  # in front of a hello
+        hello = not plain or protocol.kind_of(plain) == protocol.KIND_HELLO
+        if not hello and protocol.decode_frame(plain, Derived(skin)).cells:
             return int(received[start]["cycle"]) - 10 * Derived(skin).bit_clocks, int(received[end]["cycle"])
         start = end + 1
     raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
@@ -132,7 +133,9 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
     with Board(skin) as board:
         board.hold(cells[None], scans * Derived(skin).frame_clocks)
         packets = board.receive().split(b"\0")[:-1]
-        frames = [packet for packet in packets if protocol.kind_of(protocol.unseal(packet)) != protocol.KIND_HELLO]
+        before = protocol.check_prefix(skin)
+        plains = [(packet, protocol.unseal(packet, before)) for packet in packets if packet]
+        frames = [packet for packet, plain in plains if protocol.kind_of(plain) != protocol.KIND_HELLO]
         return len(frames) / (board.cycle / skin.clock_hz), len(frames[-1]) + 1
 
 

@@ -120,6 +120,7 @@ class PtyBoard:
         except BaseException as error:  # a thread has nobody to raise it to
             self.failure = error
             _say(f"the virtual board ended: {error}")
+            self.stop()  # its client finds the port gone, and does not wait for a board that says nothing
 
     def _run(self) -> None:
         cycles = max(1, round(CHUNK_S * self.skin.clock_hz))

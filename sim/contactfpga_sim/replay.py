@@ -147,7 +147,7 @@ class _Plan:
 
     def __init__(self, skin: Skin, count: int):
         derived = Derived(skin)
-        hello = 32 * 10 * derived.bit_clocks
+        hello = len(protocol.encode_hello(skin)) * 10 * derived.bit_clocks
         quiet = math.ceil(hello / derived.frame_clocks) + 2
         period = derived.hello_frames
         self.frame_of: list[int | None] = [None] * quiet
@@ -198,7 +198,9 @@ class _Collector:
             if value != protocol.DELIMITER:
                 self._packet.append(value)
                 continue
-            plain = protocol.unseal(bytes(self._packet))
+            if not self._packet:  # in front of a hello
+                continue
+            plain = protocol.unseal(bytes(self._packet), protocol.check_prefix(self._board.skin))
             self._packet.clear()
             if protocol.kind_of(plain) != protocol.KIND_HELLO:
                 yield from self._place(protocol.decode_frame(plain, self._derived), cycle)

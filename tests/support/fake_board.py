@@ -11,10 +11,9 @@ import threading
 import time
 import tty
 
-from wire import Wire
-
-ZONE = (4, 10, 6)
-"""The zone it reports unless told otherwise: area, sum x, sum y."""
+from model_board import ZONE as ZONE
+from model_board import ModelBoard
+from wire import old_frame, old_hello
 
 
 def wait_until(condition, seconds=60.0):
@@ -45,19 +44,17 @@ def background(function):
         raise failures[0]
 
 
-class FakeBoard:
-    """Answers each byte with a hello and a frame flagged `requested`; ``path`` is its port."""
+class FakeBoard(ModelBoard):
+    """Answers each request with a frame, and with a hello before it where one is asked for; ``path`` is its port."""
 
     def __init__(self, skin, link=None):
-        self.wire = Wire(skin)
-        self.moments = [ZONE]
+        super().__init__(skin)
         self.answers = True
         self.greets = True
+        self.old = False  # speaks protocol 1
         self.stream = b""  # sent over and over, as fast as the port takes it
-        self.version = 1
         self.slice = 1 << 16  # bytes written at once
-        self.sequence = 0
-        self.time_us = 0
+        self.delay_s = 0.0  # from a request to the answer
         self.asked = 0
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
@@ -71,19 +68,6 @@ class FakeBoard:
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
-
-    def frame(self, flags=(), **options) -> bytes:
-        """The next frame; every one counts."""
-        options = {"sequence": self.sequence, "time": self.time_us} | options
-        self.sequence += 1
-        self.time_us += 96
-        if self.wire.skin.report == "cells":
-            row = [column % 2 for column in range(self.wire.skin.columns)]
-            return self.wire.cells([row] * self.wire.skin.rows, flags=flags, **options)
-        return self.wire.zones(self.moments, flags=flags, version=self.version, **options)
-
-    def hello(self) -> bytes:
-        return self.wire.hello(version=self.version)
 
     def send(self, data: bytes):
         with self._lock:
@@ -106,6 +90,11 @@ class FakeBoard:
         if not self._stop.is_set():
             self.unplug()
 
+    def _answer(self, asked_for_hello):
+        if self.old:
+            return old_hello() + old_frame()
+        return (self.hello() if self.greets and asked_for_hello else b"") + self.frame()
+
     def _write(self, data: bytes):
         while data and not self._stop.is_set():
             _, ready, _ = select.select([], [self._master], [], 0.05)
@@ -116,10 +105,11 @@ class FakeBoard:
         while not self._stop.is_set():
             ready, _, _ = select.select([self._master], [], [], 0 if self.stream else 0.005)
             if ready:
-                self.asked += len(os.read(self._master, 100))
-                if self.answers:
-                    answer = self.hello() if self.greets else b""
-                    self.send(answer + self.frame(flags=["requested"]))
+                heard = self.hear(os.read(self._master, 100))
+                self.asked += len(heard)
+                if self.answers and heard:
+                    time.sleep(self.delay_s)
+                    self.send(self._answer(any(hello for _, hello in heard)))
             elif self.stream:
                 _, writable, _ = select.select([], [self._master], [], 0.005)
                 if writable:

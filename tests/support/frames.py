@@ -3,7 +3,7 @@
 from wire import Wire
 
 from contactfpga import protocol
-from contactfpga.derived import Derived
+from contactfpga.widths import Widths
 
 
 def moments(rng, skin, zones):
@@ -18,7 +18,8 @@ def moments(rng, skin, zones):
 def frame(rng, skin, zones=None):
     """A frame as sent, with its delimiter; ``zones``: how many, where the Skin reports zones."""
     options = {name: rng.randrange(1 << bits) for name, bits in (("time", 24), ("sequence", 8), ("overwritten", 4))}
-    options["flags"] = ["requested"] if rng.random() < 0.2 else []
+    options["heard"] = rng.randrange(8)
+    options["flags"] = ["fault"] if rng.random() < 0.2 else []
     if skin.report == "cells":
         bitmap = [[rng.random() < 0.3 for _ in range(skin.columns)] for _ in range(skin.rows)]
         return Wire(skin).cells(bitmap, **options)
@@ -27,15 +28,14 @@ def frame(rng, skin, zones=None):
 
 def receiver(skin):
     """The product's verdict on a packet without its delimiter, as a function."""
-    derived = Derived(skin)
+    widths, prefix = Widths(skin.sheet), protocol.check_prefix(skin)
 
     def accepts(packet):
         try:
-            plain = protocol.unseal(packet)
+            plain = protocol.unseal(packet, prefix)
             if protocol.kind_of(plain) == protocol.KIND_HELLO:
-                protocol.decode_hello(plain)
-            else:
-                protocol.decode_frame(plain, derived)
+                return protocol.HelloReader().take(plain) is not None
+            protocol.decode_frame(plain, widths)
         except protocol.PacketError:
             return False
         return True

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from contactfpga import driver, ports
 from contactfpga.driver import Board
-from contactfpga.errors import ContactFPGAError
-from contactfpga.receiver import report_of
+from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.mismatch import report_of
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
@@ -110,11 +110,13 @@ def _advice() -> str:
 
 def hello(board: Board) -> Iterator[Finding]:
     """What the board says of itself."""
-    skin = board.skin
-    surface = "plane" if skin.radius_mm is None else f"cylinder of radius {skin.radius_mm:g} mm"
+    sheet = board.sheet
+    surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
+    name = f"{board.name!r}, " if board.name else ""
     facts = (
-        f"{skin.rows}x{skin.columns}, pitch {skin.pitch_x_mm:g} x {skin.pitch_y_mm:g} mm, {surface}, "
-        f"connectivity {skin.connectivity}, {report_of(skin)}, fingerprint {board.fingerprint.hex()}"
+        f"{name}{sheet.rows}x{sheet.columns}, pitch {sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm, {surface}, "
+        f"connectivity {sheet.connectivity}, {report_of(sheet)}, {board.clock_hz / 1e6:g} MHz, {board.baud} baud, "
+        f"fingerprint {board.fingerprint.hex()}"
     )
     yield "ok", f"{board.port} says hello: {facts}"
 
@@ -131,11 +133,18 @@ def clock(board_s: float, host_s: float) -> Iterator[Finding]:
 
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     """Frames and losses over some seconds of device time."""
-    first = board.next(timeout)
+    try:
+        first = zones = board.next(timeout)
+    except ReplayEnded:
+        yield "fault", f"{board.port} holds no frame"
+        return
     begun = board.clock()
-    zones = first
     while zones.time_us - first.time_us < seconds * 1e6 and zones.time_us >= first.time_us:
-        zones = board.next(timeout)
+        try:
+            zones = board.next(timeout)
+        except ReplayEnded:
+            yield "note", "the recording ends here"
+            break
     yield from clock((zones.time_us - first.time_us) / 1e6, board.clock() - begun)
     stats = board.stats
     yield "ok", f"{stats.frames} frames, {stats.hellos} hellos in {(zones.time_us - first.time_us) / 1e6:.2f} s"
@@ -144,14 +153,15 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
             "note",
             f"{stats.overwritten} frames overwritten on the board: the line is slower than the scan, a hello too",
         )
-    if stats.gaps:
-        yield "note", f"{stats.gaps} pauses in which more frames may have been lost than are counted"
+    if stats.unexplained:
+        yield "note", f"{stats.unexplained} frames left out, as their times were not known before the next hello"
     faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
     told = ", ".join(f"{number} {name}" for name, number in faults.items())
     yield ("fault" if any(faults.values()) else "ok", told)
-    if zones.stuck:
-        yield "fault", f"{zones.stuck} columns read pressed while no row is driven; look for a short circuit there"
-    for flag in sorted(zones.flags - {"requested"}):
+    if "stuck" in zones.faults:
+        count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"
+        yield "fault", f"{count} read pressed while no row is driven; look for a short circuit there"
+    for flag in sorted(zones.flags - {"fault"}):
         if flag == "ghost":
             yield "note", "the last frame has zones that may be ghosts: the sheet has no diodes"
         else:

@@ -40,13 +40,18 @@ def _paced(board: Board, timeout: float) -> Iterator[Zones]:
     """
     shown_us = -REFRESH_US
     due = time.monotonic()
+    skipped = None
     while True:
         try:
             zones = board.next(timeout)
         except ReplayEnded:
+            if skipped is not None:
+                yield skipped  # the last frame is shown in any case
             return
         if 0 <= zones.time_us - shown_us < REFRESH_US:
+            skipped = zones
             continue
+        skipped = None
         shown_us = zones.time_us
         due = max(due + REFRESH_US / 1e6, time.monotonic() - REFRESH_US / 1e6)
         time.sleep(max(0.0, due - time.monotonic()))

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
-from contactfpga.zone import Zone, Zones
+from contactfpga.zone import Zones
 
 FREE, PRESSED, CENTRE, MASKED = "· ", "██", "◎ ", "  "
 
 
-def draw(zones: Zones) -> str:
-    """The sheet of one frame: the pressed cells where the board sends them, else each zone as a disc of its area."""
+def draw(zones: Zones, mask: Iterable[tuple[int, int]] = ()) -> str:
+    """The sheet of one frame: the pressed cells where the board sends them, else each zone as a disc of its area.
+    ``mask``: the Skin's, where that is known."""
     cells = zones.cells
-    grid = np.full((zones.skin.rows, zones.skin.columns), FREE, dtype="<U2")
+    grid = np.full((zones.sheet.rows, zones.sheet.columns), FREE, dtype="<U2")
     grid[_discs(zones) if cells is None else cells] = PRESSED
-    for row, column in zones.skin.mask:
+    for row, column in mask:
         grid[row, column] = MASKED
     if cells is None:
         for row, column in _centres(zones):
@@ -25,22 +27,28 @@ def draw(zones: Zones) -> str:
 
 
 def _centres(zones: Zones) -> list[tuple[int, int]]:
-    skin = zones.skin
-    return [(round(zone.y_mm / skin.pitch_y_mm), round(zone.x_mm / skin.pitch_x_mm)) for zone in _real(zones)]
+    sheet = zones.sheet
+    return [(round(y_mm / sheet.pitch_y_mm), round(x_mm / sheet.pitch_x_mm)) for x_mm, y_mm, _ in _placed(zones)]
 
 
 def _discs(zones: Zones) -> np.ndarray:
     """(rows, columns) bool: cells within the disc of each zone's area about its barycenter."""
-    skin = zones.skin
-    y, x = np.ogrid[: skin.rows, : skin.columns]
-    covered = np.zeros((skin.rows, skin.columns), bool)
-    for zone in _real(zones):
-        dx = x * skin.pitch_x_mm - zone.x_mm
-        dy = y * skin.pitch_y_mm - zone.y_mm
-        covered |= np.hypot(dx, dy) <= math.sqrt(zone.area_mm2 / math.pi)
+    sheet = zones.sheet
+    y, x = np.ogrid[: sheet.rows, : sheet.columns]
+    covered = np.zeros((sheet.rows, sheet.columns), bool)
+    for x_mm, y_mm, area_mm2 in _placed(zones):
+        dx = x * sheet.pitch_x_mm - x_mm
+        dy = y * sheet.pitch_y_mm - y_mm
+        covered |= np.hypot(dx, dy) <= math.sqrt(area_mm2 / math.pi)
     return covered
 
 
-def _real(zones: Zones) -> list[Zone]:
-    """The zones that lie somewhere: a frame flagged `mismatch` may hold others."""
-    return [zone for zone in zones if zone.area_cells]
+def _placed(zones: Zones) -> list[tuple[float, float, float]]:
+    """x and y in mm and area in mm2 of the zones that lie on the sheet: a frame flagged `mismatch` may hold others."""
+    sheet = zones.sheet
+    width_mm, height_mm = (sheet.columns - 1) * sheet.pitch_x_mm, (sheet.rows - 1) * sheet.pitch_y_mm
+    return [
+        (zone.x_mm, zone.y_mm, zone.area_mm2)
+        for zone in zones
+        if zone.x_mm is not None and zone.y_mm is not None and zone.x_mm <= width_mm and zone.y_mm <= height_mm
+    ]

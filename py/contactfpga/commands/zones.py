@@ -6,6 +6,7 @@ import argparse
 import json
 
 from contactfpga import driver
+from contactfpga.errors import ContactFPGAError
 from contactfpga.zone import Zones
 
 
@@ -39,21 +40,29 @@ def render(board: driver.Board, zones: Zones):  # type: ignore[no-untyped-def]
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
     table = Table("cells", "mm²", "x mm", "y mm", title=title)
     for zone in zones:
-        table.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", f"{zone.x_mm:.2f}", f"{zone.y_mm:.2f}")
+        place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
+        table.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", *place)
     beside = Table.grid(padding=(0, 3))
-    beside.add_row(Text(draw(zones)), table)
+    beside.add_row(Text(draw(zones, mask(board))), table)
     return Group(beside, Text(status(board, zones)))
+
+
+def mask(board: driver.Board) -> tuple[tuple[int, int], ...]:
+    """The switches that the board's Skin leaves out; none where only its hello is known."""
+    try:
+        return board.skin.mask
+    except ContactFPGAError:
+        return ()
 
 
 def status(board: driver.Board, zones: Zones) -> str:
     """The line below a frame: which one it is, and what went wrong so far."""
     stats = board.stats
-    lost = f"{stats.lost} or more" if stats.gaps else str(stats.lost)
     parts = [
         f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",
         f"{zones.pressed} cells pressed",
-        *sorted(zones.flags - {"requested"}),
-        f"{zones.stuck} columns stuck" if zones.stuck else "",
-        f"{stats.frames} frames, {lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
+        *sorted(zones.flags - {"fault"}),
+        *sorted(zones.faults),
+        f"{stats.frames} frames, {stats.lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
     ]
     return " · ".join(part for part in parts if part)

@@ -41,7 +41,7 @@ class Chip:
 class PlantTransport:
     """A :class:`contactfpga.transport.Transport`: while the driver waits, arm and gateware go on."""
 
-    live = True
+    live, threaded = True, False
     name = "arm://"
 
     def __init__(self, world: World):

@@ -42,7 +42,9 @@ def frames(skin: Skin, trace: Trace) -> Iterator[Frame]:
         if value != protocol.DELIMITER:
             packet.append(value)
             continue
-        plain = protocol.unseal(bytes(packet))
+        if not packet:  # in front of a hello
+            continue
+        plain = protocol.unseal(bytes(packet), protocol.check_prefix(skin))
         if protocol.kind_of(plain) != protocol.KIND_HELLO:
             cells = protocol.decode_frame(plain, derived).cells
             yield Frame(first, cycle + 10 * derived.bit_clocks, len(packet) + 1, cells)

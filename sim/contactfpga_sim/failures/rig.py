@@ -6,14 +6,18 @@ import math
 
 import numpy as np
 
+from contactfpga import protocol
+from contactfpga.conversation import Arrival, Conversation
 from contactfpga.derived import Derived
-from contactfpga.receiver import Receiver
 from contactfpga.skin import Skin
 from contactfpga.zone import Zones
 from contactfpga_sim.board import Board
 from contactfpga_sim.failures.study import Place
 
 REFERENCE = Skin()
+
+HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
+"""The most that a hello takes on the wire."""
 
 HELD_SCANS = 5
 """Scans for which a frame is held, so that one of it reaches the host even if a hello comes between."""
@@ -25,13 +29,13 @@ class Rig:
     def __init__(self, skin: Skin, capture: tuple[str, ...] = ()):
         self.skin = skin
         self.board = Board(skin, capture)
-        self.receiver = Receiver("the board")
+        self.conversation = Conversation("the board")
         self.scan = Derived(skin).frame_clocks
 
     def frames(self) -> list[Zones]:
         """All frames that have come since they were taken last."""
-        items = self.receiver.feed(self.board.receive(), self.board.cycle / self.skin.clock_hz)
-        return [item for item in items if isinstance(item, Zones)]
+        events = self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz)
+        return [event.zones for event in events if isinstance(event, Arrival)]
 
     def __enter__(self) -> Rig:
         return self
@@ -43,7 +47,7 @@ class Rig:
 def hello_clocks(skin: Skin) -> int:
     """Scans that the hello at power-up may take from frames, in clocks."""
     scan = Derived(skin).frame_clocks
-    return scan * (math.ceil(32 * 10 * Derived(skin).bit_clocks / scan) + 2)
+    return scan * (math.ceil(HELLO_BYTES * 10 * Derived(skin).bit_clocks / scan) + 2)
 
 
 def still(skin: Skin, cells: np.ndarray) -> Zones:
@@ -90,8 +94,7 @@ def _place(sums: list[int]) -> tuple[float, float, int]:
 
 def faults(zones: Zones) -> tuple[str, ...]:
     """What a frame says against itself."""
-    told = sorted(zones.flags - {"requested"})
-    return (*told, "stuck") if zones.stuck else tuple(told)
+    return (*sorted(zones.flags - {"fault"}), *sorted(zones.faults))
 
 
 def plural(count: int, noun: str) -> str:

@@ -92,7 +92,7 @@ def _slide(skin: Skin, speed: float, way: tuple[int, int]) -> tuple[float, Zones
         seconds = zones.time_us / 1e6
         truth = scene.truth(seconds).contacts[0]
         far = math.inf
-        if len(zones) == 1:
+        if len(zones) == 1 and zones[0].x_mm is not None and zones[0].y_mm is not None:
             far = math.hypot(zones[0].x_mm - truth.x_mm, zones[0].y_mm - truth.y_mm) / pitch
         found.append((far, zones, scene.pressed(seconds, skin)))
     return max(found, key=lambda one: one[0])

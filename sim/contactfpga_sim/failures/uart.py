@@ -8,10 +8,9 @@ import math
 import numpy as np
 
 from contactfpga import protocol
+from contactfpga.conversation import Arrival, Conversation
 from contactfpga.derived import Derived
-from contactfpga.receiver import Receiver
 from contactfpga.skin import Skin
-from contactfpga.zone import Zones
 from contactfpga_sim.failures.rig import Rig, hello_clocks
 
 OVERSAMPLING = 16
@@ -103,19 +102,18 @@ class Heard:
 
 def heard(line: Line, data: bytes) -> Heard:
     """The receiver's frames and counters."""
-    sent = _decoded(line.skin, b"".join(packet + bytes([protocol.DELIMITER]) for packet in line.frames))[0]
-    frames, receiver = _decoded(line.skin, data)
-    stats = receiver.stats
+    sent = _decoded(b"".join(packet + bytes([protocol.DELIMITER]) for packet in line.frames))[0]
+    frames, conversation = _decoded(data)
+    stats = conversation.stats
     right = sum(1 for frame in frames if frame in set(sent))
     counters = {"lost": stats.lost, "damaged": stats.damaged.total()}
     told = [name for name, count in counters.items() if count]
-    if receiver.hello is None:
+    if conversation.hello is None:
         told = ["OnlyNoise"]
     return Heard(len(sent), right, len(frames) - right, tuple(told))
 
 
-def _decoded(skin: Skin, data: bytes) -> tuple[list[str], Receiver]:
-    receiver = Receiver("the line")
-    items = receiver.feed(data, 0.0)
-    found = [item for item in items if isinstance(item, Zones)]
-    return [str(zones.to_dict() | {"time_us": zones.frame.time_us}) for zones in found], receiver
+def _decoded(data: bytes) -> tuple[list[str], Conversation]:
+    conversation = Conversation("the line")
+    events = conversation.receive(data, 0.0)
+    return [str(event.zones.to_dict()) for event in events if isinstance(event, Arrival)], conversation

@@ -7,9 +7,10 @@ from collections import deque
 
 import numpy as np
 
+from contactfpga import protocol
+from contactfpga.board import Board as Driver
 from contactfpga.commands import doctor
 from contactfpga.derived import Derived
-from contactfpga.driver import Board as Driver
 from contactfpga_sim.board import VirtualBoard
 from contactfpga_sim.failures.rig import REFERENCE, Rig, hello_clocks
 from contactfpga_sim.failures.study import Outcome, Study
@@ -39,26 +40,36 @@ def _baud(sign: int, per_cent: float) -> Outcome:
     return _of_line(heard(recorded(), recorded().read(bits)))
 
 
+ASKED = 0x15_2A_D0
+"""Of a request whose other digits mix zeros and ones; its lowest bits are left for a number."""
+
+
+def _send(rig: Rig, byte: int, bit: float) -> None:
+    """A byte whose bits last so many of the board's clocks, at its receive pin."""
+    bits = [0, *(byte >> index & 1 for index in range(8)), 1]
+    ends = [round(bit * (index + 1)) for index in range(10)]
+    for start, end, level in zip([0, *ends], ends, bits):
+        if not level:
+            rig.board.pull_low(end - start)
+        rig.board.run(end - start)
+
+
 def _asked(sign: int, per_cent: float) -> Outcome:
-    """The host's byte, at the host's rate, at the board's receive pin: does a frame answer?"""
+    """The host's requests, at the host's rate, at the board's receive pin: does a frame answer?"""
     bit = Derived(SKIN).bit_clocks / (1 + sign * per_cent / 100)
     answered = 0
-    asked = b"?U\x00\xff"
+    lows = (1, 2, 3, 4)
     with Rig(SKIN) as rig:
         rig.board.run(hello_clocks(SKIN))
-        for byte in asked:
+        for low in lows:
             rig.frames()
-            bits = [0, *(byte >> index & 1 for index in range(8)), 1]
-            ends = [round(bit * (index + 1)) for index in range(10)]
-            for start, end, level in zip([0, *ends], ends, bits):
-                if not level:
-                    rig.board.pull_low(end - start)
-                rig.board.run(end - start)
+            for byte in protocol.encode_request(ASKED + low):
+                _send(rig, byte, bit)
             rig.board.run(6 * rig.scan)
-            answered += any("requested" in zones.flags for zones in rig.frames())
-    right = answered == len(asked)
-    what = f"{len(asked) - answered} of {len(asked)} requests unanswered"
-    return Outcome(right, () if right else ("ReadTimeout",), what, 1 - answered / len(asked))
+            answered += any(zones.frame.heard == low for zones in rig.frames())
+    right = answered == len(lows)
+    what = f"{len(lows) - answered} of {len(lows)} requests unanswered"
+    return Outcome(right, () if right else ("ReadTimeout",), what, 1 - answered / len(lows))
 
 
 BAUD = Study(
@@ -129,7 +140,7 @@ TTY_BYTES = 4095
 class SlowHost:
     """A virtual board behind a buffer as the system has it; time passes while the host is busy elsewhere."""
 
-    live = True
+    live, threaded = True, False
     name = "the slow host"
 
     def __init__(self) -> None:
@@ -179,8 +190,9 @@ def _slow_host(milliseconds: float) -> Outcome:
         stats = board.stats
     scan_us = Derived(SKIN).frame_clocks / Derived(SKIN).clocks_per_us
     missing = round((times[-1] - times[0]) / scan_us) + 1 - len(times) - stats.overwritten
-    told = tuple(name for name in ("lost", "gaps") if getattr(stats, name))
-    what = f"{missing} frames missing, `lost` says {stats.lost}" + (f", {stats.gaps} long gaps" if stats.gaps else "")
+    told = tuple(name for name in ("lost", "unexplained") if getattr(stats, name))
+    what = f"{missing} frames missing, `lost` says {stats.lost}"
+    what += f", {stats.unexplained} whose time was not known" if stats.unexplained else ""
     return Outcome(missing <= 0 and not stats.damaged, told, what, missing)
 
 

@@ -1,0 +1,45 @@
+"""What is counted about a port."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+
+
+@dataclasses.dataclass
+class Stats:
+    """What came over one port since it was opened."""
+
+    frames: int = 0
+    """Frames received whole and passed on."""
+    lost: int = 0
+    """Frames the board sent that did not arrive whole: from the gaps in their sequence numbers, and exact at each
+    hello, which tells how many frames the board has sent."""
+    unexplained: int = 0
+    """Frames received whole and not passed on, as their times could not be known before the next hello: those after a
+    pause of the line, or of a board whose restart nothing has told of yet."""
+    dropped: int = 0
+    """Frames passed on that were taken out of the queue of ``Board.next`` again, the oldest first, because it was
+    full."""
+    overwritten: int = 0
+    """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Widths.overwritten_bits``."""
+    damaged: Counter[str] = dataclasses.field(default_factory=Counter)
+    """Packets refused, by reason: framing, crc, length, kind, content, noise."""
+    resynchronised: int = 0
+    """Valid packets that followed damaged ones."""
+    hellos: int = 0
+    """Hellos received."""
+    before_hello: int = 0
+    """Packets that came before the first hello, without which they cannot be read."""
+    unknown_kinds: int = 0
+    """Valid packets of kinds that this host does not know."""
+    foreign_version: int = 0
+    """Packets of protocol 1."""
+    foreign_skin: int = 0
+    """Frames of a board built from another Skin than the one asked for."""
+    skin_changes: int = 0
+    """Hellos that told of another Skin than the one before."""
+    restarts: int = 0
+    """Times the board began to count its frames anew."""
+    bytes: int = 0
+    """All bytes received."""

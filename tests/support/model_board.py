@@ -1,0 +1,52 @@
+"""A board as docs/protocol.md has it, without a line: it counts, keeps time and hears requests."""
+
+from wire import EPOCH_US, Wire, requests_in
+
+ZONE = (4, 10, 6)
+"""The zone it reports unless told otherwise: area, sum x, sum y."""
+
+SCAN_US = 96
+
+
+class ModelBoard:
+    """``frame()`` and ``hello()`` are what it sends next; ``hear()`` takes what the host sent."""
+
+    def __init__(self, skin):
+        self.wire = Wire(skin)
+        self.moments = [ZONE]
+        self.power_up()
+
+    def power_up(self):
+        self.sent = 0
+        self.time_us = SCAN_US  # of the next frame's first sample, since power-up
+        self.heard = 0
+        self.overwritten = 0
+        self.stuck = 0
+        self._heard_bytes = b""
+
+    def frame(self, flags=(), **options) -> bytes:
+        """The next frame; every one counts."""
+        options = {
+            "sequence": self.sent,
+            "time": self.time_us,
+            "heard": self.heard,
+            "overwritten": self.overwritten,
+        } | options
+        self.sent += 1
+        self.time_us += SCAN_US
+        if self.wire.skin.report == "cells":
+            row = [column % 2 for column in range(self.wire.skin.columns)]
+            return self.wire.cells([row] * self.wire.skin.rows, flags=flags, **options)
+        return self.wire.zones(self.moments, flags=flags, **options)
+
+    def hello(self, **options) -> bytes:
+        state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": self.heard, "stuck": self.stuck}
+        return self.wire.hello(**state | options)
+
+    def hear(self, data) -> list:
+        """(number, whether a hello is asked for) of the requests that these bytes complete."""
+        *packets, self._heard_bytes = (self._heard_bytes + data).split(b"\0")
+        found = requests_in(packets)
+        for number, _ in found:
+            self.heard = number
+        return found
