@@ -7,15 +7,16 @@ import math
 
 import numpy as np
 import pytest
+from decoded import decoded
 
-from contactfpga import protocol
 from contactfpga.derived import Derived
+from contactfpga.hello import HelloReader
 from contactfpga.skin import Skin
 from contactfpga_sim import bench_amaranth, bench_native, record
 from contactfpga_sim.board import Board
 from contactfpga_sim.compare import compare
 from contactfpga_sim.covering import ADAPTIVE, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import BOUNDARIES, Timeline, driven, predict, seek
+from contactfpga_sim.golden import BOUNDARIES, Timeline, driven, predict, requests, seek
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
 
@@ -35,7 +36,7 @@ def touches(skin: Skin, cycles: int, seed: int) -> Timeline:
             cells = cells ^ (rng.random(cells.shape) < rng.choice([0.5, 2.0, 5.0]) / cells.size)
         pieces.append((start, cells, rng.random(skin.columns) < 0.1 if rng.random() < 0.03 else None))
         start += int(facts(skin).row_clocks * rng.choice([0.04, 0.3, 1.0, 3.3, skin.rows, 4 * skin.rows])) + 1
-    return Timeline(pieces, [cycles // 3, cycles // 2])
+    return Timeline(pieces, requests([cycles // 3, cycles // 2], facts(skin).bit_clocks))
 
 
 def play(board: Board, timeline: Timeline, cycles: int) -> int:
@@ -264,12 +265,13 @@ def test_a_column_that_is_masked_in_every_row_never_wakes_the_scan():
 def test_stuck_columns_are_counted_as_soon_as_they_read_pressed():
     skin = Skin(**SMALL | {"baud": 6_000_000})
     stuck = np.array([True, False, True])
-    cycles = 60 * Derived(skin).row_clocks
-    timeline = Timeline([(0, np.zeros((4, 3), bool), stuck)])
+    cycles = 200 * Derived(skin).row_clocks
+    timeline = Timeline([(0, np.zeros((4, 3), bool), stuck)], requests([cycles // 8], facts(skin).bit_clocks))
     trace = predict(skin, timeline, cycles)
     assert compare(trace, bench_amaranth.run(skin, timeline, cycles))
-    packets = bytes(value for _, value in trace.bytes).split(b"\0")[1:-1]
-    assert {protocol.decode_frame(protocol.unseal(packet), Derived(skin)).stuck for packet in packets} == {2}
+    frames, hellos = decoded(bytes(value for _, value in trace.bytes), skin)
+    assert {frame.flags for frame in frames} == {frozenset({"fault"})}
+    assert HelloReader().take(hellos[-1]).stuck == 2
 
 
 def test_a_frame_tells_the_time_of_its_first_sample():
@@ -301,7 +303,7 @@ def test_unchanged_frames_come_again_within_the_keep_alive_and_hellos_twice_a_se
     assert max(np.diff(frames)) <= 1000 * keep_alive_ms
     assert max(np.diff(frames)) > 1000 * keep_alive_ms - 2 * Derived(skin).max_frame_slots * 100
     data = bytes(value for _, value in trace.bytes)
-    assert data.count(protocol.encode_hello(skin)) == 3, "at power-up and twice behind that"
+    assert len(decoded(data, skin)[1]) == 3, "at power-up and twice after that"
 
 
 # ---- no later than a raster scan

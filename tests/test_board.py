@@ -11,24 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from decoded import decoded
 
-from contactfpga import protocol
-from contactfpga.derived import Derived
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga_sim import bench_native, native
 from contactfpga_sim.board import Board, VirtualBoard
 from contactfpga_sim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, predict, requests
 from contactfpga_sim.pty_board import PtyBoard
 
 SLOW = Skin(rows=4, columns=4, clock_hz=3_000_000, baud=750_000, settle_us=19.0)
 """A board that holds real time on a busy machine."""
-
-
-def frames_in(data, skin):
-    plain = [protocol.unseal(packet) for packet in data.split(b"\0")[:-1]]
-    return [protocol.decode_frame(p, Derived(skin)) for p in plain if protocol.kind_of(p) != protocol.KIND_HELLO]
 
 
 def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property):
@@ -36,7 +30,7 @@ def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property)
     rng = np.random.default_rng(11)
     frames = rng.random((300, 16, 16)) < rng.choice([0.02, 0.1, 0.5, 0.9], (300, 1, 1))
     stuck = [rng.random(16) < 0.1 if index % 7 == 0 else None for index in range(300)]
-    timeline = Timeline.frames(skin, frames, stuck, requests=[5_000, 100_000, 100_200])
+    timeline = Timeline.frames(skin, frames, stuck, requests([5_000, 100_000, 100_400], 4))
     cycles = 300 * 16 * 72
     events = compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles))
     assert events > 30_000
@@ -52,7 +46,7 @@ def test_time_passes_only_while_it_is_read():
         while board.clock() < 0.01:
             data += board.read(0.001)
         assert 0.01 <= board.clock() < 0.012
-        frames = frames_in(data[: data.rindex(b"\0") + 1], SLOW)
+        frames = decoded(data, SLOW)[0]
         assert len(frames) > 50
         assert {frame.cells for frame in frames} == {16}
         assert [frame.sequence for frame in frames] == list(range(len(frames)))
@@ -70,7 +64,7 @@ def test_a_scene_is_asked_for_the_time():
         while board.clock() < 0.005:
             data += board.read(0.001)
     assert seen == sorted(seen)
-    pressed = [(frame.time_us, frame.cells) for frame in frames_in(data[: data.rindex(b"\0") + 1], SLOW)]
+    pressed = [(frame.time_us, frame.cells) for frame in decoded(data, SLOW)[0]]
     assert {0, 16} <= {cells for _, cells in pressed}
     first = min(time_us for time_us, cells in pressed if cells)
     assert 2000 <= first <= 2400
@@ -102,7 +96,7 @@ def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
         before, started = board.clock(), time.monotonic()
         for _ in range(3):
             data = read_for(board.port, 0.4)
-            frames = frames_in(data[data.index(b"\0") + 1 : data.rindex(b"\0") + 1], SLOW)
+            frames = decoded(data[data.index(b"\0") + 1 :], SLOW)[0]
             assert len(frames) > 100
         passed = time.monotonic() - started
         assert abs(board.clock() - before + board.slip - passed) < 0.2
@@ -117,7 +111,7 @@ def test_what_nobody_reads_is_dropped_and_counted():
         while not board.dropped and time.monotonic() < deadline:
             time.sleep(0.05)
         assert board.dropped
-        assert frames_in(b"\0".join(read_for(board.port, 0.3).split(b"\0")[1:-1]) + b"\0", SLOW)
+        assert decoded(b"\0".join(read_for(board.port, 0.3).split(b"\0")[1:-1]) + b"\0", SLOW)[0]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -5,14 +5,13 @@ import functools
 
 import numpy as np
 import pytest
+from decoded import decoded
 
-from contactfpga import protocol
-from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.compare import Mismatch, compare
 from contactfpga_sim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import Timeline, Trace, boundaries, predict
+from contactfpga_sim.golden import Timeline, Trace, boundaries, predict, requests
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.record import OutOfTime
 
@@ -61,15 +60,10 @@ def cycles_for(skin: Skin) -> int:
 
 def flags_in(skin: Skin, trace: Trace) -> set[str]:
     """Flags and counters that frames on the wire show, hellos among them."""
-    data = bytes(value for _, value in trace.bytes)
-    seen = set()
-    for packet in data[: data.rindex(0)].split(b"\0"):
-        plain = protocol.unseal(packet)
-        if protocol.kind_of(plain) == protocol.KIND_HELLO:
-            seen.add("hello")
-            continue
-        frame = protocol.decode_frame(plain, Derived(skin))
-        seen |= frame.flags | {name for name in ("overwritten", "stuck", "cells") if getattr(frame, name)}
+    frames, hellos = decoded(bytes(value for _, value in trace.bytes), skin)
+    seen = {"hello"} if hellos else set()
+    for frame in frames:
+        seen |= frame.flags | {name for name in ("overwritten", "heard", "cells") if getattr(frame, name)}
     return seen
 
 
@@ -81,7 +75,7 @@ def reference_run() -> tuple[Trace, Trace]:
     density = np.array([0.02, 0.3, 0.0, 0.1, 0.9])
     frames = rng.random((20, 16, 16)) < np.tile(density, 4)[:, None, None]
     stuck = [None, None, rng.random(16) < 0.2, None] * 5
-    timeline = Timeline.frames(skin, frames, stuck, requests=[700, 3000, 3040, 9000])
+    timeline = Timeline.frames(skin, frames, stuck, requests([700, 3000, 3440, 9000], 4))
     cycles = 20 * 16 * 72
     return predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)
 
@@ -98,7 +92,7 @@ def test_covering_set_holds_every_pair_of_choices():
 def test_reference_skin_in_amaranths_simulator():
     expected, got = reference_run()
     assert compare(expected, got) > 3_000
-    assert flags_in(Skin(), expected) >= {"hello", "requested", "overwritten", "stuck", "cells"}
+    assert flags_in(Skin(), expected) >= {"hello", "heard", "overwritten", "fault", "cells"}
 
 
 @pytest.mark.parametrize("number", range(len(COVERING)), ids=lambda number: name_of(COVERING[number]))
@@ -117,7 +111,7 @@ def test_covering_set_touches_every_flag_and_counter():
         skin = skin_for(choice)
         cycles = cycles_for(skin)
         seen |= flags_in(skin, predict(skin, stimulus(skin, cycles, seed=number), cycles))
-    assert seen == {"hello", "requested", "overflow", "overwritten", "stuck", "cells"}
+    assert seen == {"hello", "heard", "overflow", "overwritten", "fault", "cells"}
 
 
 @pytest.mark.parametrize("connectivity", [4, 8])
@@ -192,7 +186,7 @@ def test_hello_comes_again_after_half_a_second():
     timeline = stimulus(skin, cycles, seed=2)
     expected = predict(skin, Timeline(timeline.pieces), cycles)
     data = bytes(value for _, value in expected.bytes)
-    assert data.count(protocol.encode_hello(skin)) == 2
+    assert len(decoded(data, skin)[1]) == 2
     compare(expected, bench_native.run(skin, Timeline(timeline.pieces), cycles))
 
 

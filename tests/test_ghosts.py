@@ -16,7 +16,7 @@ from contactfpga_hdl.build import plan_for
 from contactfpga_sim import bench_native
 from contactfpga_sim.circuit import Circuit
 from contactfpga_sim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, predict, requests
 
 BARE = Circuit(bare=np.ones((1, 1), bool), floating=True)
 
@@ -167,7 +167,7 @@ def test_the_gateware_is_the_golden_models_in_every_clock(record_property):
     skin = Skin(rows=6, columns=7, diodes="none", connectivity=4)
     rng = np.random.default_rng(5)
     frames = np.array([BARE.read(cells)[0] for cells in rng.random((40, 6, 7)) < rng.uniform(0, 0.5, (40, 1, 1))])
-    timeline = Timeline.frames(skin, frames, requests=[5_000])
+    timeline = Timeline.frames(skin, frames, received=requests([5_000], 4))
     cycles = 40 * 6 * 72
     assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 1000
     record_property("cases", cycles)

@@ -18,9 +18,11 @@ from contactfpga_sim.covering import CHOICES, pairwise, skin_for, stimulus
 from contactfpga_sim.golden import Timeline, predict
 from contactfpga_sim.golden.debounce import debounced
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.frame import Packet, stuff
+from contactfpga_sim.golden.hello import State, hello
 from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.serial import line, received
+from contactfpga_sim.golden.packet import Packet, stuff
+from contactfpga_sim.golden.request import Heard
+from contactfpga_sim.golden.serial import Byte, line, received
 
 SCAN = 16 * 72  # reference Skin: 60 clocks settle, 12 release
 FRESH = np.zeros((16, 16), bool)
@@ -33,20 +35,20 @@ def cells_at(*places: tuple[int, int], shape: tuple[int, int] = (16, 16)) -> np.
     return cells
 
 
-def packets(trace: golden.Trace) -> list[tuple[int, bytes]]:
+def packets(skin: Skin, trace: golden.Trace) -> list[tuple[int, bytes]]:
     """(cycle of the first byte, unsealed packet) of every whole packet in a trace."""
     found, begun, data = [], None, bytearray()
     for cycle, value in trace.bytes:
         begun = cycle if begun is None else begun
         data.append(value)
-        if value == protocol.DELIMITER:
-            found.append((begun, protocol.unseal(bytes(data[:-1]))))
+        if value == protocol.DELIMITER and len(data) > 1:
+            found.append((begun, protocol.unseal(bytes(data[:-1]).lstrip(b"\0"), protocol.check_prefix(skin))))
             begun, data = None, bytearray()
     return found
 
 
 def sent_frames(skin: Skin, trace: golden.Trace) -> list[protocol.Frame]:
-    plain = [packet for _, packet in packets(trace) if protocol.kind_of(packet) != protocol.KIND_HELLO]
+    plain = [packet for _, packet in packets(skin, trace) if protocol.kind_of(packet) != protocol.KIND_HELLO]
     return [protocol.decode_frame(packet, Derived(skin)) for packet in plain]
 
 
@@ -68,7 +70,7 @@ def test_rows_records_and_contact_of_the_reference_skin_by_hand():
 
 def test_bytes_and_line_of_the_reference_skin_by_hand():
     skin = Skin()
-    trace = predict(skin, Timeline.frames(skin, [FRESH]), 3 * SCAN)
+    trace = predict(skin, Timeline.frames(skin, [FRESH]), 6 * SCAN)
     hello = protocol.encode_hello(skin)
     assert trace.bytes[: len(hello)] == [(2 + 40 * place, value) for place, value in enumerate(hello)]
     assert trace.line[0] == (3, 0)
@@ -76,7 +78,7 @@ def test_bytes_and_line_of_the_reference_skin_by_hand():
     # taken one cycle after the delimiter, its first byte goes when the UART is free.
     delimiter = 2 + 40 * (len(hello) - 1)
     assert trace.bytes[len(hello)][0] == delimiter + 40
-    (begun, plain), *_ = packets(trace)[1:]
+    (begun, plain), *_ = packets(skin, trace)[1:]
     frame = protocol.decode_frame(plain, Derived(skin))
     assert (begun, frame.sequence, frame.time_us, frame.cells, frame.zones) == (delimiter + 40, 0, 61 // 12, 0, 0)
 
@@ -90,7 +92,7 @@ def test_last_byte_of_a_one_zone_frame_keeps_the_stated_bound():
         ends = [cycle for cycle, value in trace.bytes if value == 0]
         with_zone = [frame.zones for frame in sent_frames(skin, trace)].index(1)
         wire = 40 * 18  # 14 bytes a frame, 4 a zone
-        last_byte_out = ends[1 + with_zone] + 40  # the first packet is the hello
+        last_byte_out = ends[2 + with_zone] + 40  # after both delimiters of the hello
         assert SCAN < last_byte_out - closes <= 2 * SCAN + wire + 3 * 12
 
 
@@ -148,46 +150,51 @@ def test_a_full_block_costs_a_cycle_with_the_byte_behind_it():
 
 
 def test_link_sends_a_hello_first_and_answers_several_wishes_once():
-    link = Link(b"h\0", bit_clocks=4)
+    known = facts(Skin())
+    link = Link(known, State(known, [], Heard([], [])))
+    size = len(hello(known))
     link.want_hello(0)
     link.offer(0, b"f\0")
     link.want_hello(1)
-    link.advance(1000)
-    # taken at 0, byte at 2, delimiter at 42, idle from 43; the hello wanted at 1 comes before the frame
-    assert link.bytes == [(2, 104), (42, 0), (82, 104), (122, 0), (162, 102), (202, 0)]
+    link.advance(10_000)
+    # taken at 0, first byte at 2, a byte takes 40; the hello wanted at 1 comes before the frame
+    assert [cycle for cycle, _ in link.bytes] == [2 + 40 * place for place in range(2 * size + 2)]
+    assert bytes(value for _, value in link.bytes) == 2 * hello(known) + b"f\0"
     assert link.sent == 1
 
 
 def test_serial_line_by_hand():
     assert line([(10, 0x0F)], 4) == [(11, 0), (15, 1), (31, 0), (47, 1)]
     assert line([(0, 0xFF), (40, 0xFF)], 4) == [(1, 0), (5, 1), (41, 0), (45, 1)]
-    assert received([100], 4) == [100 + 2 + 2 + 36]
-    with pytest.raises(ValueError, match="apart"):
-        received([100, 139], 4)
+    assert received([(100, b"ab")], 4) == [Byte(97, 108, 100 + 2 + 2 + 36), Byte(98, 148, 100 + 2 + 2 + 76)]
+    with pytest.raises(ValueError, match="take until 140"):
+        received([(100, b"a"), (139, b"b")], 4)
 
 
-def test_request_flags_the_next_frame_and_brings_a_hello():
+@pytest.mark.parametrize("wants_hello", [False, True])
+def test_frames_from_the_next_sample_on_tell_a_request_and_a_hello_repeats_its_number(wants_hello):
     skin = Skin()
-    start = 10 * SCAN
-    trace = predict(skin, Timeline([], [start]), 16 * SCAN)
-    flagged = [frame.time_us for frame in sent_frames(skin, trace) if "requested" in frame.flags]
-    came = received([start], 4)[0]
-    strobes = [index * SCAN + 61 for index in range(20)]
-    assert flagged == [min(strobe for strobe in strobes if strobe > came) // 12]
-    hellos = [cycle for cycle, plain in packets(trace) if protocol.kind_of(plain) == protocol.KIND_HELLO]
-    assert len(hellos) == 2
-    assert hellos[1] > came
+    start, number = 10 * SCAN, 0x12345
+    trace = predict(skin, Timeline([], [(start, golden.request(number, wants_hello))]), 26 * SCAN)
+    told = {frame.time_us: frame.heard for frame in sent_frames(skin, trace)}
+    came = start + 9 * 40 + 2 + 2 + 36
+    assert told == {time_us: number % 8 * (12 * time_us > came) for time_us in told}
+    assert set(told.values()) == {0, number % 8}
+    hellos = [(cycle, plain) for cycle, plain in packets(skin, trace) if plain[-1] >> 4 == protocol.KIND_HELLO]
+    assert len(hellos) == 1 + wants_hello
+    for cycle, plain in hellos:
+        assert protocol.HelloReader().take(plain).heard == number * (cycle > came)
 
 
-def test_request_of_an_overwritten_frame_moves_to_the_newer_one():
+def test_frames_that_are_overwritten_take_no_request_with_them():
     skin = Skin(baud=100_000)  # a frame takes 16 scans on the wire
-    start = 50 * SCAN
-    trace = predict(skin, Timeline([], [start]), 120 * SCAN)
+    start = 150 * SCAN
+    trace = predict(skin, Timeline([], [(start, golden.request(0x12345))]), 300 * SCAN)
     frames = sent_frames(skin, trace)
     assert [frame.sequence for frame in frames] == list(range(len(frames)))
-    assert sum("requested" in frame.flags for frame in frames) == 1
-    flagged = next(frame for frame in frames if "requested" in frame.flags)
-    assert flagged.time_us > received([start], 120)[0] // 12 + SCAN // 12
+    came = start + 9 * 1200 + 2 + 60 + 9 * 120
+    assert [frame.heard for frame in frames] == [5 * (12 * frame.time_us > came) for frame in frames]
+    assert {frame.heard for frame in frames} == {0, 5}
 
 
 def test_unchanged_frames_are_kept_back_until_the_keep_alive():
@@ -201,7 +208,7 @@ def test_unchanged_frames_are_kept_back_until_the_keep_alive():
 def test_overflow_carries_what_fits_and_counts_all():
     skin = Skin(rows=3, columns=5, zone_capacity=2)
     cells = cells_at((0, 0), (0, 2), (0, 4), (2, 0), shape=(3, 5))
-    trace = predict(skin, Timeline.frames(skin, [cells] * 12), 12 * 3 * 72)
+    trace = predict(skin, Timeline.frames(skin, [cells] * 40), 40 * 3 * 72)
     frame = sent_frames(skin, trace)[-1]
     assert (frame.flags, frame.zones, frame.cells) == ({"overflow"}, 4, 4)
     assert frame.moments.tolist() == [[1, 0, 0], [1, 2, 0]]
@@ -211,9 +218,9 @@ def test_stuck_columns_read_pressed_and_are_counted_once():
     skin = Skin(rows=2, columns=4, mask=((0, 1), (0, 3), (1, 3)))
     stuck = np.array([True, True, False, True])
     cells = np.zeros((2, 4), bool)
-    trace = predict(skin, Timeline.frames(skin, [cells] * 30, [stuck] * 30), 30 * 2 * 72)
+    trace = predict(skin, Timeline.frames(skin, [cells] * 60, [stuck] * 60), 60 * 2 * 72)
     assert [event[1:] for event in trace.rows[:2]] == [(0b0001, False), (0b0011, True)]
-    assert {frame.stuck for frame in sent_frames(skin, trace)[1:]} == {2}
+    assert {frame.flags for frame in sent_frames(skin, trace)[1:]} == {frozenset({"fault"})}
 
 
 @pytest.mark.parametrize("choice", pairwise(CHOICES), ids=lambda choice: "x".join(map(str, choice["sheet"])))
@@ -227,9 +234,9 @@ def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
     strobe = known.row_shift + known.settle + 1 + known.column_shift
     late = strobe + 1 + (skin.columns + 3 if known.debounced else 0)
     seen = 0
-    for begun, plain in packets(trace):
+    for begun, plain in packets(skin, trace):
         if protocol.kind_of(plain) == protocol.KIND_HELLO:
-            assert protocol.decode_hello(plain) == protocol.Hello.of(skin)
+            assert protocol.HelloReader().take(plain).sheet == skin.sheet
             continue
         frame = protocol.decode_frame(plain, Derived(skin))
         scans = [  # a few, where a scan takes less than a microsecond

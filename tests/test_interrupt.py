@@ -128,7 +128,11 @@ def test_a_command_listens_even_where_its_shell_would_have_it_ignore_the_signal(
     code = "from contactfpga import interrupt; import time; print(1, flush=True); "
     code += "interrupt.guarded(lambda: print(2, flush=True) or time.sleep(60))"
     with subprocess.Popen(
-        [sys.executable, "-c", f"import sys; {code.replace('interrupt.guarded', 'r = interrupt.guarded')}; sys.exit(r)"],
+        [
+            sys.executable,
+            "-c",
+            f"import sys; {code.replace('interrupt.guarded', 'r = interrupt.guarded')}; sys.exit(r)",
+        ],
         **pipes,
         text=True,
         preexec_fn=deaf,

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from amaranth.hdl import Cat, Const, Mux, Signal
+from amaranth.hdl import Cat, Const, Signal
 
 from contactfpga.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
 from contactfpga_hdl.odometer import LIVE_DIGITS, Odometer

@@ -1,0 +1,20 @@
+"""What the product reads in bytes that a board sent."""
+
+from contactfpga import framing, protocol
+from contactfpga.hello import KIND_HELLO
+from contactfpga.widths import Widths
+
+
+def decoded(data, skin):
+    """Frames and plain hellos in whole packets; what comes after the last delimiter does not count."""
+    widths, before = Widths(skin.sheet), protocol.check_prefix(skin)
+    frames, hellos = [], []
+    for packet in data[: data.rfind(0) + 1].split(b"\0"):
+        if not packet:
+            continue
+        plain = framing.unseal(packet, before)
+        if framing.kind_of(plain) == KIND_HELLO:
+            hellos.append(plain)
+        else:
+            frames.append(protocol.decode_frame(plain, widths))
+    return frames, hellos
