@@ -126,7 +126,7 @@ def test_what_nobody_reads_is_dropped_and_counted():
     [
         (Skin(), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 6000000 would"),  # 7 MHz does not make 3 Mbaud
         (Skin(baud=1_000_000), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 7000000 would"),
-        (Skin(), 0.95, "5% of it at 12 MHz; no slower clock"),
+        (Skin(), 0.95, "5% of it at 12 MHz; the clock that would hold it does not go with baud = 3000000"),
     ],
 )
 def test_a_slow_board_says_which_clock_would_hold(skin, share, told):

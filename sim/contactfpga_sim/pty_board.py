@@ -194,7 +194,7 @@ def slip_told(skin: Skin, share: float) -> str:
     advice = (
         f"a Skin with clock_hz = {clock_hz} would hold it on this machine"
         if clock_hz
-        else "no slower clock goes with the other values of this Skin"
+        else f"the clock that would hold it does not go with baud = {skin.baud} and the rest of this Skin"
     )
     return f"slower than real time: {held:.0%} of it at {skin.clock_hz / 1e6:g} MHz; {advice}"
 
