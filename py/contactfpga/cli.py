@@ -9,7 +9,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga.commands import cover_flags, fit_flags
+from contactfpga import limits
+from contactfpga.commands import cover_flags, fit_flags, numbers
 from contactfpga.errors import ContactFPGAError, MissingExtra
 
 _COMMANDS = {
@@ -85,8 +86,9 @@ def _parser() -> argparse.ArgumentParser:
 def _connection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("port", nargs="?", metavar="PORT", help=_PORT)
     parser.add_argument("--skin", metavar="FILE", help="Skin the board must be built from; its baud rate is taken")
-    parser.add_argument("--baud", type=int, help="bits a second (that of the Skin, else 3000000)")
-    parser.add_argument("--timeout", type=float, default=1.0, help="seconds to wait for the board (default: 1)")
+    parser.add_argument("--baud", type=numbers.BAUD, help="bits per second (that of the Skin, else 3000000)")
+    wait = "seconds to wait for the board (default: 1)"
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
 
 
 def _zones(parser: argparse.ArgumentParser) -> None:
@@ -109,14 +111,16 @@ def _board(parser: argparse.ArgumentParser) -> None:
 
 def _doctor(parser: argparse.ArgumentParser) -> None:
     _connection(parser)
-    parser.add_argument("--seconds", type=float, default=1.0, help="how long frames are counted (default: 1)")
+    long = "how long frames are counted (default: 1)"
+    parser.add_argument("--seconds", type=numbers.SECONDS, default=1.0, help=long)
 
 
 def _build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("board", metavar="BOARD", help=_BOARD)
     parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board)")
     parser.add_argument("--output", metavar="DIR", help="folder for what is built (default: build/BOARD)")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="where place and route starts (default: 1)")
+    start = "where place and route starts (default: 1)"
+    parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
 
 
 def _flash(parser: argparse.ArgumentParser) -> None:
@@ -127,20 +131,22 @@ def _flash(parser: argparse.ArgumentParser) -> None:
 def _replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("frames", metavar="FRAMES.npy", help="array (frames, rows, columns), bool or numbers")
     parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help="default: 8")
-    parser.add_argument("--threshold", type=float, help="cells above this count as pressed; needed for numbers")
-    parser.add_argument("--pitch-mm", type=float, default=10.0, help="distance of rows and columns (default: 10)")
+    parser.add_argument("--threshold", type=numbers.CELL, help="cells above this count as pressed; needed for numbers")
     parser.add_argument(
-        "--barycenter-bits", type=int, metavar="K", help="barycenters divided on the board, to 1/2^K cell"
+        "--pitch-mm", type=numbers.PITCH_MM, default=10.0, help="distance of rows and columns (default: 10)"
     )
+    bits, divided = numbers.whole(0, limits.MAX_BARYCENTER_BITS), "barycenters divided on the board, to 1/2^K cell"
+    parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
     parser.add_argument("--json", action="store_true", help="one JSON object a frame and line")
 
 
 def _chart(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", action="append", metavar="NAME", help="only this one; can be repeated")
     parser.add_argument("--family", action="append", metavar="NAME", help="only these scenes; can be repeated")
-    parser.add_argument("--placements", type=int, default=1000, metavar="N", help="for each point (default: 1000)")
-    parser.add_argument("--seed", type=int, default=0, help="of the placements (default: 0)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a core)")
+    count = numbers.whole(1, 1_000_000)
+    parser.add_argument("--placements", type=count, default=1000, metavar="N", help="for each point (default: 1000)")
+    parser.add_argument("--seed", type=numbers.SEED, default=0, help="of the placements (default: 0)")
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work instead")
     parser.add_argument("--no-size", action="store_true", help="leave out place and route")
     parser.add_argument("--output", metavar="DIR", default="build/chart", help="folder (default: build/chart)")
@@ -154,13 +160,12 @@ def _failures(parser: argparse.ArgumentParser) -> None:
 
 def _arm(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", default="paper", metavar="NAME", help="paper, paper-offset, push or a .toml file")
-    parser.add_argument(
-        "--latency", type=float, default=6.0, metavar="MS", help="that is put in (default: the paper's 6)"
-    )
+    late, usual = numbers.number(0, 10_000, "ms"), "that is put in (default: the paper's 6)"
+    parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
     parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin)")
     parser.add_argument("--json", action="store_true", help="one JSON object, in SI units, and no pictures")
     parser.add_argument("--charts", action="store_true", help="draw force, safe speed and thickness against latency")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes for the charts (default: one a core)")
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="processes for the charts (default: one a core)")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that works the charts out instead"
     )
