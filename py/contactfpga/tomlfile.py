@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from contactfpga.regular import open_regular
 from contactfpga.values import shown
 
 MAX_BYTES = 1_000_000
@@ -32,10 +31,7 @@ def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
 
 
 def _text(path: str | Path, refused: type[ValueError]) -> str:
-    # A FIFO would be waited for, a device read for ever.
-    if not stat.S_ISREG(os.stat(path).st_mode):
-        raise refused(f"{path}: not a file; a TOML file is needed")
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")

@@ -24,6 +24,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.label_bench import LabelBench
+from contactfpga_sim.recordings import Recording
 from contactfpga_sim.scenes import CONTACTS, edge, fingertip, palm, two_fingers
 from contactfpga_sim.shapes import variants
 
@@ -272,7 +273,7 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     """Evenly spaced frames of each recording in the folder."""
     found = {}
     for path in sorted(folder.glob("*.npz")):
-        frames = np.load(path, allow_pickle=False)["pressed"]
+        frames = Recording.load(path).pressed
         found[path.name.partition(".")[0]] = frames[:: max(1, len(frames) // RECORDED)][:RECORDED]
     return found
 

@@ -43,7 +43,7 @@ def main(args: argparse.Namespace) -> int:
 
 def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
-    sources = tuple(source(name, args.seed) for name in args.scenes)
+    sources = tuple(source(name, args.seed, args.threshold) for name in args.scenes)
     base = Skin.load(args.skin) if args.skin else None
     goals = Goals(
         miscounted=_share(args.miscounted),
