@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from contactfpga import limits
 from contactfpga.commands import cover_flags, fit_flags, numbers
 from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.regular import told
+from contactfpga.values import visible_lines
 
 _COMMANDS = {
     "zones": "contactfpga.commands.zones",
@@ -29,13 +31,25 @@ _COMMANDS = {
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
+_EXTRAS = {
+    "build": "boards",
+    "chart": "chart",
+    "fit": "chart",
+    **dict.fromkeys(("board", "replay", "failures", "arm", "cover"), "sim"),
+}
+"""Extra with all that a command needs; of the others it depends on the port."""
+
 _PORT = "device path, sim://, replay://FILE; none: the one supported board that is plugged in"
 _BOARD = "icebreaker, icestick, ulx3s-12f or ulx3s-85f"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors print one line that names the next step."""
-    args = _parser().parse_args(arguments)
+    parser = _parser()
+    args = parser.parse_args(arguments)
+    if args.command is None:
+        parser.print_help(sys.stderr)
+        return 2
     try:
         return importlib.import_module(_COMMANDS[args.command]).main(args) or 0
     except KeyboardInterrupt:
@@ -45,18 +59,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except ModuleNotFoundError as error:
         return _failed(_missing(args.command, error))
-    except (ContactFPGAError, ValueError, OSError) as error:
+    except MissingExtra as error:  # of a part that does not know which command it serves
+        extra = _EXTRAS.get(args.command)
+        return _failed(MissingExtra(error.what, extra) if extra else error)
+    except (ContactFPGAError, ValueError) as error:
         return _failed(error)
+    except OSError as error:
+        return _failed(told(error))
 
 
-def _failed(error: Exception) -> int:
-    print(f"contactfpga: {error}", file=sys.stderr)
+def _failed(reason: object) -> int:
+    # Names from files and devices are part of it.
+    print(f"contactfpga: {visible_lines(str(reason))}", file=sys.stderr)
     return 1
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
-    by_command = {"build": "boards", "chart": "chart", "fit": "chart"}.get(command, "sim")
-    extra = {"rich": "cli", "distributed": "cluster"}.get((error.name or "").split(".")[0], by_command)
+    package = (error.name or "").split(".")[0]
+    extra = "cluster" if package == "distributed" else _EXTRAS.get(command, "cli" if package == "rich" else "sim")
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
@@ -67,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="Without a board: contactfpga zones sim://",
     )
     parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     _zones(commands.add_parser("zones", help="show the contact zones, live"))
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))
     _board(commands.add_parser("board", help="run the virtual board on a pseudo-terminal"))

@@ -6,8 +6,8 @@ import contextlib
 import time
 from pathlib import Path
 from typing import Any, Protocol
-from urllib.parse import parse_qsl, urlsplit
 
+from contactfpga import recording, sim_address
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
 from contactfpga.skin import Skin
 
@@ -91,21 +91,18 @@ class SerialTransport:
 
 
 class SimTransport:
-    """The virtual board, simulated while it is read: ``sim://?scene=NAME&skin=FILE``."""
+    """The virtual board, simulated while it is read: ``sim://?scene=NAME&skin=FILE&threshold=NUMBER``."""
 
     live = True
 
     def __init__(self, name: str):
         self.name = name
-        options = dict(parse_qsl(urlsplit(name).query, keep_blank_values=True))
-        unknown = sorted(set(options) - {"scene", "skin"})
-        if unknown or urlsplit(name).netloc or urlsplit(name).path:
-            raise PortNotFound(f"{name}: it reads sim://, with ?scene=NAME and &skin=FILE where wanted")
-        skin = Skin.load(options["skin"]) if "skin" in options else None
+        asked = sim_address.parse(name)
+        skin = Skin.load(asked.skin) if asked.skin is not None else None
         try:
             from contactfpga_sim.board import VirtualBoard
 
-            self._board: Any = VirtualBoard(skin=skin, scene=options.get("scene"))
+            self._board: Any = VirtualBoard(skin=skin, scene=_scene(asked))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -132,11 +129,7 @@ class ReplayTransport:
 
     def __init__(self, name: str):
         self.name = name
-        path = Path(name.removeprefix("replay://")).expanduser()
-        try:
-            self._file = open(path, "rb")  # noqa: SIM115 - closed by close()
-        except OSError as error:
-            raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; is the path right?") from None
+        self._file = recording.open_recorded(name)
 
     def read(self, timeout_s: float) -> bytes:
         data = self._file.read(4096)
@@ -163,10 +156,7 @@ class Recorder:
         self.live = transport.live
         self.write = transport.write
         self.clock = transport.clock
-        try:
-            self._file = open(path, "wb")  # noqa: SIM115 - closed by close()
-        except OSError as error:
-            raise ContactFPGAError(f"{path} cannot be written: {_reason(error)}") from None
+        self._file = recording.create(path, transport.name)
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
@@ -185,6 +175,17 @@ def connect(name: str, baud: int) -> Transport:
     if name.startswith("replay:"):
         return ReplayTransport(name)
     return SerialTransport(name, baud)
+
+
+def _scene(asked: sim_address.SimAddress) -> Any:
+    """What :class:`~contactfpga_sim.board.VirtualBoard` takes as its scene."""
+    if asked.threshold is None:
+        return asked.scene
+    from contactfpga_sim.recordings import Recording
+
+    if asked.scene is None or not asked.scene.endswith((".npy", ".npz")):
+        raise ValueError(f"threshold is {asked.threshold:g}; only numbers of a .npy or .npz file are compared with it")
+    return Recording.load(asked.scene, asked.threshold)
 
 
 def _reason(error: Exception) -> str:
