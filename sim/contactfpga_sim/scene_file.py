@@ -124,7 +124,7 @@ def _kind(where: str, given: Any) -> Kind:
         raise SceneFileError(f"{where} is {given!r}; it must be a part, [[contact]]")
     values = dict(given)
     shape = values.pop("shape", None)
-    if shape not in SHAPES:
+    if not isinstance(shape, str) or shape not in SHAPES:
         raise SceneFileError(f"{where}: shape is {shape!r}; it must be one of {', '.join(SHAPES)}")
     usual = SHAPES[shape][1]
     common = [field.name for field in dataclasses.fields(Kind) if field.name != "sizes"]

@@ -19,6 +19,8 @@ from contactfpga.values import is_finite, shown
 
 _NEEDED = object()
 
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Of a number in SI units; what follows from it can be computed."""
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
 """Of cover and link; who means mm is told."""
 
@@ -203,8 +205,8 @@ def _fits(path: str | Path, name: str, key: str, value: Any, default: Any) -> No
     elif isinstance(default, bool):
         right, wanted = isinstance(value, bool), "true or false"
     else:
-        right = is_finite(value)
-        wanted = "a finite number"
+        right = is_finite(value) and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
+        wanted = f"a number, 0 or from {SMALLEST:g} to {LARGEST:g}"
     if right and key in LENGTHS and value > MAX_LENGTH_M:
         right, wanted = False, f"a length in m, at most {MAX_LENGTH_M:g}; 5 mm is 0.005"
     if not right:
