@@ -365,6 +365,29 @@ def test_random_values_in_files_never_end_in_a_traceback(name, data, run, files)
         refused(status, errors)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("gear = ", "gear = 1e300 #"),
+        ("thickness_m = ", "thickness_m = 1e-300 #"),
+        ("period_s = ", "period_s = 1e-300 #"),
+        ("[foam]", "[run]\nstep_s = 1e-9\n[foam]"),
+        ("[foam]", "[run]\nduration_s = 1e6\n[foam]"),
+    ],
+)
+def test_a_case_that_cannot_be_computed_is_refused(tmp_path, run, old, new):
+    text = (ROOT / "sim/contactfpga_sim/arm/cases/paper.toml").read_text()
+    assert old in text
+    (tmp_path / "case.toml").write_text(text.replace(old, new, 1))
+    assert "it must" in refused(*run("arm", "--json", "--case", str(tmp_path / "case.toml")))
+
+
+def test_a_case_that_is_like_itself_is_refused(tmp_path, run):
+    path = tmp_path / "case.toml"
+    path.write_text(f"like = {str(path)!r}")
+    assert "it must name another case" in refused(*run("arm", "--case", str(path)))
+
+
 @pytest.mark.timeout(120)
 @pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize("suffix", ["npy", "npz", "bin"])

@@ -11,6 +11,10 @@ MAX_LENGTH_M = 1.0
 """No thickness, pitch, offset or radius of a cover on a robot is longer: who writes 5 means mm."""
 
 
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Of what a file says in SI units, 0 aside; powers of it are still numbers."""
+
+
 class CoverError(ContactFPGAError, ValueError):
     """A value that no cover can have; the message names it and the limit."""
 

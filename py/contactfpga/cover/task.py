@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga import tomlfile
-from contactfpga.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
+from contactfpga.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
 from contactfpga.cover.elastic import THICKNESS_RULES
 from contactfpga.cover.foams import FOAMS, Foam, find
 from contactfpga.cover.impact import Arm
@@ -19,8 +19,6 @@ from contactfpga.values import is_finite, shown
 
 _NEEDED = object()
 
-SMALLEST, LARGEST = 1e-12, 1e12
-"""Of a number in SI units; what follows from it can be computed."""
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
 """Of cover and link; who means mm is told."""
 

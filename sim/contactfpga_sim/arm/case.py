@@ -15,6 +15,8 @@ from contactfpga_sim.arm.parts import BEHAVIOURS, Contacts, Control, Foam, Link,
 
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz")
+MAX_STEPS = 1_000_000
+"""In a run."""
 STEPS_A_TIME_CONSTANT = 4
 """Steps that the current's time constant, the plant's shortest, has to have."""
 
@@ -53,9 +55,11 @@ class Case:
             raise CaseError(
                 f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the current takes"
             )
+        if (steps := (self.run.lead_s + self.run.duration_s) / self.run.step_s) > MAX_STEPS:
+            raise CaseError(f"lead_s + duration_s is {steps:.3g} times step_s; it must be at most {MAX_STEPS:,} times")
         for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
             part = self.run.step_s if name == "period_s" else self.control.period_s
-            if abs(whole / part - round(whole / part)) > 1e-6:
+            if abs(whole / part - round(whole / part)) > 1e-6 or round(whole / part) < 1:
                 raise CaseError(f"{name} is {whole:g}; it must be a whole number of times {part:g} s")
 
     @functools.cached_property
