@@ -212,6 +212,21 @@ def test_millimeters_are_told_from_meters(run):
     assert "lengths are in m, 5 mm is 0.005" in refused(*run(*SENSE, "--offset", "5", "--thickness", "5"))
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("cover", "thickness_m = 0.005", "thickness_m = 5"),
+        ("design", "thickness_m = ", "thickness_m = 5 #"),
+        ("design", "pitch_m = ", "pitch_m = 10 #"),
+    ],
+)
+def test_millimeters_in_files_are_told_from_meters(tmp_path, run, name, old, new):
+    command, text = BASES[name]
+    assert old in text
+    (tmp_path / "file.toml").write_text(text.replace(old, new, 1))
+    assert "it must be a length in m, at most 1; 5 mm is 0.005" in refused(*run(*command, str(tmp_path / "file.toml")))
+
+
 # ---- every numeric option of every command
 
 
@@ -301,6 +316,7 @@ BASES = {
         ["zones", "sim://", "--skin"],
         "rows = 8\n[cover]\nmodel = 'bonded'\nthickness_m = 0.005\n[cover.switch]\n",
     ],
+    "patch": [["zones", "sim://", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
     "design": [["cover", "design"], (ROOT / "examples/paper-second-design.toml").read_text()],
     "scenes": [["fit"], (ROOT / "examples/scenes-hands.toml").read_text()],
     "case": [["arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/arm/cases/paper.toml").read_text()],
