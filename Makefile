@@ -3,8 +3,10 @@
 
 VENV := .venv
 PY   := $(VENV)/bin/python
-HERE := $(CURDIR)
 , := ,
+
+# What the user named, as one word of the shell's: make sees no $ in it, the shell no quotes, spaces or $.
+quoted = '$(subst ','\'',$(value $(1)))'
 
 # Passed on: make sim ARGS="--help", make test ARGS="-k labeller -x"
 ARGS ?=
@@ -54,15 +56,19 @@ endif
 endif
 
 bitstream: $(VENV)/.stamp-boards ## build a bitstream: make bitstream BOARD=icebreaker [SKIN=file.toml]
-	$(VENV)/bin/contactfpga build $(BOARD) $(if $(SKIN),--skin $(SKIN)) $(ARGS)
+	$(VENV)/bin/contactfpga build $(call quoted,BOARD) $(if $(value SKIN),--skin $(call quoted,SKIN)) $(ARGS)
 
 bitstreams: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## build one for every board and check size and timing
 	$(PY) -m pytest -m campaign $(ARGS) tests/test_bitstream.py
 
-RECORDINGS ?= $(wildcard ../shared/data/*.npz)
+# A .npz file, or a folder of them.
+ifeq ($(origin RECORDINGS),undefined)
+RECORDINGS := $(wildcard ../shared/data)
+endif
 bitstream-replay: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## simulate what the bitstreams hold: [BOARD=..., SKIN=...] ARGS="--frames 100000"
-	$(PY) -m contactfpga_sim.bitstream_replay $(BOARD) $(if $(SKIN),--skin $(SKIN)) \
-	    $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(ARGS)
+	$(PY) -m contactfpga_sim.bitstream_replay $(if $(value BOARD),$(call quoted,BOARD)) \
+	    $(if $(value SKIN),--skin $(call quoted,SKIN)) \
+	    $(if $(value RECORDINGS),--recordings $(call quoted,RECORDINGS)) $(ARGS)
 
 constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
 	$(PY) -m contactfpga_hdl.constraints
@@ -121,8 +127,9 @@ distclean: clean ## delete .venv too
 compiler:
 	@sh scripts/check compiler
 
-# .venv holds absolute paths: in a copied or moved clone it would still run the code of the old folder.
-ifneq ($(shell cat $(VENV)/.folder 2>/dev/null),$(HERE))
+# .venv holds absolute paths: in a copied or moved clone it would still run the code of the old folder. The shell compares
+# them, as make would read a $ or a comma in the folder's name.
+ifneq ($(shell test "`cat $(VENV)/.folder 2>/dev/null`" = "`pwd -P`" && echo same),same)
 $(VENV)/.stamp-venv: FORCE
 endif
 
@@ -130,7 +137,7 @@ $(VENV)/.stamp-venv:
 	@python=`sh scripts/check python` && \
 	    echo ">>> Creating $(VENV) with $$python" && \
 	    "$$python" -m venv --clear $(VENV)
-	@printf '%s\n' "$(HERE)" > $(VENV)/.folder
+	@pwd -P > $(VENV)/.folder
 	@touch $@
 
 # $(call install,extras,what it costs). The constraints hold for the packages that build packages, too; pip reads

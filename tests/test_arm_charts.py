@@ -73,12 +73,6 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
 
 
-@pytest.mark.parametrize("latency", ["-1", "nan", "inf"])
-def test_a_latency_that_cannot_be_is_refused(latency, capsys):
-    assert cli.main(["arm", f"--latency={latency}"]) == 1
-    assert "--latency is" in capsys.readouterr().err
-
-
 def test_charts_of_an_arm_at_rest_are_refused(capsys):
     assert cli.main(["arm", "--case", "push", "--charts"]) == 1
     assert "behaviour is 'comply' at 0 m/s" in capsys.readouterr().err

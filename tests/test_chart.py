@@ -236,7 +236,6 @@ def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, caps
     [
         (["--method", "guess"], "--method 'guess' is not known; take one of: run, 5 mm"),
         (["--family", "guess"], "--family 'guess' is not known; take one of: bumper"),
-        (["--placements", "0"], "--placements is 0; it must be at least 1"),
     ],
 )
 def test_what_cannot_be_charted_is_refused(arguments, message, capsys):

@@ -442,7 +442,6 @@ def test_sense_command_finds_the_best_thickness(run):
     ("flags", "message"),
     [
         (["sense", *SWITCH], "nothing is asked; give --offset, --force or --pitch"),
-        (["sense", "--offset", "nan", *SWITCH], "offset_m is nan; it must be a finite number, 0 m or above"),
         (["sense", "--force", "3"], "thickness is missing; the best one is found for --offset or --pitch alone"),
         (
             ["sense", "--offset", "0.01", "--model", "bonded", "--contact", "patch"],
@@ -450,8 +449,6 @@ def test_sense_command_finds_the_best_thickness(run):
         ),
         (["sense", "--offset", "0", "--contact", "patch", *SWITCH], "--contact is 'patch'; name the model, too"),
         (["sense", "--offset", "0", "--modulus", "1e5", *SWITCH], "--effective-radius is missing; a patch needs"),
-        (["impact", *ARM, "--modulus", "1e5", "--speed", "1e200"], "a number is too large to compute with"),
-        (["impact", *ARM, "--modulus", "-1"], "modulus_pa is -1.0; it must be a finite number above 0 Pa"),
         (["impact", *ARM, "--time", "0.01", "--method", "ode"], "the modulus for a time is found by 'auto' only"),
         (["design", "nowhere.toml"], "nowhere.toml"),
     ],

@@ -79,15 +79,15 @@ def test_variants_are_flips_and_transposes_without_doubles():
 
 def test_recordings_and_callbacks_are_scenes(tmp_path):
     skin = Skin(rows=2, columns=3)
-    frames = np.zeros((2, 2, 3), np.uint8)
-    frames[1, 0, 2] = 9
+    frames = np.zeros((2, 2, 3), bool)
+    frames[1, 0, 2] = True
     path = tmp_path / "touch.npy"
     np.save(path, frames)
     scene = scenes.scene(skin, path)
     assert not scene(0.0).any()
     assert scene(1 / DEFAULT_HZ)[0, 2]
     assert not scene(2 / DEFAULT_HZ).any()
-    assert scenes.scene(skin, lambda seconds: np.ones((2, 3)))(0.0).all()
+    assert scenes.scene(skin, lambda seconds: np.ones((2, 3), bool))(0.0).all()
 
 
 def test_what_is_no_scene_is_refused(tmp_path):
@@ -95,7 +95,7 @@ def test_what_is_no_scene_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"'elbow' is not known; take a \.npy or \.npz file or one of fingertip"):
         scenes.scene(skin, "elbow")
     with pytest.raises(ValueError, match=r"shape \(1, 3, 2\); the sheet takes \(frames, 2, 3\)"):
-        scenes.scene(skin, np.zeros((3, 2)))
+        scenes.scene(skin, np.zeros((3, 2), bool))
     with pytest.raises(ValueError, match=r"shape \(1,\); the sheet has 2x3"):
         scenes.scene(skin, lambda seconds: [True])(0.0)
 

@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -34,6 +35,13 @@ REFUSED = [
     ({"pitch_x_mm": "10"}, "pitch_x_mm is '10'; it must be a finite number"),
     ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
     ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
+    ({"connectivity": 8.0}, "connectivity is 8.0; it must be one of 4, 8"),
+    ({"connectivity": True}, "connectivity is True; it must be one of 4, 8"),
+    ({"connectivity": "8"}, "connectivity is '8'; it must be one of 4, 8"),
+    ({"surface": 8}, "surface is 8; it must be one of 'plane', 'cylinder'"),
+    ({"surface": ["plane"]}, "surface is ['plane']; it must be one of 'plane', 'cylinder'"),
+    ({"mask": [(0, 1.0)]}, "mask holds (0, 1.0); it must hold [row, column] pairs"),
+    ({"mask": [(0, True)]}, "mask holds (0, True); it must hold [row, column] pairs"),
     # its surface
     ({"surface": "sphere"}, "surface is 'sphere'; it must be one of 'plane', 'cylinder'"),
     ({"radius_mm": 50}, "radius_mm is 50.0; a plane has none, leave it out"),
@@ -191,6 +199,23 @@ def test_refused_with_value_and_limit(changes, message):
     assert isinstance(caught.value, ContactFPGAError)
 
 
+@pytest.mark.parametrize("field", ["rows", "connectivity", "pitch_x_mm", "clock_hz", "baud", "shift_hz"])
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_that_no_float_holds_are_refused_in_a_short_sentence(field, digits):
+    with pytest.raises(SkinError, match=f"^{field} is ") as caught:
+        Skin(**{field: 10**digits})
+    assert len(str(caught.value)) < 200
+
+
+def test_whole_numbers_of_numpy_make_the_same_skin():
+    plain = Skin(rows=8, columns=8, connectivity=4, mask=[(1, 2)])
+    mask = np.argwhere(np.arange(64).reshape(8, 8) == 10)
+    skin = Skin(rows=np.int64(8), columns=np.uint8(8), connectivity=np.int32(4), mask=list(map(tuple, mask)))
+    assert skin == plain
+    assert skin.fingerprint == plain.fingerprint
+    assert type(skin.rows) is type(skin.connectivity) is type(skin.mask[0][0]) is int
+
+
 JUST_WITHIN = [
     {"row_drive": "74hc595", "column_read": "74hc165", "shift_hz": 10_000},
     {"row_drive": "74hc595", "row_chains": 16, "column_read": "74hc165", "column_chains": 16, "shift_hz": 50_000_000},
@@ -317,8 +342,6 @@ def test_max_zones_is_what_the_worst_frame_of_a_small_sheet_holds(connectivity):
     """Every frame of every sheet up to 3x4, labelled by scipy."""
     ndimage = pytest.importorskip("scipy.ndimage")
     structure = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
-    import numpy as np
-
     for rows in range(1, 4):
         for columns in range(1, 5):
             words = np.arange(1 << rows * columns)[:, None] >> np.arange(rows * columns) & 1

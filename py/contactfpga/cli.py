@@ -9,8 +9,11 @@ import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga.commands import cover_flags, fit_flags
+from contactfpga import limits
+from contactfpga.commands import cover_flags, fit_flags, numbers
 from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.regular import told
+from contactfpga.values import visible_lines
 
 _COMMANDS = {
     "zones": "contactfpga.commands.zones",
@@ -28,13 +31,25 @@ _COMMANDS = {
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
+_EXTRAS = {
+    "build": "boards",
+    "chart": "chart",
+    "fit": "chart",
+    **dict.fromkeys(("board", "replay", "failures", "arm", "cover"), "sim"),
+}
+"""Extra with all that a command needs; of the others it depends on the port."""
+
 _PORT = "device path, sim://, replay://FILE; none: the one supported board that is plugged in"
 _BOARD = "icebreaker, icestick, ulx3s-12f or ulx3s-85f"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors print one line that names the next step."""
-    args = _parser().parse_args(arguments)
+    parser = _parser()
+    args = parser.parse_args(arguments)
+    if args.command is None:
+        parser.print_help(sys.stderr)
+        return 2
     try:
         return importlib.import_module(_COMMANDS[args.command]).main(args) or 0
     except KeyboardInterrupt:
@@ -44,18 +59,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except ModuleNotFoundError as error:
         return _failed(_missing(args.command, error))
-    except (ContactFPGAError, ValueError, OSError) as error:
+    except MissingExtra as error:  # of a part that does not know which command it serves
+        extra = _EXTRAS.get(args.command)
+        return _failed(MissingExtra(error.what, extra) if extra else error)
+    except (ContactFPGAError, ValueError) as error:
         return _failed(error)
+    except OSError as error:
+        return _failed(told(error))
 
 
-def _failed(error: Exception) -> int:
-    print(f"contactfpga: {error}", file=sys.stderr)
+def _failed(reason: object) -> int:
+    # Names from files and devices are part of it.
+    print(f"contactfpga: {visible_lines(str(reason))}", file=sys.stderr)
     return 1
 
 
 def _missing(command: str, error: ModuleNotFoundError) -> MissingExtra:
-    by_command = {"build": "boards", "chart": "chart", "fit": "chart"}.get(command, "sim")
-    extra = {"rich": "cli", "distributed": "cluster"}.get((error.name or "").split(".")[0], by_command)
+    package = (error.name or "").split(".")[0]
+    extra = "cluster" if package == "distributed" else _EXTRAS.get(command, "cli" if package == "rich" else "sim")
     return MissingExtra(f"`contactfpga {command}` ({error})", extra)
 
 
@@ -66,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="Without a board: contactfpga zones sim://",
     )
     parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     _zones(commands.add_parser("zones", help="show the contact zones, live"))
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))
     _board(commands.add_parser("board", help="run the virtual board on a pseudo-terminal"))
@@ -85,8 +106,9 @@ def _parser() -> argparse.ArgumentParser:
 def _connection(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("port", nargs="?", metavar="PORT", help=_PORT)
     parser.add_argument("--skin", metavar="FILE", help="Skin the board must be built from; its baud rate is taken")
-    parser.add_argument("--baud", type=int, help="bits a second (that of the Skin, else 3000000)")
-    parser.add_argument("--timeout", type=float, default=1.0, help="seconds to wait for the board (default: 1)")
+    parser.add_argument("--baud", type=numbers.BAUD, help="bits per second (that of the Skin, else 3000000)")
+    wait = "seconds to wait for the board (default: 1)"
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
 
 
 def _zones(parser: argparse.ArgumentParser) -> None:
@@ -109,14 +131,16 @@ def _board(parser: argparse.ArgumentParser) -> None:
 
 def _doctor(parser: argparse.ArgumentParser) -> None:
     _connection(parser)
-    parser.add_argument("--seconds", type=float, default=1.0, help="how long frames are counted (default: 1)")
+    long = "how long frames are counted (default: 1)"
+    parser.add_argument("--seconds", type=numbers.SECONDS, default=1.0, help=long)
 
 
 def _build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("board", metavar="BOARD", help=_BOARD)
     parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board)")
     parser.add_argument("--output", metavar="DIR", help="folder for what is built (default: build/BOARD)")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="where place and route starts (default: 1)")
+    start = "where place and route starts (default: 1)"
+    parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
 
 
 def _flash(parser: argparse.ArgumentParser) -> None:
@@ -127,20 +151,22 @@ def _flash(parser: argparse.ArgumentParser) -> None:
 def _replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("frames", metavar="FRAMES.npy", help="array (frames, rows, columns), bool or numbers")
     parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help="default: 8")
-    parser.add_argument("--threshold", type=float, help="cells above this count as pressed; needed for numbers")
-    parser.add_argument("--pitch-mm", type=float, default=10.0, help="distance of rows and columns (default: 10)")
+    parser.add_argument("--threshold", type=numbers.CELL, help="cells above this count as pressed; needed for numbers")
     parser.add_argument(
-        "--barycenter-bits", type=int, metavar="K", help="barycenters divided on the board, to 1/2^K cell"
+        "--pitch-mm", type=numbers.PITCH_MM, default=10.0, help="distance of rows and columns (default: 10)"
     )
+    bits, divided = numbers.whole(0, limits.MAX_BARYCENTER_BITS), "barycenters divided on the board, to 1/2^K cell"
+    parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
     parser.add_argument("--json", action="store_true", help="one JSON object a frame and line")
 
 
 def _chart(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", action="append", metavar="NAME", help="only this one; can be repeated")
     parser.add_argument("--family", action="append", metavar="NAME", help="only these scenes; can be repeated")
-    parser.add_argument("--placements", type=int, default=1000, metavar="N", help="for each point (default: 1000)")
-    parser.add_argument("--seed", type=int, default=0, help="of the placements (default: 0)")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes (default: one a core)")
+    count = numbers.whole(1, 1_000_000)
+    parser.add_argument("--placements", type=count, default=1000, metavar="N", help="for each point (default: 1000)")
+    parser.add_argument("--seed", type=numbers.SEED, default=0, help="of the placements (default: 0)")
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work instead")
     parser.add_argument("--no-size", action="store_true", help="leave out place and route")
     parser.add_argument("--output", metavar="DIR", default="build/chart", help="folder (default: build/chart)")
@@ -154,13 +180,12 @@ def _failures(parser: argparse.ArgumentParser) -> None:
 
 def _arm(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", default="paper", metavar="NAME", help="paper, paper-offset, push or a .toml file")
-    parser.add_argument(
-        "--latency", type=float, default=6.0, metavar="MS", help="that is put in (default: the paper's 6)"
-    )
+    late, usual = numbers.number(0, 10_000, "ms"), "that is put in (default: the paper's 6)"
+    parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
     parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin)")
     parser.add_argument("--json", action="store_true", help="one JSON object, in SI units, and no pictures")
     parser.add_argument("--charts", action="store_true", help="draw force, safe speed and thickness against latency")
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes for the charts (default: one a core)")
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="processes for the charts (default: one a core)")
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that works the charts out instead"
     )

@@ -51,7 +51,11 @@ class MissingExtra(ContactFPGAError, ImportError):
     """A command needs a part of contactfpga that is not installed."""
 
     def __init__(self, what: str, extra: str):
-        super().__init__(f"{what} needs more than is installed; install it with: pip install 'contactfpga[{extra}]'")
+        self.what = what
+        super().__init__(
+            f"{what} needs more than is installed; in the folder of contactfpga's sources, install it with: "
+            f"pip install '.[{extra}]'"
+        )
 
 
 class MissingTool(ContactFPGAError):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from contactfpga.errors import SkinError
+from contactfpga.values import is_finite, shown, whole
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -17,6 +18,8 @@ Mask = tuple[tuple[int, int], ...]
 MAX_LINES = 64
 MAX_NAME_BYTES = 32
 MAX_BAUD_ERROR = 0.015
+MIN_PITCH_MM, MAX_PITCH_MM = 0.01, 1000.0
+MIN_BAUD, MAX_CLOCK_HZ = 1200, 400_000_000
 MAX_KEEP_ALIVE_MS = 100.0
 MAX_DEBOUNCE_SCANS = 4095
 SHIFT_HZ = 8_000_000
@@ -41,30 +44,44 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 _WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "clock_hz", "baud")
 
 
-def check_types(skin: Skin) -> dict[str, float]:
-    """Every field is of its type; returns the lengths and times as floats."""
-    kept = {}
-    for name, choices in _CHOICES.items():
-        value = getattr(skin, name)
-        if value not in choices or isinstance(value, bool):
-            raise SkinError(f"{name} is {value!r}; it must be one of {', '.join(map(repr, choices))}")
-    for name in (*_WHOLE, "zone_capacity"):
-        value = getattr(skin, name)
-        if value is None and name == "zone_capacity":
-            continue
-        if not isinstance(value, int) or isinstance(value, bool):
-            raise SkinError(f"{name} is {value!r}; it must be a whole number")
+def check_types(skin: Skin) -> dict[str, Any]:
+    """Every field is of its type; returns choices, whole numbers, lengths and times as the types that they are to be.
+
+    Equal Skins have one fingerprint, so 8.0 is no 8. A whole number of numpy's is one, and is kept as Python's.
+    """
     _check_name(skin.name)
+    return (
+        {name: _choice(name, getattr(skin, name), choices) for name, choices in _CHOICES.items()}
+        | {name: _whole(name, getattr(skin, name)) for name in _WHOLE}
+        | ({} if skin.zone_capacity is None else {"zone_capacity": _whole("zone_capacity", skin.zone_capacity)})
+        | {name: _finite(name, value) for name, value in _floats(skin)}
+    )
+
+
+def _choice(name: str, value: Any, choices: tuple[Any, ...]) -> Any:
+    of_type = isinstance(value, str) if isinstance(choices[0], str) else whole(value) is not None
+    if not of_type or value not in choices:
+        raise SkinError(f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, choices))}")
+    return choices[choices.index(value)]
+
+
+def _whole(name: str, value: Any) -> int:
+    if (number := whole(value)) is None:
+        raise SkinError(f"{name} is {shown(value)}; it must be a whole number")
+    return number
+
+
+def _floats(skin: Skin) -> Iterator[tuple[str, Any]]:
     for field in dataclasses.fields(skin):
-        if field.type not in ("float", "float | None"):
-            continue
         value = getattr(skin, field.name)
-        if value is None and field.name == "radius_mm":
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SkinError(f"{field.name} is {value!r}; it must be a finite number")
-        kept[field.name] = float(value)
-    return kept
+        if field.type == "float" or (field.type == "float | None" and value is not None):
+            yield field.name, value
+
+
+def _finite(name: str, value: Any) -> float:
+    if not is_finite(value):
+        raise SkinError(f"{name} is {shown(value)}; it must be a finite number")
+    return float(value)
 
 
 def _check_name(name: object) -> None:
@@ -81,7 +98,7 @@ def check_sheet(skin: Skin) -> Mask:
     for name in ("rows", "columns"):
         _within(name, getattr(skin, name), 1, MAX_LINES)
     for name in ("pitch_x_mm", "pitch_y_mm"):
-        _within(name, getattr(skin, name), 0.01, 1000.0, "mm")
+        _within(name, getattr(skin, name), MIN_PITCH_MM, MAX_PITCH_MM, "mm")
     mask = _check_mask(skin)
     _check_registers(skin)
     _check_scan(skin)
@@ -109,18 +126,16 @@ def _check_surface(skin: Skin) -> None:
 
 def _check_mask(skin: Skin) -> Mask:
     if isinstance(skin.mask, str) or not isinstance(skin.mask, Iterable):
-        raise SkinError(f"mask is {skin.mask!r}; it must be a list of [row, column]")
+        raise SkinError(f"mask is {shown(skin.mask)}; it must be a list of [row, column]")
     cells = []
     for cell in skin.mask:
-        if (
-            not isinstance(cell, list | tuple)
-            or len(cell) != 2
-            or not all(isinstance(index, int) and not isinstance(index, bool) for index in cell)
-        ):
-            raise SkinError(f"mask holds {cell!r}; it must hold [row, column] pairs")
-        if not (0 <= cell[0] < skin.rows and 0 <= cell[1] < skin.columns):
-            raise SkinError(f"mask holds {list(cell)}; the sheet has {skin.rows} rows and {skin.columns} columns")
-        cells.append((cell[0], cell[1]))
+        pair = [whole(index) for index in cell] if isinstance(cell, list | tuple) else []
+        if len(pair) != 2 or pair[0] is None or pair[1] is None:
+            raise SkinError(f"mask holds {shown(cell)}; it must hold [row, column] pairs")
+        row, column = pair[0], pair[1]
+        if not (0 <= row < skin.rows and 0 <= column < skin.columns):
+            raise SkinError(f"mask holds {shown(pair)}; the sheet has {skin.rows} rows and {skin.columns} columns")
+        cells.append((row, column))
     if len(set(cells)) == skin.rows * skin.columns:
         raise SkinError(f"mask lists all {len(set(cells))} switches; at least one must be left")
     return tuple(sorted(set(cells)))
@@ -131,20 +146,20 @@ def _check_registers(skin: Skin) -> None:
         lines, chains = getattr(skin, f"{kind}s"), getattr(skin, f"{kind}_chains")
         if getattr(skin, wiring) == "direct":
             if chains != 1:
-                raise SkinError(f"{kind}_chains is {chains}; leave it out, or set {wiring} = '{registers}'")
+                raise SkinError(f"{kind}_chains is {shown(chains)}; leave it out, or set {wiring} = '{registers}'")
             continue
         _within(f"{kind}_chains", chains, 1, lines)
         length = math.ceil(lines / chains)
         filled = math.ceil(lines / length)
         if filled < chains:
             raise SkinError(
-                f"{kind}_chains is {chains}; {lines} {kind}s in chains of {length} fill {filled}, set "
+                f"{kind}_chains is {shown(chains)}; {lines} {kind}s in chains of {length} fill {filled}, set "
                 f"{kind}_chains = {filled}"
             )
     _within("shift_hz", skin.shift_hz, MIN_SHIFT_HZ, MAX_SHIFT_HZ, "Hz")
     if skin.row_drive == skin.column_read == "direct" and skin.shift_hz != SHIFT_HZ:
         raise SkinError(
-            f"shift_hz is {skin.shift_hz}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
+            f"shift_hz is {shown(skin.shift_hz)}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
         )
 
 
@@ -183,10 +198,10 @@ def check_link(skin: Skin) -> None:
     """Clock, baud rate and report go together."""
     _within("barycenter_bits", skin.barycenter_bits, 0, MAX_BARYCENTER_BITS)
     if skin.report != "barycenter" and skin.barycenter_bits != BARYCENTER_BITS:
-        raise SkinError(f"barycenter_bits is {skin.barycenter_bits}; leave it out, or set report = 'barycenter'")
-    if skin.clock_hz % 1_000_000 or not 1_000_000 <= skin.clock_hz <= 400_000_000:
-        raise SkinError(f"clock_hz is {skin.clock_hz}; it must be a whole number of MHz from 1 to 400 MHz")
-    _within("baud", skin.baud, 1200, skin.clock_hz // 2, "for this clock")
+        raise SkinError(f"barycenter_bits is {shown(skin.barycenter_bits)}; leave it out, or set report = 'barycenter'")
+    if skin.clock_hz % 1_000_000 or not 1_000_000 <= skin.clock_hz <= MAX_CLOCK_HZ:
+        raise SkinError(f"clock_hz is {shown(skin.clock_hz)}; it must be a whole number of MHz from 1 to 400 MHz")
+    _within("baud", skin.baud, MIN_BAUD, skin.clock_hz // 2, "for this clock")
     divisor = round(skin.clock_hz / skin.baud)
     error = skin.clock_hz / divisor / skin.baud - 1
     if abs(error) > MAX_BAUD_ERROR:
@@ -233,4 +248,4 @@ def check_timing(skin: Skin) -> None:
 
 def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     if not low <= value <= high:
-        raise SkinError(f"{name} is {value}; it must lie between {low} and {high} {unit}".rstrip())
+        raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())

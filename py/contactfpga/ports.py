@@ -6,6 +6,8 @@ import dataclasses
 import itertools
 from collections.abc import Iterable
 
+from contactfpga.values import visible
+
 FTDI = 0x0403
 
 
@@ -35,8 +37,9 @@ class Candidate:
     serial_number: str | None = None
 
     def __str__(self) -> str:
-        number = f", serial number {self.serial_number}" if self.serial_number else ""
-        return f"{self.device} ({self.boards}{number})"
+        # A USB device says what it likes of itself.
+        number = f", serial number {visible(self.serial_number)}" if self.serial_number else ""
+        return f"{visible(self.device)} ({self.boards}{number})"
 
 
 def candidates() -> list[Candidate]:

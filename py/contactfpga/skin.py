@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contactfpga import limits
+from contactfpga import limits, tomlfile
 from contactfpga.cover import Cover, CoverError, table
 from contactfpga.errors import SkinError
 from contactfpga.sheet import Sheet, max_zones
+from contactfpga.values import shown
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Skin:
 
     def __post_init__(self, cover: Cover | None = None) -> None:  # noqa: RUF033  # to type checkers it is a field
         if cover is not None and not isinstance(cover, Cover):
-            raise SkinError(f"cover is {cover!r}; it must be a contactfpga.cover.Cover")
+            raise SkinError(f"cover is {shown(cover)}; it must be a contactfpga.cover.Cover")
         self._keep(cover=cover)
         self._keep(**limits.check_types(self))
         self._keep(mask=limits.check_sheet(self))
@@ -116,11 +116,7 @@ class Skin:
     @classmethod
     def load(cls, path: str | Path) -> Skin:
         """Read a Skin from a TOML file whose keys are the fields of this class."""
-        with open(path, "rb") as file:
-            try:
-                values = tomllib.load(file)
-            except tomllib.TOMLDecodeError as error:
-                raise SkinError(f"{path}: not a TOML file: {error}") from None
+        values = tomlfile.load(path, SkinError)
         known = [*(field.name for field in dataclasses.fields(cls)), "cover"]
         unknown = sorted(set(values) - set(known))
         if unknown:

@@ -7,8 +7,8 @@ import math
 import time
 from pathlib import Path
 from typing import BinaryIO, Protocol
-from urllib.parse import parse_qsl, urlsplit
 
+from contactfpga import recording, sim_address
 from contactfpga.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
 from contactfpga.skin import Skin
@@ -122,16 +122,13 @@ class SimTransport:
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
-        """``sim://?scene=NAME&skin=FILE``"""
-        options = dict(parse_qsl(urlsplit(name).query, keep_blank_values=True))
-        unknown = sorted(set(options) - {"scene", "skin"})
-        if unknown or urlsplit(name).netloc or urlsplit(name).path:
-            raise PortNotFound(f"{name}: it reads sim://, with ?scene=NAME and &skin=FILE where wanted")
-        skin = Skin.load(options["skin"]) if "skin" in options else None
+        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
+        asked = sim_address.parse(name)
+        skin = Skin.load(asked.skin) if asked.skin is not None else None
         try:
             from contactfpga_sim.board import VirtualBoard
 
-            return cls(name, VirtualBoard(skin=skin, scene=options.get("scene")))
+            return cls(name, VirtualBoard(skin=skin, scene=_scene(asked)))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -159,13 +156,9 @@ class ReplayTransport:
 
     def __init__(self, name: str):
         self.name = name
-        location, _, pace = name.removeprefix("replay://").partition("?pace=")
-        path = Path(location).expanduser()
+        address, _, pace = name.partition("?pace=")
         self._pace = _pace(name, pace) if pace else None
-        try:
-            self._file = open(path, "rb")  # noqa: SIM115 - closed by close()
-        except OSError as error:
-            raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; is the path right?") from None
+        self._file = recording.open_recorded(address)
 
     def read(self, timeout_s: float) -> bytes:
         if self._pace is not None:
@@ -245,10 +238,7 @@ class Recorder:
         self.live, self.threaded = transport.live, transport.threaded
         self.write = transport.write
         self.clock = transport.clock
-        try:
-            self._file = open(path, "wb")  # noqa: SIM115 - closed by close()
-        except OSError as error:
-            raise ContactFPGAError(f"{path} cannot be written: {_reason(error)}") from None
+        self._file = recording.create(path, transport.name)
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
@@ -269,6 +259,17 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     if name.startswith("replay:"):
         return ReplayTransport(name)
     return SerialTransport(name, baud)
+
+
+def _scene(asked: sim_address.SimAddress) -> Any:
+    """What :class:`~contactfpga_sim.board.VirtualBoard` takes as its scene."""
+    if asked.threshold is None:
+        return asked.scene
+    from contactfpga_sim.recordings import Recording
+
+    if asked.scene is None or not asked.scene.endswith((".npy", ".npz")):
+        raise ValueError(f"threshold is {asked.threshold:g}; only numbers of a .npy or .npz file are compared with it")
+    return Recording.load(asked.scene, asked.threshold)
 
 
 def _reason(error: Exception) -> str:

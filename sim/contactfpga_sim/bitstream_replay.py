@@ -25,6 +25,7 @@ from contactfpga_sim import bench_native, native, netlist
 from contactfpga_sim.board import model_of
 from contactfpga_sim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, predict, requests
+from contactfpga_sim.recordings import Recording
 from contactfpga_sim.replay import skin_for
 from contactfpga_sim.shapes import variants
 
@@ -141,13 +142,14 @@ def main() -> int:
     parser.add_argument("board", nargs="?", choices=list(BOARDS), help="default: 8x8 on one of each FPGA")
     parser.add_argument("--skin", type=Path, help="the board's sheet; default: the one it is built with")
     parser.add_argument("--frames", type=int, default=500, help="for each board (default: %(default)s)")
-    parser.add_argument("--recordings", type=Path, nargs="*", default=[], help=".npz files with frames named `pressed`")
+    told = "a .npz file with frames named `pressed`, or a folder of such files"
+    parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
     args = parser.parse_args()
     if args.skin and not args.board:
         parser.error("--skin needs the board that it is for")
     if args.frames < 1:
         parser.error(f"--frames is {args.frames}; it must be at least 1")
-    recordings = [np.load(path, allow_pickle=False)["pressed"] for path in args.recordings]
+    recordings = [Recording.load(path).pressed for path in recordings_in(args.recordings)]
     print(f"frames       {args.frames} a board: shapes, random ones and {len(recordings)} recordings")
     runs = RUNS
     if args.board:
@@ -165,6 +167,13 @@ def main() -> int:
             print(f"FAILED       {error}")
             status = 1
     return status
+
+
+def recordings_in(path: Path | None) -> list[Path]:
+    """The file itself, or the files in a folder."""
+    if path is None:
+        return []
+    return sorted(path.glob("*.npz")) if path.is_dir() else [path]
 
 
 def _report(board: Board, skin: Skin, frames: np.ndarray) -> None:

@@ -114,6 +114,13 @@ def _last_record(trace: Trace, skin: Skin) -> int | None:
     return window[-1] - end if window else None
 
 
+LEGEND = """\
+last record after last row: below 0 where all zones ended before the frame's last row.
+touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is the
+median and the worst of touches at any instant of a scan, so both are longer."""
+"""Which number of the table is which."""
+
+
 def table_of(outcomes: list[Outcome]) -> Table:
     """One line a scene and engine."""
     table = Table(title="Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud", title_justify="left")
@@ -161,6 +168,7 @@ def main() -> int:
     scenes_run = [out for out in outcomes if out.engine == "compiled"]
     console.print(draw.in_terminal(scenes_run))
     console.print(table_of(outcomes))
+    console.print(LEGEND, markup=False, highlight=False)
     draw.to_file(scenes_run, skin, picture)
     wrong = [out for out in outcomes if out.difference or out.frame is None]
     console.print(f"Scenes and their zones: {picture}")

@@ -24,6 +24,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.label_figures import labeller_table, recorded_table
+from contactfpga_sim.recordings import Recording
 from contactfpga_sim.scenes import CONTACTS
 
 INSTANTS = 96
@@ -230,10 +231,7 @@ def built_in_scenes() -> dict[str, np.ndarray]:
 
 def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     """(n, R, C) bool: all frames of each recording in the folder."""
-    return {
-        path.name.partition(".")[0]: np.load(path, allow_pickle=False)["pressed"]
-        for path in sorted(folder.glob("*.npz"))
-    }
+    return {path.name.partition(".")[0]: Recording.load(path).pressed for path in sorted(folder.glob("*.npz"))}
 
 
 def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:

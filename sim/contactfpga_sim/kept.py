@@ -6,7 +6,6 @@ import functools
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import contactfpga
 import contactfpga_hdl
 import contactfpga_sim
-from contactfpga_sim.native import cache_folder
+from contactfpga_sim.cache import FILE_MODE, cache_folder, ready, scratch, trusted
 
 _PACKAGES = (contactfpga, contactfpga_hdl, contactfpga_sim)
 
@@ -32,13 +31,13 @@ def sources() -> str:
 
 def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
     """What ``new()`` gives, or what it gave before for the same key; it must be plain JSON."""
-    path = cache_folder() / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
-    if path.exists():
+    path = ready(cache_folder()) / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
+    if trusted(path):
         return json.loads(path.read_text())
     value = json.loads(json.dumps(new()))
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Whole or not at all, whoever else writes it at the same time.
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
-        json.dump(value, file)
-    os.replace(file.name, path)
+    with scratch(path.parent, "unkept") as work:
+        (work / "value").write_text(json.dumps(value))
+        (work / "value").chmod(FILE_MODE)
+        os.replace(work / "value", path)
     return value

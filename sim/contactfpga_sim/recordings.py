@@ -5,13 +5,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from contactfpga.limits import MAX_LINES, MAX_PITCH_MM, MIN_PITCH_MM
 from contactfpga.skin import Skin
+from contactfpga_sim import array_file, cells
 
 DEFAULT_HZ = 100.0
 """Rate at which a recording is played that does not come with one."""
+
+
+_RANGES = {"rate_hz": (1e-3, 1e6), "pitch_mm": (MIN_PITCH_MM, MAX_PITCH_MM)}
+"""What a .npz file may say of its frames, and within which limits."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,26 +35,25 @@ class Recording:
     """Its name, for messages."""
 
     @classmethod
-    def of(cls, frames: np.ndarray, what: str, rate_hz: float = DEFAULT_HZ, pitch_mm: float | None = None) -> Recording:
-        """From (rows, columns) or (frames, rows, columns), bool or numbers of which all but 0 are pressed."""
+    def of(cls, frames: np.ndarray, what: str, threshold: float | None = None) -> Recording:
+        """From (rows, columns) or (frames, rows, columns), bool or numbers with a threshold (:func:`cells.pressed`)."""
         if frames.ndim == 2:
             frames = frames[None]
-        if frames.ndim != 3 or not len(frames):
+        if frames.ndim != 3:
             raise ValueError(f"{what} has shape {frames.shape}; a recording has (frames, rows, columns)")
-        return cls(frames != 0, rate_hz, pitch_mm, what)
+        count, rows, columns = frames.shape
+        if not count:
+            raise ValueError(f"{what} has shape {frames.shape}; it holds no frame")
+        if not (1 <= rows <= MAX_LINES and 1 <= columns <= MAX_LINES):
+            raise ValueError(f"{what} has frames of {rows}x{columns}; a sheet has 1 to {MAX_LINES} lines")
+        return cls(cells.pressed(frames, what, threshold), what=what)
 
     @classmethod
-    def load(cls, path: str | Path) -> Recording:
+    def load(cls, path: str | Path, threshold: float | None = None) -> Recording:
         """From a .npy file, or a .npz file with `pressed` and, where known, `rate_hz` and `pitch_mm`."""
-        with open(path, "rb") as file:
-            loaded = np.load(file, allow_pickle=False)
-            if isinstance(loaded, np.ndarray):
-                return cls.of(loaded, str(path))
-            if "pressed" not in loaded:
-                raise ValueError(f"{path} holds {', '.join(loaded.files)}; a recording has an array `pressed`")
-            rate = float(loaded["rate_hz"]) if "rate_hz" in loaded else DEFAULT_HZ
-            pitch = float(loaded["pitch_mm"]) if "pitch_mm" in loaded else None
-            return cls.of(loaded["pressed"], str(path), rate, pitch)
+        held = array_file.read(path, ("pressed", *_RANGES))
+        facts: dict[str, Any] = {name: _number(path, name, held[name]) for name in _RANGES if name in held}
+        return dataclasses.replace(cls.of(held["pressed"], str(path), threshold), **facts)
 
     def on(self, skin: Skin) -> Callable[[float], np.ndarray]:
         """Time in s to the cells pressed then, played in a loop; the sheet must be the recorded one's size."""
@@ -57,3 +63,13 @@ class Recording:
                 f"{self.what} has shape {self.pressed.shape}; the sheet takes (frames, {skin.rows}, {skin.columns})"
             )
         return lambda seconds: self.pressed[int(seconds * self.rate_hz + 1e-9) % len(self.pressed)]
+
+
+def _number(path: str | Path, name: str, array: np.ndarray) -> float:
+    low, high = _RANGES[name]
+    if array.size != 1 or array.dtype == bool:
+        raise ValueError(f"`{name}` in {path} has shape {array.shape} of {array.dtype}; it must be one number")
+    value = float(array.item())
+    if not low <= value <= high:
+        raise ValueError(f"`{name}` in {path} is {value:g}; it must lie between {low:g} and {high:g}")
+    return value

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +16,10 @@ import numpy as np
 from contactfpga import protocol
 from contactfpga.derived import Derived
 from contactfpga.errors import ContactFPGAError
-from contactfpga.limits import MAX_LINES
 from contactfpga.protocol import Frame
 from contactfpga.skin import Skin
 from contactfpga_sim.board import Board
+from contactfpga_sim.recordings import Recording
 
 if TYPE_CHECKING:
     import argparse
@@ -48,33 +47,6 @@ class Replayed:
     """The same to its last record."""
     duration: int
     """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
-
-
-def read_frames(path: str | Path, threshold: float | None) -> np.ndarray:
-    """(frames, rows, columns) bool from a .npy file of bools, or of numbers that count as pressed above ``threshold``.
-
-    Raises ValueError that names what is wrong.
-    """
-    try:
-        frames = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise ValueError(f"{path} is no .npy file: {error}") from None
-    if not isinstance(frames, np.ndarray) or frames.ndim != 3:
-        shape = getattr(frames, "shape", "none")
-        raise ValueError(f"{path} has shape {shape}; replay takes an array (frames, rows, columns)")
-    if not all(1 <= lines <= MAX_LINES for lines in frames.shape[1:]):
-        raise ValueError(
-            f"{path} has frames of {frames.shape[1]}x{frames.shape[2]}; a sheet has 1 to {MAX_LINES} lines"
-        )
-    if frames.dtype == bool:
-        return frames
-    if frames.dtype.kind not in "iuf":
-        raise ValueError(f"{path} holds {frames.dtype}; replay takes bools or numbers")
-    if threshold is None:
-        raise ValueError(f"{path} holds {frames.dtype}; say with --threshold above which value a cell is pressed")
-    if frames.dtype.kind == "f" and np.isnan(frames).any():
-        raise ValueError(f"{path} holds {int(np.isnan(frames).sum())} NaN; a cell is pressed or it is not")
-    return frames > threshold
 
 
 def zones_bound(frames: np.ndarray, connectivity: int) -> int:
@@ -266,7 +238,7 @@ def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
 def main(args: argparse.Namespace) -> int:
     """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.barycenter_bits,
     args.json."""
-    frames = read_frames(args.frames, args.threshold)
+    frames = Recording.load(args.frames, args.threshold).pressed
     _, rows, columns = frames.shape
     bound = zones_bound(frames, args.connectivity)
     skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm, args.barycenter_bits)

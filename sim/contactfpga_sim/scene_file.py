@@ -7,14 +7,14 @@ contacts press sheets of any pitch. docs/scenes.md tells the keys.
 from __future__ import annotations
 
 import dataclasses
-import math
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from contactfpga import tomlfile
+from contactfpga.values import is_finite, shown
 from contactfpga_sim import contacts
 from contactfpga_sim.contacts import Shape, Track
 
@@ -94,13 +94,11 @@ class SceneFile:
     @classmethod
     def load(cls, path: str | Path) -> SceneFile:
         """Read a file. Raises :class:`SceneFileError` for what cannot be."""
-        with open(path, "rb") as file:
-            try:
-                return _scene_file(tomllib.load(file))
-            except tomllib.TOMLDecodeError as error:
-                raise SceneFileError(f"{path}: not a TOML file: {error}") from None
-            except SceneFileError as error:
-                raise SceneFileError(f"{path}: {error}") from None
+        values = tomlfile.load(path, SceneFileError)
+        try:
+            return _scene_file(values)
+        except SceneFileError as error:
+            raise SceneFileError(f"{path}: {error}") from None
 
 
 def _scene_file(values: dict[str, Any]) -> SceneFile:
@@ -126,7 +124,7 @@ def _kind(where: str, given: Any) -> Kind:
         raise SceneFileError(f"{where} is {given!r}; it must be a part, [[contact]]")
     values = dict(given)
     shape = values.pop("shape", None)
-    if shape not in SHAPES:
+    if not isinstance(shape, str) or shape not in SHAPES:
         raise SceneFileError(f"{where}: shape is {shape!r}; it must be one of {', '.join(SHAPES)}")
     usual = SHAPES[shape][1]
     common = [field.name for field in dataclasses.fields(Kind) if field.name != "sizes"]
@@ -200,8 +198,8 @@ def _range(name: str, value: Any, low: float, high: float) -> Range:
 
 
 def _number(name: str, value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise SceneFileError(f"{name} is {value!r}; it must be a finite number")
+    if not is_finite(value):
+        raise SceneFileError(f"{name} is {shown(value)}; it must be a finite number")
     if not low <= value <= high:
         raise SceneFileError(f"{name} is {value}; it must lie between {low:g} and {high:g}")
     return float(value)
@@ -209,7 +207,7 @@ def _number(name: str, value: Any, low: float, high: float) -> float:
 
 def _whole(name: str, value: Any, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise SceneFileError(f"{name} is {value!r}; it must be a whole number")
+        raise SceneFileError(f"{name} is {shown(value)}; it must be a whole number")
     if not low <= value <= high:
         raise SceneFileError(f"{name} is {value}; it must lie between {low} and {high}")
     return value

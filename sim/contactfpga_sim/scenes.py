@@ -14,7 +14,7 @@ import numpy as np
 
 from contactfpga.cover import Cover, Load
 from contactfpga.skin import Skin
-from contactfpga_sim import contacts
+from contactfpga_sim import cells, contacts
 from contactfpga_sim.contacts import Contact, Swing
 from contactfpga_sim.recordings import Recording
 from contactfpga_sim.shapes import SHAPES
@@ -58,8 +58,8 @@ class Scene:
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
         """:meth:`pressed` on this sheet as a function of time."""
         if all(contact.still for contact in self.contacts):
-            cells = self.pressed(0.0, skin, cover)
-            return lambda seconds: cells
+            still = self.pressed(0.0, skin, cover)
+            return lambda seconds: still
         return lambda seconds: self.pressed(seconds, skin, cover)
 
 
@@ -154,8 +154,8 @@ def scene(skin: Skin, source: Source = None) -> CellsAt:
     if name in CONTACTS:
         return CONTACTS[name](skin).on(skin)
     if name in SHAPES:
-        cells = SHAPES[name](skin.rows, skin.columns)
-        return lambda seconds: cells
+        shape = SHAPES[name](skin.rows, skin.columns)
+        return lambda seconds: shape
     if not name.endswith((".npy", ".npz")):
         raise ValueError(f"scene {name!r} is not known; take a .npy or .npz file or one of {', '.join(NAMES)}")
     return Recording.load(name).on(skin)
@@ -163,9 +163,9 @@ def scene(skin: Skin, source: Source = None) -> CellsAt:
 
 def _checked(skin: Skin, callback: CellsAt) -> CellsAt:
     def scene(seconds: float) -> np.ndarray:
-        cells = np.asarray(callback(seconds), bool)
-        if cells.shape != (skin.rows, skin.columns):
-            raise ValueError(f"the scene gave cells of shape {cells.shape}; the sheet has {skin.rows}x{skin.columns}")
-        return cells
+        found = np.asarray(callback(seconds))
+        if found.shape != (skin.rows, skin.columns):
+            raise ValueError(f"the scene gave cells of shape {found.shape}; the sheet has {skin.rows}x{skin.columns}")
+        return cells.pressed(found, "what the scene gave")
 
     return scene

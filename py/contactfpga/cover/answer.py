@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from numbers import Real
 
 from contactfpga.errors import ContactFPGAError
+from contactfpga.values import is_finite, shown
+
+MAX_LENGTH_M = 1.0
+"""No thickness, pitch, offset or radius of a cover on a robot is longer: who writes 5 means mm."""
+
+
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Of what a file says in SI units, 0 aside; powers of it are still numbers."""
 
 
 class CoverError(ContactFPGAError, ValueError):
@@ -25,13 +31,13 @@ class NoSolution:
 
 def positive(name: str, value: float, unit: str) -> float:
     """``value`` if it is a finite number above 0; raises :class:`CoverError` otherwise."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
-        raise CoverError(f"{name} is {value!r}; it must be a finite number above 0 {unit}".rstrip())
+    if not is_finite(value) or value <= 0:
+        raise CoverError(f"{name} is {shown(value)}; it must be a finite number above 0 {unit}".rstrip())
     return float(value)
 
 
 def not_negative(name: str, value: float, unit: str) -> float:
     """``value`` if it is a finite number, 0 or above; raises :class:`CoverError` otherwise."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 <= value < math.inf:
-        raise CoverError(f"{name} is {value!r}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
+    if not is_finite(value) or value < 0:
+        raise CoverError(f"{name} is {shown(value)}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
     return float(value)

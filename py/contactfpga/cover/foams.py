@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.cover.answer import CoverError, positive
+from contactfpga.values import is_finite, shown
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,8 +35,12 @@ class Foam:
         for name, unit in (("density_kg_m3", "kg/m3"), ("yield_pa", "Pa")):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name), unit)
-        if not 0 < self.strain <= 1:
-            raise CoverError(f"strain is {self.strain!r}; it must lie above 0 and not above 1")
+        for name in ("name", "source"):
+            text = getattr(self, name)
+            if not isinstance(text, str) or not text.isprintable():
+                raise CoverError(f"{name} is {shown(text)}; it must be a text that can be printed, on one line")
+        if not is_finite(self.strain) or not 0 < self.strain <= 1:
+            raise CoverError(f"strain is {shown(self.strain)}; it must lie above 0 and not above 1")
 
 
 _PAPER = "paper, IV.A: E printed"

@@ -10,6 +10,8 @@ import numpy as np
 
 from contactfpga.cover.answer import CoverError
 from contactfpga.cover.solve import Floats
+from contactfpga.regular import open_regular
+from contactfpga.values import shown
 
 
 class Line(NamedTuple):
@@ -26,7 +28,9 @@ class Line(NamedTuple):
 def read(path: str | Path) -> tuple[Floats, Floats]:
     """Forces in N and deformations in m from a file with two columns, by comma; names may stand above them."""
     rows: list[list[float]] = []
-    for number, text in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):
+    with open_regular(path) as file:
+        lines = file.read().decode(errors="replace").splitlines()
+    for number, text in enumerate(lines, 1):
         cells = [cell.strip() for cell in text.split(",")]
         if not text.strip() or text.startswith("#"):
             continue
@@ -35,16 +39,18 @@ def read(path: str | Path) -> tuple[Floats, Floats]:
         except ValueError:
             if not rows and number == 1:
                 continue
-            raise CoverError(
-                f"{path}, line {number}: {text!r} is not two numbers, force in N and deformation in m"
-            ) from None
+            raise _refused(path, number, text) from None
         if len(row) != 2 or not all(map(math.isfinite, row)):
-            raise CoverError(f"{path}, line {number}: {text!r} is not two numbers, force in N and deformation in m")
+            raise _refused(path, number, text)
         rows.append(row)
     if len(rows) < 3:
         raise CoverError(f"{path}: {len(rows)} points; a line with a correlation needs 3")
     force, deformation = np.array(rows).T
     return force, deformation
+
+
+def _refused(path: str | Path, number: int, text: str) -> CoverError:
+    return CoverError(f"{path}, line {number}: {shown(text)} is not two numbers, force in N and deformation in m")
 
 
 def fit(force_n: Floats, deformation_m: Floats) -> Line:

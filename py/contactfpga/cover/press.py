@@ -12,6 +12,7 @@ from contactfpga.cover import hertz, medium, point
 from contactfpga.cover.answer import CoverError, not_negative, positive
 from contactfpga.cover.patch import Ellipse, Part
 from contactfpga.cover.switch import Switch
+from contactfpga.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 """``patch``: a switch closes when it lies under the contact's shape, whatever the force.
@@ -57,14 +58,14 @@ class Cover:
 
     def __post_init__(self) -> None:
         if self.model not in MODELS:
-            raise CoverError(f"model is {self.model!r}; it must be one of {', '.join(MODELS)}")
+            raise CoverError(f"model is {shown(self.model)}; it must be one of {', '.join(MODELS)}")
         positive("thickness_m", self.thickness_m, "m")
         if self.share is None:
             return
         if self.model != "patch":
             raise CoverError(f"share is {self.share}; the model {self.model!r} goes by stress, leave it out")
-        if not 0 < self.share <= 1:
-            raise CoverError(f"share is {self.share}; it must lie above 0 and not above 1")
+        if not is_finite(self.share) or not 0 < self.share <= 1:
+            raise CoverError(f"share is {shown(self.share)}; it must lie above 0 and not above 1")
 
     def closed(self, loads: Sequence[Load], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Bool: which of the switches at these places, in m, are closed; ``x_m`` and ``y_m`` broadcast."""

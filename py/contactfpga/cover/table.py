@@ -6,7 +6,7 @@ import dataclasses
 import json
 from typing import Any
 
-from contactfpga.cover.answer import CoverError
+from contactfpga.cover.answer import MAX_LENGTH_M, CoverError
 from contactfpga.cover.press import Cover
 from contactfpga.cover.switch import Switch
 
@@ -16,7 +16,13 @@ def read(values: Any) -> Cover:
     given = dict(_known("cover", values, Cover))
     if "switch" in given:
         given["switch"] = Switch(**_known("cover.switch", given["switch"], Switch))
-    return Cover(**given)
+    cover = Cover(**given)
+    if cover.thickness_m > MAX_LENGTH_M:
+        raise CoverError(
+            f"thickness_m in [cover] is {cover.thickness_m:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
+            "5 mm is 0.005"
+        )
+    return cover
 
 
 def write(cover: Cover) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
-from contactfpga.cover.answer import CoverError, not_negative, positive
+from contactfpga import tomlfile
+from contactfpga.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
 from contactfpga.cover.elastic import THICKNESS_RULES
 from contactfpga.cover.foams import FOAMS, Foam, find
 from contactfpga.cover.impact import Arm
@@ -16,8 +15,12 @@ from contactfpga.cover.medium import MEDIA
 from contactfpga.cover.sense import CONTACTS, TOLERANCE, Model
 from contactfpga.cover.switch import Switch
 from contactfpga.skin import Skin
+from contactfpga.values import is_finite, shown
 
 _NEEDED = object()
+
+LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
+"""Of cover and link; who means mm is told."""
 
 _KEYS: dict[str, dict[str, Any]] = {
     "arm": {
@@ -127,17 +130,13 @@ class Task:
             ("model", self.model.within if self.model else "bonded", MEDIA),
         ):
             if value not in known:
-                raise CoverError(f"{name} is {value!r}; it must be one of {', '.join(known)}")
+                raise CoverError(f"{name} is {shown(value)}; it must be one of {', '.join(known)}")
 
     @classmethod
     def load(cls, path: str | Path) -> Task:
         """Read a task from a TOML file; ``[[foam]]`` adds foams, ``[reaction] skin`` is a path beside the file."""
-        with open(path, "rb") as file:
-            try:
-                given = tomllib.load(file)
-            except tomllib.TOMLDecodeError as error:
-                raise CoverError(f"{path}: not a TOML file: {error}") from None
-        own = tuple(_foam(path, one) for one in given.pop("foam", []))
+        given = tomlfile.load(path, CoverError)
+        own = tuple(_foam(path, one) for one in _foams(path, given.pop("foam", [])))
         part = _read(path, given)
         foams = FOAMS + own
         if part["cover"]["foams"] is not None:
@@ -179,7 +178,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for name, keys in _KEYS.items():
         values = given.get(name, {})
         if not isinstance(values, dict):
-            raise CoverError(f"{path}: {name} is {values!r}; it must be a part, [{name}]")
+            raise CoverError(f"{path}: {name} is {shown(values)}; it must be a part, [{name}]")
         for key in values:
             if key not in keys:
                 raise CoverError(f"{path}: unknown key {key!r} in [{name}]; known are {', '.join(keys)}")
@@ -204,10 +203,18 @@ def _fits(path: str | Path, name: str, key: str, value: Any, default: Any) -> No
     elif isinstance(default, bool):
         right, wanted = isinstance(value, bool), "true or false"
     else:
-        right = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        wanted = "a finite number"
+        right = is_finite(value) and (value == 0 or SMALLEST <= abs(value) <= LARGEST)
+        wanted = f"a number, 0 or from {SMALLEST:g} to {LARGEST:g}"
+    if right and key in LENGTHS and value > MAX_LENGTH_M:
+        right, wanted = False, f"a length in m, at most {MAX_LENGTH_M:g}; 5 mm is 0.005"
     if not right:
-        raise CoverError(f"{path}: {key} in [{name}] is {value!r}; it must be {wanted}")
+        raise CoverError(f"{path}: {key} in [{name}] is {shown(value)}; it must be {wanted}")
+
+
+def _foams(path: str | Path, values: Any) -> list[dict[str, Any]]:
+    if not isinstance(values, list) or not all(isinstance(one, dict) for one in values):
+        raise CoverError(f"{path}: foam is {shown(values)}; it must be a part, [[foam]]")
+    return values
 
 
 def _foam(path: str | Path, values: dict[str, Any]) -> Foam:

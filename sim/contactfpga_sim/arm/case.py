@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from contactfpga import tomlfile
 from contactfpga.cover import Cover
 from contactfpga.errors import ContactFPGAError
+from contactfpga.values import shown
 from contactfpga_sim.arm.parts import BEHAVIOURS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
 
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz")
+MAX_STEPS = 1_000_000
+"""In a run."""
 STEPS_A_TIME_CONSTANT = 4
 """Steps that the current's time constant, the plant's shortest, has to have."""
 
@@ -52,9 +55,11 @@ class Case:
             raise CaseError(
                 f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the current takes"
             )
+        if (steps := (self.run.lead_s + self.run.duration_s) / self.run.step_s) > MAX_STEPS:
+            raise CaseError(f"lead_s + duration_s is {steps:.3g} times step_s; it must be at most {MAX_STEPS:,} times")
         for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
             part = self.run.step_s if name == "period_s" else self.control.period_s
-            if abs(whole / part - round(whole / part)) > 1e-6:
+            if abs(whole / part - round(whole / part)) > 1e-6 or round(whole / part) < 1:
                 raise CaseError(f"{name} is {whole:g}; it must be a whole number of times {part:g} s")
 
     @functools.cached_property
@@ -95,17 +100,17 @@ def names() -> list[str]:
     return sorted(path.stem for path in _CASES.glob("*.toml"))
 
 
-def _values(name: str) -> dict[str, Any]:
+def _values(name: str, before: tuple[str, ...] = ()) -> dict[str, Any]:
     path = Path(name) if name.endswith(".toml") else _CASES / f"{name}.toml"
     if not path.exists():
         raise CaseError(f"case {name!r} is not known; take a .toml file or one of {', '.join(names())}")
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{path}: not a TOML file: {error}") from None
+    values = tomlfile.load(path, CaseError)
     if (like := values.pop("like", None)) is None:
         return values
-    merged = _values(str(like))
+    above = (*before, name)
+    if not isinstance(like, str) or like in above:
+        raise CaseError(f"{name}: like is {shown(like)}; it must name another case than {', '.join(above)}")
+    merged = _values(like, above)
     for part, change in values.items():
         both = isinstance(change, dict) and isinstance(merged.get(part), dict)
         merged[part] = {**merged[part], **change} if both else change
@@ -120,6 +125,8 @@ def _case(name: str, values: dict[str, Any]) -> Case:
         part: _part(name, part, kind, values[part]) for part, kind in _PARTS.items() if part in values
     }
     if "touch" in values:
+        if not isinstance(values["touch"], list):
+            raise CaseError(f"{name}: touch is {shown(values['touch'])}; it must be a part, [[touch]]")
         parts["touch"] = tuple(_part(name, "touch", Touch, one) for one in values["touch"])
     if "model" in values:
         parts["model"] = values["model"]
@@ -131,7 +138,7 @@ def _case(name: str, values: dict[str, Any]) -> Case:
 
 def _part(name: str, part: str, kind: type, values: Any) -> Any:
     if not isinstance(values, dict):
-        raise CaseError(f"{name}: {part} is {values!r}; it must be a part, [{part}]")
+        raise CaseError(f"{name}: {part} is {shown(values)}; it must be a part, [{part}]")
     known = [field.name for field in dataclasses.fields(kind)]
     for key in values:
         if key not in known:
@@ -144,4 +151,4 @@ def _part(name: str, part: str, kind: type, values: Any) -> Any:
 
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
-        raise CaseError(f"{name} is {value!r}; it must be one of {', '.join(known)}")
+        raise CaseError(f"{name} is {shown(value)}; it must be one of {', '.join(known)}")

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import math
 from pathlib import Path
 
 from contactfpga.skin import Skin
 from contactfpga_sim.arm import comply, draw, report
-from contactfpga_sim.arm.case import Case, CaseError
+from contactfpga_sim.arm.case import Case
 
 SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
 """Of the fastest push that the arm yields to."""
@@ -19,8 +18,6 @@ SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
     case = Case.load(args.case)
-    if not 0 <= args.latency < math.inf:
-        raise CaseError(f"--latency is {args.latency}; it must be a finite number, 0 ms or above")
     if args.charts:
         from contactfpga_sim.arm import charts  # which needs processes and a progress bar
 

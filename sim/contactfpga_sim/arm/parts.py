@@ -7,7 +7,7 @@ import functools
 import math
 
 from contactfpga.cover import Ball, Switch, elastic
-from contactfpga.cover.answer import not_negative, positive
+from contactfpga.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
 
 BEHAVIOURS = ("reverse", "comply")
 
@@ -23,7 +23,11 @@ class _Checked:
             if isinstance(field.default, str) or (value is None and field.default is None):
                 continue
             check = not_negative if field.name in self._zero else positive
-            object.__setattr__(self, field.name, check(field.name, value, ""))
+            number = check(field.name, value, "")
+            if number and not SMALLEST <= number <= LARGEST:
+                ends = f"from {SMALLEST:g} to {LARGEST:g}"
+                raise CoverError(f"{field.name} is {number:g}; it must lie {ends}, all are in SI units")
+            object.__setattr__(self, field.name, number)
 
 
 @dataclasses.dataclass(frozen=True)

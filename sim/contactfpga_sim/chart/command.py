@@ -17,8 +17,6 @@ FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
-    if args.placements < 1:
-        raise ValueError(f"--placements is {args.placements}; it must be at least 1")
     _known("--method", args.method, METHODS)
     _known("--family", args.family, FAMILIES)
     tasks = [

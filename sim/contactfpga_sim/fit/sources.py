@@ -11,10 +11,10 @@ import dataclasses
 import functools
 import hashlib
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
+from contactfpga.regular import open_regular
 from contactfpga.skin import Skin
 from contactfpga_sim.chart import errors
 from contactfpga_sim.chart.study import Look, look
@@ -139,11 +139,12 @@ class Recorded(Source):
 
     path: str
     digest: str
+    threshold: float | None = None
 
     @property
     def recording(self) -> Recording:
         """What the file holds."""
-        return _recording(self.path, self.digest)
+        return _recording(self.path, self.digest, self.threshold)
 
     def size_mm(self) -> Size | None:
         _, rows, columns = self.recording.pressed.shape
@@ -164,22 +165,23 @@ class Recorded(Source):
 
 
 @functools.lru_cache(maxsize=4)
-def _recording(path: str, digest: str) -> Recording:
-    return Recording.load(path)
+def _recording(path: str, digest: str, threshold: float | None) -> Recording:
+    return Recording.load(path, threshold)
 
 
-def source(name: str, seed: int | None = None) -> Source:
+def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
     """By the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a recording.
 
-    ``seed``: of the places, in the place of the file's. A family hides the built-in scene of its name. Raises
-    ValueError for anything else.
+    ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed. A
+    family hides the built-in scene of its name. Raises ValueError for anything else.
     """
     if name in FAMILIES:
         return Family(name, seed or 0)
     if name in CONTACTS:
         return BuiltIn(name, seed or 0)
     if name.endswith((".npz", ".npy")):
-        found = Recorded(name, hashlib.sha256(Path(name).read_bytes()).hexdigest())
+        with open_regular(name) as file:
+            found = Recorded(name, hashlib.sha256(file.read()).hexdigest(), threshold)
         if (frames := len(found.recording.pressed)) < 4:
             raise ValueError(f"{name} has {frames} frames; two to choose with and two to report are the least")
         return found

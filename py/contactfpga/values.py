@@ -1,0 +1,54 @@
+"""What a value from outside is: a number, a whole number, a text that a terminal can show."""
+
+from __future__ import annotations
+
+import math
+import operator
+from numbers import Real
+from typing import Any
+
+MAX_SHOWN = 80
+"""Characters of a value in a message."""
+
+
+def is_finite(value: object) -> bool:
+    """A number, no bool, that a float can hold. Python's whole numbers can be too large for one."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def whole(value: object) -> int | None:
+    """The value as an int if it is a whole number by its type, numpy's included; None for anything else, 8.0 too."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        return None
+    try:
+        return int(operator.index(value))
+    except TypeError:  # numpy's bool, and arrays of more than one number
+        return None
+
+
+def shown(value: Any) -> str:
+    """``repr`` of a value, short enough for a message."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a number of more digits than Python writes, or lists in lists in lists
+        return f"one {type(value).__name__} too long to show"
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 20]}... ({len(text)} characters)"
+
+
+def visible(text: str) -> str:
+    """The text with what a terminal would obey written as an escape: control characters, marks that reorder text."""
+    return "".join(one if one.isprintable() else _escaped(one) for one in text)
+
+
+def visible_lines(text: str) -> str:
+    """:func:`visible`, line by line."""
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape", "backslashreplace").decode("ascii")

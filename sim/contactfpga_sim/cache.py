@@ -1,0 +1,134 @@
+"""The folder of compiled gateware and kept results. What is loaded from it runs: only what this user alone, or root,
+can write is used."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl  # not on Windows, where only the host part runs
+import os
+import shlex
+import shutil
+import stat
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from contactfpga.errors import ContactFPGAError
+
+FOLDER_MODE, FILE_MODE = 0o700, 0o600
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_LOCK = "lock"
+_FRESH_S = 60.0
+"""A folder may be so old before its lock is there."""
+
+
+class CacheError(ContactFPGAError):
+    """The cache cannot be used, or somebody else could have put something into it."""
+
+
+def cache_folder() -> Path:
+    """Where it is: ``CONTACTFPGA_CACHE``, or in the user's cache folder."""
+    if chosen := os.environ.get("CONTACTFPGA_CACHE"):
+        return Path(chosen).absolute()
+    try:
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "contactfpga"
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "contactfpga"
+    except RuntimeError as error:
+        raise CacheError(f"there is no place for the cache ({error}); name one with CONTACTFPGA_CACHE") from None
+
+
+def ready(folder: Path) -> Path:
+    """The folder, made where there is none, and without links in its path. Raises :class:`CacheError`."""
+    try:
+        _make(folder)
+        folder = folder.resolve(strict=True)
+        _check(folder, folder.stat())
+        for above in folder.parents:
+            mode = above.stat().st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                raise CacheError(f"the cache {folder} lies in {above}, where anybody can replace it; {_another()}")
+    except OSError as error:
+        raise CacheError(f"the cache {folder} cannot be used: {error.strerror}; {_another()}") from None
+    return folder
+
+
+def trusted(file: Path) -> bool:
+    """Whether the file is there; raises :class:`CacheError` if somebody else could have written it."""
+    try:
+        found = file.lstat()
+    except FileNotFoundError:
+        return False
+    if not stat.S_ISREG(found.st_mode):
+        raise CacheError(f"{file} in the cache is not a regular file; {_remove(file)}")
+    _check(file, found)
+    return True
+
+
+@contextlib.contextmanager
+def locked(file: Path) -> Iterator[None]:
+    """Let one process at a time go on; the file stays."""
+    with _opened(file) as descriptor:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+
+
+@contextlib.contextmanager
+def scratch(folder: Path, kind: str) -> Iterator[Path]:
+    """A folder in the cache for work in progress. Those that killed processes left are removed first."""
+    _sweep(folder, kind)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=f"{kind}-") as name:
+        # Held for as long as the process lives, however it ends.
+        with locked(Path(name) / _LOCK):
+            yield Path(name)
+
+
+def _sweep(folder: Path, kind: str) -> None:
+    for left in folder.glob(f"{kind}-*"):
+        with contextlib.suppress(OSError, CacheError):  # its owner removed it meanwhile, or still works in it
+            fresh = time.time() - left.lstat().st_mtime < _FRESH_S
+            if fresh and not (left / _LOCK).exists():
+                continue
+            with _opened(left / _LOCK) as descriptor:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(left)
+
+
+def _make(folder: Path) -> None:
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        with contextlib.suppress(FileExistsError):  # another process made it
+            path.mkdir(FOLDER_MODE)
+            path.chmod(FOLDER_MODE)  # whatever the umask took away
+
+
+def _check(path: Path, found: os.stat_result) -> None:
+    if found.st_uid not in (os.geteuid(), 0):
+        raise CacheError(f"{path} in the cache belongs to user {found.st_uid}, not to you or root; {_remove(path)}")
+    if found.st_mode & OTHERS_WRITE:
+        mode = stat.S_IMODE(found.st_mode)
+        raise CacheError(f"{path} in the cache can be written by others (mode {mode:o}); {_remove(path)}")
+
+
+@contextlib.contextmanager
+def _opened(file: Path) -> Iterator[int]:
+    """A descriptor of the file, made where there is none; a link is not followed."""
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        descriptor = os.open(file, flags, FILE_MODE)
+    except OSError as error:
+        raise CacheError(f"{file} in the cache cannot be opened: {error.strerror}; {_remove(file)}") from None
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _remove(path: Path) -> str:
+    return f"what lies there cannot be trusted: delete it (rm -r {shlex.quote(str(path))}), or {_another()}"
+
+
+def _another() -> str:
+    return "name another folder with CONTACTFPGA_CACHE"
