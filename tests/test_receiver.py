@@ -123,4 +123,4 @@ def test_bytes_thrown_away_are_no_gap():
 def test_the_line_below_a_frame_says_that_more_may_be_lost(gaps, told):
     receiver, wire = Receiver("x"), Wire(SKIN)
     *_, zones = receiver.feed(wire.hello() + wire.zones([]), 0.0)
-    assert f"frames, {told}, " in status(SimpleNamespace(port="x", stats=Stats(lost=3, gaps=gaps)), zones)
+    assert f"frames, {told}, " in status(SimpleNamespace(port="x", stats=Stats(lost=3, gaps=gaps)), zones, 160)

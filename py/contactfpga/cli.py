@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from contactfpga import interrupt, terminal
 from contactfpga.commands import cover_flags, fit_flags
 from contactfpga.errors import ContactFPGAError, MissingExtra
 
@@ -34,11 +35,12 @@ _BOARD = "icebreaker, icestick, ulx3s-12f or ulx3s-85f"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors print one line that names the next step."""
-    args = _parser().parse_args(arguments)
+    return interrupt.guarded(lambda: _run(_parser().parse_args(arguments)))
+
+
+def _run(args: argparse.Namespace) -> int:
     try:
         return importlib.import_module(_COMMANDS[args.command]).main(args) or 0
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nor is what is left to flush at exit
         return 0
@@ -49,7 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(error: Exception) -> int:
-    print(f"contactfpga: {error}", file=sys.stderr)
+    interrupt.silence_amaranth()
+    terminal.say(f"contactfpga: {error}", sys.stderr, hang=2)
     return 1
 
 

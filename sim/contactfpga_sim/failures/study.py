@@ -54,9 +54,13 @@ class Study:
     format: str = "{:,g}"
     """How a value is written."""
 
-    def turn(self) -> dict[str, Turned]:
-        """Every value, for every method."""
-        return {name: Turned(self.values, tuple(map(run, self.values))) for name, run in self.runs.items()}
+    def turn(self, step: Callable[[], None] = lambda: None) -> dict[str, Turned]:
+        """Every value, for every method; ``step()`` is called after each of these."""
+        found = {}
+        for name, run in self.runs.items():
+            found[name] = Turned(self.values, tuple(map(run, self.values)))
+            step()
+        return found
 
 
 @dataclasses.dataclass(frozen=True)
