@@ -95,6 +95,9 @@ def _run(folder: Path, board: Board, seed: int) -> None:
                 f"{board.title}: place and route did not end in {LIMIT_S} s; another seed may do (--seed {seed + 1}); "
                 f"see {folder / 'build.log'}"
             ) from None
+        except BaseException:  # Ctrl-C does not reach a session of its own
+            _stop(run)
+            raise
         log.seek(0)
         said = log.read()
     if status:

@@ -115,15 +115,15 @@ def _cells(dots: np.ndarray, scale: int, full: str, unicode: bool) -> np.ndarray
         return _braille(dots)
     if scale == 2 and unicode:
         upper, lower = (_blocks(dots)[:, :, half, 0].astype(int) for half in (0, 2))
-    spread: np.ndarray = cells.repeat(scale, axis=0).repeat(scale, axis=1)
-    return spread
+        return _HALVES[upper, lower]
     blocks = _blocks(dots)
     return np.full(blocks.shape[:2], full)
 
 
 def _spread(cells: np.ndarray, scale: int) -> np.ndarray:
     """Each cell as scale x scale dots."""
-    return cells.repeat(scale, axis=0).repeat(scale, axis=1)
+    spread: np.ndarray = cells.repeat(scale, axis=0).repeat(scale, axis=1)
+    return spread
 
 
 def _blocks(dots: np.ndarray, filled: bool = False) -> np.ndarray:

@@ -48,10 +48,11 @@ def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
 
 def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
     """Where what was finished is, in a file of its own: a whole table from before stays."""
-    if not turned:
+    done = sum(map(len, turned.values()))
+    if not done:
         return "interrupted before the first knob was turned"
     path = _write(turned, folder / "failures-so-far.md")
-    return f"interrupted; what came of {', '.join(turned)} is in {path}"
+    return f"interrupted; the {done} rows that were finished are in {path}"
 
 
 def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
@@ -65,4 +66,4 @@ def _turn(names: list[str], turned: dict[str, dict[str, Turned]]) -> None:
     runs = sum(len(STUDIES[name].runs) for name in names)
     with progress() as step:
         for name in names:
-            turned[name] = STUDIES[name].turn(lambda: step("knobs and methods", runs))
+            STUDIES[name].turn(lambda: step("knobs and methods", runs), turned.setdefault(name, {}))
