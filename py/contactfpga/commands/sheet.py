@@ -115,7 +115,8 @@ def _cells(dots: np.ndarray, scale: int, full: str, unicode: bool) -> np.ndarray
         return _braille(dots)
     if scale == 2 and unicode:
         upper, lower = (_blocks(dots)[:, :, half, 0].astype(int) for half in (0, 2))
-        return _HALVES[upper, lower]
+        halves: np.ndarray = _HALVES[upper, lower]
+        return halves
     blocks = _blocks(dots)
     return np.full(blocks.shape[:2], full)
 
