@@ -280,9 +280,12 @@ def main(args: argparse.Namespace) -> int:
             late.append(result.last_record or 0)
     if not args.json:
         seconds = time.monotonic() - started
-        print(f"frames              {len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity")
-        print(f"zones               {sum(counts)}, at most {max(counts)} in a frame")
-        print(f"last record         at most {max(late)} clocks after a frame's last row")
-        print(f"speed               {len(frames) / seconds:,.0f} frames a second, once compiled")
+        for title, what in (
+            ("frames", f"{len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity"),
+            ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
+            ("last record", f"at most {max(late)} clocks after a frame's last row"),
+            ("speed", f"{len(frames) / seconds:,.0f} frames a second, once compiled"),
+        ):
+            terminal.say(f"{title:20}{what}", hang=20)
         terminal.say("Every frame came back exactly once. One JSON object a frame: --json")
     return 0
