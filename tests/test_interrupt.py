@@ -193,6 +193,12 @@ def test_a_pool_that_is_done_ends_as_usual():
         assert list(workers.map(abs, [-1, -2, 3])) == [1, 2, 3]
 
 
+def test_the_signal_is_handled_as_before_when_a_command_is_done():
+    before = signal.getsignal(signal.SIGINT)
+    assert interrupt.guarded(lambda: 3) == 3
+    assert signal.getsignal(signal.SIGINT) is before
+
+
 def test_an_interrupt_says_what_was_kept(capsys):
     def body():
         raise interrupt.Interrupted("interrupted; 3 of 7 are kept")

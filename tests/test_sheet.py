@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactfpga.commands import sheet
-from contactfpga.commands.sheet import CENTER, CIRCLE, MASKED, SCALES, draw
+from contactfpga.commands.sheet import CENTER, MASKED, SCALES, draw
 from contactfpga.skin import Skin
 
 
@@ -42,11 +42,9 @@ def test_a_zone_is_no_blob_of_cells():
 
 def test_zones_about_one_barycenter_are_told_apart():
     rings = zones(Skin(), (12, 7.5, 7.5), (28, 7.5, 7.5), (44, 7.5, 7.5), (60, 7.5, 7.5))
-    drawing = draw(rings)
-    line = drawing.kinds[8].tolist()
-    groups = [kind for kind, before in zip(line, [None, *line]) if kind != before]
-    assert groups.count(CIRCLE) == 8  # each circle is crossed twice
-    assert (drawing.kinds == CENTER).sum() == 1
+    across = sheet._circles(rings, SCALES[0])[32]  # through all their middles
+    assert np.flatnonzero(across[1:] & ~across[:-1]).size == 8  # each circle is crossed twice
+    assert (draw(rings).kinds == CENTER).sum() == 1
 
 
 @pytest.mark.parametrize("scale", SCALES)

@@ -127,7 +127,7 @@ def test_a_pipe_has_no_width_unless_one_is_asked_for(monkeypatch):
     there = terminal.of(Stream("utf-8"))
     assert (there.width, there.height, there.wraps, there.live) == (terminal.PIPE_WIDTH, None, False, False)
     monkeypatch.setenv("COLUMNS", "70")
-    assert (terminal.of(Stream("utf-8")).width, terminal.of(Stream("utf-8")).wraps) == (70, True)
+    assert (terminal.of(Stream("utf-8")).width, terminal.of(Stream("utf-8")).wraps) == (70, False)
     for nonsense in ("", "0", "-5", "wide", "٣"):
         monkeypatch.setenv("COLUMNS", nonsense)
         assert terminal.of(Stream("utf-8")).width == terminal.PIPE_WIDTH

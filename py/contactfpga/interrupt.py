@@ -30,7 +30,6 @@ def guarded(body: Callable[[], int | None]) -> int:
         try:
             return body() or 0
         except KeyboardInterrupt as interrupt:
-            silence_amaranth()
             if str(interrupt):
                 terminal.say(f"contactfpga: {interrupt}", sys.stderr, hang=2)
             return STATUS
@@ -42,13 +41,16 @@ def _listening() -> Iterator[None]:
         yield  # signals are the main thread's
         return
     before = signal.getsignal(signal.SIGINT)
-    if before is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, _interrupt)
     try:
         yield
     finally:
-        if before is signal.SIG_IGN:
-            signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+def _interrupt(*_: object) -> None:
+    silence_amaranth()  # before anything is left half made
+    raise KeyboardInterrupt
 
 
 def silence_amaranth() -> None:

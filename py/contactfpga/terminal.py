@@ -59,7 +59,7 @@ class Terminal:
     unicode: bool
     """All characters, not ASCII alone."""
     wraps: bool
-    """Long lines are to be broken at the width: somebody reads along, or asked for it by COLUMNS."""
+    """Long lines are to be broken at the width, as somebody reads along."""
     live: bool
     """What was written can be written over."""
 
@@ -74,7 +74,7 @@ def of(stream: TextIO | None = None) -> Terminal:
         width=max(NARROWEST, asked or usual),
         height=None if size is None else size.lines or USUAL_HEIGHT,
         unicode=(getattr(stream, "encoding", None) or "utf-8").lower().startswith("utf"),
-        wraps=size is not None or asked is not None,
+        wraps=size is not None,
         live=size is not None and os.environ.get("TERM", "") not in ("", "dumb", "unknown"),
     )
 

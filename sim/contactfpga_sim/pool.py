@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 
 from contactfpga import terminal
+from contactfpga.interrupt import silence_amaranth
 
 GRACE_S = 0.5
 """What a worker that is told to end has to tidy up, until it is ended."""
@@ -51,6 +52,7 @@ def _alone() -> None:
 
 
 def _leave(*_: object) -> None:
+    silence_amaranth()
     raise SystemExit
 
 

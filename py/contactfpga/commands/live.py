@@ -49,7 +49,9 @@ def show(board: Board, args: argparse.Namespace, render: Render) -> int:
         console.print(render(board.next(args.timeout), _room(console, endless=True)))
         return 0
     if not terminal.of().live:
-        terminal.say("contactfpga: nothing can be drawn over here, so the last frame is shown at the end", sys.stderr)
+        if sys.stdout.isatty():
+            what = "contactfpga: nothing can be drawn over here, so the last frame is shown at the end"
+            terminal.say(what, sys.stderr, hang=2)
         return _last(board, args, console, render)
     with Live(console=console, auto_refresh=False) as live:
         for zones in _paced(board, args.timeout):
