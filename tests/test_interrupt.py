@@ -90,7 +90,7 @@ def test_failures_keep_the_rows_that_are_finished(tmp_path):
 
     status, took, said = interrupted(["failures", "--output", tmp_path], ready, True, tmp_path / "cache")
     well_ended(status, took, said)
-    assert "rows that were finished are in" in " ".join(said.split())
+    assert "of the table, all that was finished, in" in " ".join(said.split())
     assert (tmp_path / "failures-so-far.md").read_text().startswith("| knob | method |")
     assert not (tmp_path / "failures.md").exists()
 

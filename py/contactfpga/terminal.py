@@ -75,7 +75,10 @@ def of(stream: TextIO | None = None) -> Terminal:
         height=None if size is None else size.lines or USUAL_HEIGHT,
         unicode=(getattr(stream, "encoding", None) or "utf-8").lower().startswith("utf"),
         wraps=size is not None,
-        live=size is not None and os.environ.get("TERM", "") not in ("", "dumb", "unknown"),
+        # What stands in for a stream hands lines on, below which something else is drawn.
+        live=size is not None
+        and stream in (sys.__stdout__, sys.__stderr__)
+        and os.environ.get("TERM", "") not in ("", "dumb", "unknown"),
     )
 
 

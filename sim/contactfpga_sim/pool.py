@@ -28,7 +28,11 @@ def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Execu
 
     When the block ends by an error or by Ctrl-C, what is left to do is dropped, and no process stays.
     """
-    with _cluster(dask) if dask is not None else ProcessPoolExecutor(jobs, initializer=_alone) as workers:
+    if dask is not None:
+        with _cluster(dask) as workers:
+            yield workers
+        return
+    with ProcessPoolExecutor(jobs, initializer=_alone) as workers:
         try:
             yield workers
         except BaseException:
@@ -37,10 +41,17 @@ def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Execu
             raise
 
 
-def _cluster(address: str) -> Executor:
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
     from distributed import Client
 
-    return Client(address).get_executor()
+    with Client(address) as client:
+        workers = client.get_executor()
+        try:
+            yield workers
+        except BaseException:
+            workers.shutdown(wait=False)
+            raise
 
 
 def _alone() -> None:

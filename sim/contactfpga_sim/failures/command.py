@@ -52,7 +52,7 @@ def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
     if not done:
         return "interrupted before the first knob was turned"
     path = _write(turned, folder / "failures-so-far.md")
-    return f"interrupted; the {done} rows that were finished are in {path}"
+    return f"interrupted; {done} row{'' if done == 1 else 's'} of the table, all that was finished, in {path}"
 
 
 def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
