@@ -119,7 +119,7 @@ def test_zones_once_shows_table_and_sheet(board, run):
     for number in ("400", "25.00", "15.00"):  # mm2, x mm, y mm
         assert f" {number} " in out
     assert "4 cells pressed" in out
-    assert out.count("◎") == 1
+    assert out.count("◎") == 2  # on the sheet and in the line that says what it is
 
 
 def test_zones_json_is_one_object_a_line(board, run):

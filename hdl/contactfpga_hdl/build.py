@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -95,6 +96,9 @@ def _run(folder: Path, board: Board, seed: int) -> None:
                 f"{board.title}: place and route did not end in {LIMIT_S} s; another seed may do (--seed {seed + 1}); "
                 f"see {folder / 'build.log'}"
             ) from None
+        except BaseException:  # Ctrl-C does not reach a session of its own
+            _stop(run)
+            raise
         log.seek(0)
         said = log.read()
     if status:
@@ -106,7 +110,8 @@ def _stop(run: subprocess.Popen) -> None:
     if os.name == "nt":
         run.kill()
     else:
-        os.killpg(run.pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
     run.wait()
 
 

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga import limits
+from contactfpga import interrupt, limits, terminal
 from contactfpga.commands import cover_flags, fit_flags, numbers
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.regular import told
@@ -45,6 +45,10 @@ _BOARD = "icebreaker, icestick, ulx3s-12f or ulx3s-85f"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; errors print one line that names the next step."""
+    return interrupt.guarded(lambda: _run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
     args = parser.parse_args(arguments)
     if args.command is None:
@@ -52,8 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         return importlib.import_module(_COMMANDS[args.command]).main(args) or 0
-    except KeyboardInterrupt:
-        return 130
     except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nor is what is left to flush at exit
         return 0
@@ -69,8 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _failed(reason: object) -> int:
+    interrupt.silence_amaranth()
     # Names from files and devices are part of it.
-    print(f"contactfpga: {visible_lines(str(reason))}", file=sys.stderr)
+    terminal.say(f"contactfpga: {visible_lines(str(reason))}", sys.stderr, hang=2)
     return 1
 
 

@@ -10,6 +10,8 @@ from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.regular import open_regular, told
 
 SCHEME = "replay://"
+PACE = "?pace="
+"""Comes after the path in a name, with how fast it is to be played."""
 
 
 def open_recorded(name: str) -> BinaryIO:
@@ -34,4 +36,4 @@ def create(path: str | Path, port: str) -> BinaryIO:
 
 
 def _path(name: str) -> Path:
-    return Path(name.removeprefix(SCHEME)).expanduser()
+    return Path(name.removeprefix(SCHEME).partition(PACE)[0]).expanduser()

@@ -6,7 +6,7 @@ import contextlib
 import math
 import time
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import Any, BinaryIO, Protocol
 
 from contactfpga import recording, sim_address
 from contactfpga.conversation import Arrival, Conversation
@@ -156,9 +156,9 @@ class ReplayTransport:
 
     def __init__(self, name: str):
         self.name = name
-        address, _, pace = name.partition("?pace=")
+        pace = name.partition(recording.PACE)[2]
         self._pace = _pace(name, pace) if pace else None
-        self._file = recording.open_recorded(address)
+        self._file = recording.open_recorded(name)
 
     def read(self, timeout_s: float) -> bytes:
         if self._pace is not None:

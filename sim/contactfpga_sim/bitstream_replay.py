@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga import interrupt
 from contactfpga.derived import Derived
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
@@ -196,4 +197,4 @@ def _report(board: Board, skin: Skin, frames: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

@@ -9,15 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
-from rich.table import Table
 
-from contactfpga import protocol
+from contactfpga import interrupt, outputs, protocol, terminal
+from contactfpga.commands.tables import tables
 from contactfpga.derived import Derived
 from contactfpga.protocol import Frame
 from contactfpga.skin import Skin
-from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native, draw, scenes
+from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native, draw, pool, scenes
 from contactfpga_sim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, Trace, predict
 
@@ -114,38 +112,32 @@ def _last_record(trace: Trace, skin: Skin) -> int | None:
     return window[-1] - end if window else None
 
 
-LEGEND = """\
-last record after last row: below 0 where all zones ended before the frame's last row.
-touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is the
-median and the worst of touches at any instant of a scan, so both are longer."""
+LEGEND = (
+    "last record after last row: below 0 where all zones ended before the frame's last row.",
+    'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
+    "the median and the worst of touches at any instant of a scan, so both are longer.",
+)
 """Which number of the table is which."""
 
+TITLE = "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud"
 
-def table_of(outcomes: list[Outcome]) -> Table:
-    """One line a scene and engine."""
-    table = Table(title="Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud", title_justify="left")
-    for heading in ("scene", "engine"):
-        table.add_column(heading, no_wrap=True)
-    headings = (
-        "zones",
-        "last record\nafter last row",
-        "touch to\nfirst byte",
-        "touch to\nlast byte",
-        "bytes",
-        "events\ncompared",
-    )
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    table.add_column("verdict")
+HEADS = (
+    *("scene", "engine", "verdict", "zones", "last record after last row", "touch to first byte", "touch to last byte"),
+    *("bytes", "events compared"),
+)
+VERDICT = HEADS.index("verdict")
+
+
+def rows_of(outcomes: list[Outcome]) -> list[list[str]]:
+    """The head, and a line a scene and engine."""
+    rows = [list(HEADS)]
     for out in outcomes:
         zones = "-" if out.frame is None else str(out.frame.zones)
         late = "-" if out.last_record is None else f"{out.last_record} clocks"
-        verdict = "[red]differs" if out.difference else "[green]the same"
-        table.add_row(
-            *(out.scene, out.engine, zones, late, f"{out.first_byte_us:.1f} us", f"{out.last_byte_us:.1f} us"),
-            *(str(out.size), str(out.events), verdict),
-        )
-    return table
+        times = (f"{out.first_byte_us:.1f} us", f"{out.last_byte_us:.1f} us")
+        verdict = "differs" if out.difference else "the same"
+        rows.append([out.scene, out.engine, verdict, zones, late, *times, str(out.size), str(out.events)])
+    return rows
 
 
 def main() -> int:
@@ -153,41 +145,51 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make sim", description=__doc__)
     parser.add_argument("--picture", type=Path, default=Path("build/scenes.png"), help="where the scenes are drawn")
     picture = parser.parse_args().picture
-    skin = Skin()
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=120)
-    runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine, console)]
-    outcomes = []
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("scenes", total=len(runs))
-        for name, engine in runs:
-            progress.update(task, description=f"{name} ({engine})")
-            outcomes.append(run(name, engine, skin))
-            progress.advance(task)
-    scenes_run = [out for out in outcomes if out.engine == "compiled"]
-    console.print(draw.in_terminal(scenes_run))
-    console.print(table_of(outcomes))
-    console.print(LEGEND, markup=False, highlight=False)
-    draw.to_file(scenes_run, skin, picture)
-    wrong = [out for out in outcomes if out.difference or out.frame is None]
-    console.print(f"Scenes and their zones: {picture}")
-    if wrong:
-        for out in wrong:
-            console.print(f"[red]{out.scene}, {out.engine}: {out.difference or 'no touched frame came'}")
-        console.print(f"[red]{len(wrong)} of {len(outcomes)} runs differ from the golden model")
+    try:
+        outputs.file(picture, "--picture")
+    except outputs.OutputError as error:
+        terminal.say(f"make sim: {error}", sys.stderr, hang=2)
         return 1
-    console.print(f"All {len(outcomes)} runs agree with the golden model in every clock.")
-    console.print("Next: .venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")
-    return 0
+    outcomes = _run_all(Skin())
+    scenes_run = [out for out in outcomes if out.engine == "compiled"]
+    console = terminal.console()
+    console.print(draw.in_terminal(scenes_run, terminal.of().unicode))
+    wrong = [out for out in outcomes if out.difference or out.frame is None]
+    styles = {number: "red" for number, out in enumerate(outcomes) if out in wrong}
+    for table in tables(rows_of(outcomes), console.width, keys=3, title=TITLE, texts=(VERDICT,), styles=styles):
+        console.print(table)
+        console.print()
+    for line in LEGEND:
+        terminal.say(line, hang=2)
+    for out in wrong:
+        terminal.say(f"{out.scene}, {out.engine}: {out.difference or 'no touched frame came'}", hang=2)
+    if wrong:
+        terminal.say(f"{len(wrong)} of {len(outcomes)} runs differ from the golden model")
+    else:
+        terminal.say(f"All {len(outcomes)} runs agree with the golden model in every clock.")
+    draw.to_file(scenes_run, Skin(), picture)
+    terminal.say(f"Scenes and their zones: {picture}")
+    if not wrong:
+        terminal.say("Next:\n.venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")
+    return 1 if wrong else 0
 
 
-def _available(engine: str, console: Console) -> bool:
+def _run_all(skin: Skin) -> list[Outcome]:
+    runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine)]
+    outcomes = []
+    with pool.progress() as step:
+        for name, engine in runs:
+            outcomes.append(run(name, engine, skin))
+            step("scenes", len(runs))
+    return outcomes
+
+
+def _available(engine: str) -> bool:
     if engine.startswith("cocotb") and not bench_cocotb.available("verilator"):
-        console.print(f"[yellow]{engine}: not available on this machine, left out")
+        terminal.say(f"{engine}: not available on this machine, left out")
         return False
     return True
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

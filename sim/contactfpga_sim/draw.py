@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -28,22 +28,36 @@ class Drawn(Protocol):
     def frame(self) -> Frame | None: ...
 
 
-def in_terminal(outcomes: Sequence[Drawn]) -> Columns:
-    """Two rows of cells a line of text, each zone in a colour of its own."""
-    return Columns([_sheet(out) for out in outcomes], padding=(0, 3))
+def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
+    """Two rows of cells a line of text, each zone in a colour of its own; in ASCII a row a line."""
+    return Columns([_sheet(out, unicode) for out in outcomes], padding=(0, 3))
 
 
-def _sheet(out: Drawn) -> Text:
+def _sheet(out: Drawn, unicode: bool) -> Text:
     labels, _ = flood(out.cells, 8)
-    if len(labels) % 2:
-        labels = np.vstack([labels, np.zeros((1, labels.shape[1]), int)])
     count = out.frame.zones if out.frame else 0
     text = Text(f"{out.scene}: {count} zone{'' if count == 1 else 's'}\n")
-    for upper, lower in zip(labels[::2], labels[1::2]):
-        for above, below in zip(upper.tolist(), lower.tolist()):
-            text.append(_GLYPHS[above > 0, below > 0], style=_style(above, below))
+    for pieces in _halves(labels) if unicode else _ascii(labels):
+        for character, style in pieces:
+            text.append(character, style=style)
         text.append("\n")
     return text
+
+
+Pieces = Iterator[tuple[str, str]]
+"""Characters of a line with their styles."""
+
+
+def _halves(labels: np.ndarray) -> Iterator[Pieces]:
+    if len(labels) % 2:
+        labels = np.vstack([labels, np.zeros((1, labels.shape[1]), int)])
+    for upper, lower in zip(labels[::2].tolist(), labels[1::2].tolist()):
+        yield ((_GLYPHS[above > 0, below > 0], _style(above, below)) for above, below in zip(upper, lower))
+
+
+def _ascii(labels: np.ndarray) -> Iterator[Pieces]:
+    for row in labels.tolist():
+        yield (("#" if number else ".", _style(number, number)) for number in row)
 
 
 _GLYPHS = {(False, False): "·", (True, False): "▀", (False, True): "▄", (True, True): "█"}
@@ -52,7 +66,7 @@ _GLYPHS = {(False, False): "·", (True, False): "▀", (False, True): "▄", (Tr
 def _style(above: int, below: int) -> str:
     """Both halves of a full block are of one zone, or, where two zones meet, the lower one is the background."""
     if not above and not below:
-        return "grey42"
+        return "dim"
     colours = [COLOURS[(number - 1) % len(COLOURS)] for number in (above, below) if number]
     return colours[0] if len(set(colours)) == 1 else f"{colours[0]} on {colours[1]}"
 

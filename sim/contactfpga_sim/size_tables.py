@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from contactfpga import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl import boards, build, sizes
 from contactfpga_sim import figures, label_figures, size
@@ -124,4 +125,4 @@ TABLES: dict[str, Callable[[], str]] = {
 
 
 if __name__ == "__main__":
-    sys.exit(figures.main(TABLES))
+    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from contactfpga import outputs
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 
@@ -15,7 +16,7 @@ def main(args: argparse.Namespace) -> int:
 
     board = boards.find(args.board)
     skin = Skin.load(args.skin) if args.skin else board.skin
-    folder = Path(args.output or default_folder(args.board))
+    folder = outputs.folder(args.output or default_folder(args.board))
     try:
         report = build.build(skin, board, folder, args.seed)
     except build.BuildFailed as error:

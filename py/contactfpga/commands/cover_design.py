@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from pathlib import Path
 from typing import Any
 
+from contactfpga import outputs
 from contactfpga.commands.cover import KPA, MM, UNSOLVED, notes, say, table
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.design import Candidate, Design, Thin, design, margin
@@ -144,10 +144,9 @@ def _number(sensed: Sense | None) -> float | None:
 
 
 def _figures(args: argparse.Namespace) -> int:
+    folder = outputs.folder(args.output)
     from contactfpga.cover import drawing, line, paper  # matplotlib, which only drawing needs
 
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
     task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
     data = line.read(args.data) if args.data else None
     files = drawing.draw(folder, args.format, task, data)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga import driver, ports
+from contactfpga import driver, ports, terminal
 from contactfpga.driver import Board
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.mismatch import report_of
@@ -32,7 +32,7 @@ def main(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
     faults = 0
     for verdict, sentence in _findings(args):
-        print(f"{verdict:5} {sentence}", flush=True)
+        terminal.say(f"{verdict:5} {sentence}", hang=6)
         faults += verdict == "fault"
     return min(faults, 1)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import sys
 import time
 from collections.abc import Callable, Iterator
 
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from contactfpga import driver
+from contactfpga import driver, terminal
 from contactfpga.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.zone import Zones
@@ -22,14 +24,55 @@ def connect(args: argparse.Namespace, record: str | None = None) -> Board:
     return driver.open(args.port, args.skin, baud=args.baud, record=record, timeout=args.timeout)
 
 
-def show(board: Board, args: argparse.Namespace, render: Callable[[Zones], RenderableType]) -> int:
+@dataclasses.dataclass(frozen=True)
+class Room:
+    """What there is for a frame."""
+
+    console: Console
+    width: int
+    height: int | None
+    """Lines; None where there is no end of them."""
+    unicode: bool
+
+    def without(self, lines: int) -> Room:
+        """What is left above so many lines."""
+        return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
+
+
+Render = Callable[[Zones, Room], RenderableType]
+
+
+def show(board: Board, args: argparse.Namespace, render: Render) -> int:
     """Show one frame with ``--once``, else fifteen a second until interrupted or the recording ends."""
+    console = terminal.console()
     if args.once:
-        Console().print(render(board.next(args.timeout)))
+        console.print(render(board.next(args.timeout), _room(console, endless=True)))
         return 0
-    with Live(auto_refresh=False) as live:
+    if not terminal.of().live:
+        if sys.stdout.isatty():
+            what = "contactfpga: nothing can be drawn over here, so the last frame is shown at the end"
+            terminal.say(what, sys.stderr, hang=2)
+        return _last(board, args, console, render)
+    with Live(console=console, auto_refresh=False) as live:
         for zones in _paced(board, args.timeout):
-            live.update(render(zones), refresh=True)
+            live.update(render(zones, _room(console)), refresh=True)
+    return 0
+
+
+def _room(console: Console, endless: bool = False) -> Room:
+    shown = terminal.of()
+    return Room(console, shown.width, None if endless else shown.height, shown.unicode)
+
+
+def _last(board: Board, args: argparse.Namespace, console: Console, render: Render) -> int:
+    """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
+    zones = None
+    try:
+        for zones in _paced(board, args.timeout):  # noqa: B007
+            pass
+    finally:
+        if zones is not None:
+            console.print(render(zones, _room(console, endless=True)))
     return 0
 
 

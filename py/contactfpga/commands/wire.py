@@ -7,12 +7,16 @@ import argparse
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from contactfpga.commands import live
-from contactfpga.commands.sheet import draw
-from contactfpga.commands.zones import mask, status
+from contactfpga import terminal
+from contactfpga.commands import live, sheet
+from contactfpga.commands.live import Room
+from contactfpga.commands.zones import LEGEND_LINES, mask, status, styled
 from contactfpga.driver import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.zone import Zones
+
+NAMED = 12
+"""Pressed cells whose places are written out."""
 
 
 def main(args: argparse.Namespace) -> int:
@@ -23,13 +27,15 @@ def main(args: argparse.Namespace) -> int:
                 f"{board.port} sends zones, not cells; build a bitstream from the same Skin with "
                 'report = "cells" for wiring, or see the zones with `contactfpga zones`'
             )
-        return live.show(board, args, lambda zones: _render(board, zones))
+        return live.show(board, args, lambda zones, room: _render(board, zones, room))
 
 
-def _render(board: Board, zones: Zones) -> RenderableType:
+def _render(board: Board, zones: Zones, room: Room) -> RenderableType:
     assert zones.cells is not None
-    pressed = [f"({row}, {column})" for row, column in zip(*zones.cells.nonzero())]
-    shown = ", ".join(pressed[:12]) + (f" and {len(pressed) - 12} more" if len(pressed) > 12 else "")
-    return Group(
-        Text(draw(zones, mask(board))), Text(f"pressed (row, column): {shown or 'none'}"), Text(status(board, zones))
-    )
+    places = [f"({row}, {column})" for row, column in zip(*zones.cells.nonzero())]
+    named = [*places[:NAMED], *([f"and {len(places) - NAMED} more"] if len(places) > NAMED else [])]
+    pressed = terminal.listed("pressed (row, column): ", named or ["none"], room.width)
+    below = f"{pressed}\n{status(board, zones, room.width)}"
+    left = room.without(below.count("\n") + 1 + LEGEND_LINES)
+    drawing = sheet.draw(zones, sheet.scales(zones, left.width, left.height)[0], room.unicode, mask(board))
+    return Group(styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))

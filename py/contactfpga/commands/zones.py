@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING
 
-from contactfpga import driver
+from contactfpga import driver, terminal
+from contactfpga.commands import sheet
 from contactfpga.errors import ContactFPGAError
 from contactfpga.zone import Zones
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+    from rich.text import Text
+
+    from contactfpga.commands.live import Room
+
+BESIDE = 3
+"""Characters between the sheet and the table."""
 
 
 def main(args: argparse.Namespace) -> int:
@@ -17,7 +29,7 @@ def main(args: argparse.Namespace) -> int:
     from contactfpga.commands import live  # rich, which scripts do without
 
     with live.connect(args, args.record) as board:
-        return live.show(board, args, lambda zones: render(board, zones))
+        return live.show(board, args, lambda zones, room: render(board, zones, room))
 
 
 def _json(args: argparse.Namespace) -> int:
@@ -29,25 +41,63 @@ def _json(args: argparse.Namespace) -> int:
     return 0
 
 
-def render(board: driver.Board, zones: Zones):  # type: ignore[no-untyped-def]
-    """One frame as rich shows it."""
+def render(board: driver.Board, zones: Zones, room: Room) -> RenderableType:
+    """One frame as rich shows it: the sheet as large as there is room for, the table beside it or below."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
-    from contactfpga.commands.sheet import draw
+    below = status(board, zones, room.width)
+    left = room.without(below.count("\n") + 1 + LEGEND_LINES)
+    listed = table(zones, left.height)
+    across = listed.__rich_measure__(room.console, room.console.options).maximum
+    scale, beside = _layout(zones, left, across)
+    drawing = sheet.draw(zones, scale, room.unicode, mask(board))
+    shown: list[RenderableType]
+    if beside:
+        both = Table.grid(padding=(0, BESIDE))
+        both.add_row(styled(drawing), listed)
+        shown = [both]
+    else:
+        high = sheet.size(zones, scale)[1]
+        shown = [styled(drawing), table(zones, left.without(high).height)]
+    return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
+
+LEGEND_LINES = 2
+
+
+def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
+    """The scale of the drawing, and whether the table stands beside it. Beside it is better than large: it is read
+    with the sheet, and stays in sight."""
+    for scale in sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
+        if sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
+            return scale, True
+    return sheet.scales(zones, room.width, room.height)[0], False
+
+
+def table(zones: Zones, lines: int | None = None) -> Table:
+    """The zones, the first of them where there are lines for no more."""
+    from rich.table import Table
+
+    most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
+    left_out = len(zones) - most
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
-    table = Table("cells", "mm²", "x mm", "y mm", title=title)
-    for zone in zones:
+    caption = f"and {left_out} more" if left_out > 0 else None
+    made = Table(title=title, caption=caption)
+    for heading in ("cells", "mm²", "x mm", "y mm"):
+        made.add_column(heading, justify="right", no_wrap=True)
+    for zone in zones[:most]:
         place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
-        table.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", *place)
-    beside = Table.grid(padding=(0, 3))
-    beside.add_row(Text(draw(zones, mask(board))), table)
-    return Group(beside, Text(status(board, zones)))
+        made.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", *place)
+    return made
 
 
-def mask(board: driver.Board) -> tuple[tuple[int, int], ...]:
+TABLE_LINES = 6
+"""Of a table: title, head, rules and caption."""
+
+
+def mask(board: driver.Board) -> sheet.Mask:
     """The switches that the board's Skin leaves out; none where only its hello is known."""
     try:
         return board.skin.mask
@@ -55,8 +105,21 @@ def mask(board: driver.Board) -> tuple[tuple[int, int], ...]:
         return ()
 
 
-def status(board: driver.Board, zones: Zones) -> str:
-    """The line below a frame: which one it is, and what went wrong so far."""
+def styled(drawing: sheet.Drawing) -> Text:
+    """The drawing in its styles."""
+    from rich.text import Text
+
+    text = Text(no_wrap=True)
+    for number, (characters, kinds) in enumerate(zip(drawing.characters, drawing.kinds.tolist())):
+        if number:
+            text.append("\n")
+        for character, kind in zip(characters, kinds):
+            text.append(character, sheet.STYLES[kind])
+    return text
+
+
+def status(board: driver.Board, zones: Zones, width: int) -> str:
+    """The lines below a frame: which one it is, and what went wrong so far."""
     stats = board.stats
     parts = [
         f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",
@@ -65,4 +128,4 @@ def status(board: driver.Board, zones: Zones) -> str:
         *sorted(zones.faults),
         f"{stats.frames} frames, {stats.lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
     ]
-    return " · ".join(part for part in parts if part)
+    return terminal.listed("", [part for part in parts if part], width, " · ")

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactfpga import interrupt
 from contactfpga.cover import elastic, impact, motion, paper
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.design import thinning
@@ -339,4 +340,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

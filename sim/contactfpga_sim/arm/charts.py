@@ -15,7 +15,9 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
 
+from contactfpga import outputs
 from contactfpga.cover.drawing import SETTINGS, save
+from contactfpga.interrupt import Interrupted
 from contactfpga.skin import Skin
 from contactfpga_sim.arm import sweep
 from contactfpga_sim.arm.case import Case, CaseError
@@ -80,14 +82,27 @@ def main(args: argparse.Namespace, case: Case) -> int:
         raise CaseError(
             f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
         )
+    folder = outputs.folder(args.output)
     tasks = plan(case)
-    with executor(args.jobs, args.dask) as workers, progress() as step:
-        found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step)))
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in (*draw(case, tasks, found, folder), write_csv(found, folder / "arm-charts.csv")):
+    so_far: dict[Task, Point] = {}
+    try:
+        with executor(args.jobs, args.dask) as workers, progress() as step:
+            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(so_far, len(tasks.all), folder)) from None
+    print(write_csv(found, folder / "arm-charts.csv"), flush=True)
+    for path in draw(case, tasks, found, folder):
         print(path)
     return 0
+
+
+def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
+    """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
+    again = "the same command goes on from there"
+    if not found:
+        return f"interrupted before the first of {of} runs was finished; {again}"
+    path = write_csv(found, folder / "arm-charts-so-far.csv")
+    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"
 
 
 def draw(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-from pathlib import Path
 
+from contactfpga import outputs, terminal
 from contactfpga.skin import Skin
 from contactfpga_sim.arm import comply, draw, report
 from contactfpga_sim.arm.case import Case
@@ -25,15 +25,16 @@ def main(args: argparse.Namespace) -> int:
     if case.control.behaviour == "comply":
         return _pushes(args, case)
     skin = Skin.load(args.skin) if args.skin else None
+    folder = None if args.json else outputs.folder(args.output)
     found = report.columns(case, args.case, 1e-3 * args.latency, skin)
-    if args.json:
+    if folder is None:
         print(json.dumps(report.as_json(found, args.case), indent=2))
         return 0
     title = f"Case {args.case}: time counts from the touch, {case.link.speed_m_s:g} m/s"
     _print(report.table(found, args.case == "paper"), title)
     for note in report.NOTES if args.case == "paper" else ():
-        print(note)
-    for path in draw.pictures(found, Path(args.output)):
+        terminal.say(note)
+    for path in draw.pictures(found, folder):
         print(path)
     return 0
 
@@ -46,20 +47,14 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
         print(json.dumps(known, indent=2))
         return 0
     _print(report.push_lines(pushes), f"Case {args.case}: pushed by {1e3 * case.touch[0].push_m:g} mm and let go")
-    print(f"The torque stays below {case.control.torque_limit_nm:g} Nm up to a push of {fastest:.3f} m/s.")
+    terminal.say(f"The torque stays below {case.control.torque_limit_nm:g} Nm up to a push of {fastest:.3f} m/s.")
     return 0
 
 
 def _print(lines: list[list[str]], title: str) -> None:
-    from rich.console import Console
-    from rich.table import Table
+    from contactfpga.commands.tables import tables
 
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=140)
-    table = Table(title=title, title_justify="left")
-    for number, heading in enumerate(lines[0]):
-        table.add_column(heading, justify="right" if number else "left", no_wrap=not number)
-    for line in lines[1:]:
-        table.add_row(*line)
-    console.print(table)
+    console = terminal.console()
+    for table in tables(lines, console.width, title=title):
+        console.print(table)
+        console.print()

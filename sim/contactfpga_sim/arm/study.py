@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactfpga import interrupt, outputs
 from contactfpga_sim import figures
 from contactfpga_sim.arm import charts, comply, draw, report, sweep
 from contactfpga_sim.arm.case import Case
@@ -18,7 +18,7 @@ from contactfpga_sim.arm.command import SHARES
 from contactfpga_sim.arm.run import Result, run
 from contactfpga_sim.arm.sweep import Point, Task
 from contactfpga_sim.arm.world import Faults
-from contactfpga_sim.pool import progress
+from contactfpga_sim.pool import executor, progress
 
 STEPS_US = (25.0, 12.5, 6.25)
 """Of the integrator; each is half of the one before."""
@@ -132,9 +132,11 @@ def main() -> int:
     parser.add_argument("page", type=Path)
     parser.add_argument("folder", type=Path)
     args = parser.parse_args()
+    outputs.file(args.page, "page")
+    outputs.folder(args.folder, "folder")
     case = Case.load("paper")
     tasks = charts.plan(case)
-    with ProcessPoolExecutor() as workers, progress() as step:
+    with executor() as workers, progress() as step:
         points = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step)))
     found = report.columns(case, "paper", charts.PAPER_S)
     tables: dict[str, Callable[[], str]] = {
@@ -154,4 +156,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

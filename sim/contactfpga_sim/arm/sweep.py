@@ -62,13 +62,20 @@ def work(task: Task) -> dict[str, float]:
     return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
 
 
-def sweep(tasks: Sequence[Task], executor: Executor, step: Callable[[str, int], None] = lambda name, of: None):
-    """The tasks' points, in their order; ``step(name, number of all)`` is called after each."""
-    futures = [executor.submit(work, task) for task in tasks]
+def sweep(
+    tasks: Sequence[Task],
+    executor: Executor,
+    step: Callable[[str, int], None] = lambda name, of: None,
+    so_far: dict[Task, Point] | None = None,
+) -> list[Point]:
+    """The tasks' points, in their order; ``step(name, number of all)`` is called after each, and it is in ``so_far`` at
+    once."""
+    found = {} if so_far is None else so_far
+    futures = {executor.submit(work, task): task for task in tasks}
     for future in as_completed(futures):
-        future.result()
+        found[futures[future]] = Point(**future.result())
         step("runs of the arm", len(futures))
-    return [Point(**future.result()) for future in futures]
+    return [found[task] for task in tasks]
 
 
 def _point(task: Task) -> Point:

@@ -6,10 +6,12 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
+from contactfpga import outputs
+from contactfpga.interrupt import Interrupted
 from contactfpga_sim import pool
 from contactfpga_sim.chart import draw, host, numbers
 from contactfpga_sim.chart.methods import METHODS
-from contactfpga_sim.chart.study import Task, study
+from contactfpga_sim.chart.study import Point, Task, study
 from contactfpga_sim.families import FAMILIES
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
@@ -19,20 +21,35 @@ def main(args: argparse.Namespace) -> int:
     """Run the command."""
     _known("--method", args.method, METHODS)
     _known("--family", args.family, FAMILIES)
+    folder = outputs.folder(args.output)
     tasks = [
         Task(method, METHODS[method], family, args.placements, args.seed)
         for family in args.family or FAMILIES_DRAWN
         for method in args.method or METHODS
     ]
-    with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-        points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step)]
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
-    numbers.write(points, folder / "chart.csv")
-    draw.save(numbers.read(folder / "chart.csv"), folder)
-    for name in ("chart.csv", "chart.png", "chart.svg"):
+    so_far: dict[Task, Point] = {}
+    try:
+        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+            points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step, so_far)]
+    except KeyboardInterrupt:
+        raise Interrupted(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
+    table = folder / "chart.csv"
+    numbers.write(points, table)
+    print(table, flush=True)
+    draw.save(numbers.read(table), folder)
+    for name in ("chart.png", "chart.svg"):
         print(folder / name)
     return 0
+
+
+def _kept(points: list[Point], of: int, folder: Path) -> str:
+    """Where the points are that were finished, in a file of their own: a whole chart from before stays."""
+    again = "the same command goes on from there"
+    if not points:
+        return f"interrupted before the first of {of} points was finished; {again}"
+    path = folder / "chart-so-far.csv"
+    numbers.write(points, path)
+    return f"interrupted; {len(points)} of {of} points are in {path}, without sizes and the host's times; {again}"
 
 
 def _known(option: str, names: Iterable[str] | None, known: Iterable[str]) -> None:

@@ -74,37 +74,46 @@ def study(
     executor: Executor,
     with_size: bool = True,
     step: Callable[[str, int], None] = lambda name, of: None,
+    so_far: dict[Task, Point] | None = None,
 ) -> list[Point]:
-    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece.
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece. A point is put
+    into ``so_far`` as soon as its errors and times are known; its size comes last.
 
     What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
     any other with the same interface, a Dask cluster's for instance.
     """
-    jobs = [(task, first) for task in tasks for first in range(0, task.count, PIECE)]
     skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
-    pieces = [executor.submit(accuracy, task, first) for task, first in jobs]
-    times = [executor.submit(timing, task) for task in tasks]
-    places = [executor.submit(_size, skin) for skin in skins]
-    names: dict[Future[Any], str] = {
-        **dict.fromkeys(pieces, "placements"),
-        **dict.fromkeys(times, "times"),
-        **dict.fromkeys(places, "place and route"),
+    parts: dict[Task, tuple[list[Future[Found]], Future[dict[str, float]]]] = {
+        task: (
+            [executor.submit(accuracy, task, first) for first in range(0, task.count, PIECE)],
+            executor.submit(timing, task),
+        )
+        for task in dict.fromkeys(tasks)
     }
+    places = {skin: executor.submit(_size, skin) for skin in skins}
+    names: dict[Future[Any], str] = {
+        **dict.fromkeys((piece for pieces, _ in parts.values() for piece in pieces), "placements"),
+        **dict.fromkeys((time for _, time in parts.values()), "times"),
+        **dict.fromkeys(places.values(), "place and route"),
+    }
+    owners = {future: task for task, (pieces, time) in parts.items() for future in (*pieces, time)}
+    found = {} if so_far is None else so_far
     of = Counter(names.values())
     for future in as_completed(names):
         future.result()
         step(names[future], of[names[future]])
-    sizes_by_skin = {skin: future.result() for skin, future in zip(skins, places, strict=True)}
-    return [
-        Point(
-            task,
-            intervals([piece.result() for (owner, _), piece in zip(jobs, pieces, strict=True) if owner == task]),
-            Speed(**time.result()),
-            sizes_by_skin[task.skin].luts if with_size else None,
-            sizes_by_skin[task.skin].fmax_mhz if with_size else None,
-        )
-        for task, time in zip(tasks, times, strict=True)
-    ]
+        task = owners.get(future)
+        if task is None:
+            continue
+        pieces, time = parts[task]
+        if time.done() and all(piece.done() for piece in pieces):
+            measured = intervals([piece.result() for piece in pieces])
+            found[task] = Point(task, measured, Speed(**time.result()), None, None)
+    return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
+
+
+def _sized(point: Point, size: sizes.Size) -> Point:
+    return dataclasses.replace(point, luts=size.luts, fmax_mhz=size.fmax_mhz)
 
 
 def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:

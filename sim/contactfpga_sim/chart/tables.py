@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga import interrupt
 from contactfpga.derived import Derived
 from contactfpga.skin import Skin
 from contactfpga_sim import figures
@@ -106,4 +107,4 @@ TABLES: dict[str, Callable[[], str]] = {"front": front_table, "host": host_table
 
 
 if __name__ == "__main__":
-    sys.exit(figures.main(TABLES))
+    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))

@@ -6,10 +6,13 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
+from contactfpga import outputs
+from contactfpga.interrupt import Interrupted
 from contactfpga_sim import figures
 from contactfpga_sim.failures import draw, page
 from contactfpga_sim.failures.catalogue import STUDIES
 from contactfpga_sim.failures.study import Turned
+from contactfpga_sim.pool import progress
 
 
 def main(args: argparse.Namespace) -> int:
@@ -20,36 +23,47 @@ def main(args: argparse.Namespace) -> int:
             raise ValueError(f"--study {name!r} is not known; take one of {', '.join(STUDIES)}")
     if args.page and args.study:
         raise ValueError("--page takes all studies; leave --study out")
-    turned = _with_progress(args.study or list(STUDIES))
-    if args.page:
-        path = Path(args.page)
-        text = figures.update(path.read_text(), {"failures": lambda: page.table(turned), "pictures": page.pictures})
-        path.write_text(text)
-        print(path)
-        _draw(turned, path.parent / "images" / "failures")
-        return 0
-    folder = Path(args.output)
-    _draw(turned, folder)
-    (folder / "failures.md").write_text(page.table(turned) + "\n")
-    print(folder / "failures.md")
+    folder = outputs.folder(args.output)
+    path = outputs.file(args.page, "--page") if args.page else None
+    pictures = outputs.folder(path.parent / "images" / "failures", "--page") if path else folder
+    turned: dict[str, dict[str, Turned]] = {}
+    try:
+        _turn(args.study or list(STUDIES), turned)
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(turned, folder)) from None
+    if path:
+        tables = {"failures": lambda: page.table(turned), "pictures": page.pictures}
+        path.write_text(figures.update(path.read_text(encoding="utf-8"), tables), encoding="utf-8")
+    else:
+        path = _write(turned, folder / "failures.md")
+    print(path, flush=True)
+    _draw(turned, pictures)
     return 0
 
 
+def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
+    path.write_text(page.table(turned) + "\n", encoding="utf-8")
+    return path
+
+
+def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
+    """Where what was finished is, in a file of its own: a whole table from before stays."""
+    done = sum(map(len, turned.values()))
+    if not done:
+        return "interrupted before the first knob was turned"
+    path = _write(turned, folder / "failures-so-far.md")
+    return f"interrupted; {done} row{'' if done == 1 else 's'} of the table, all that was finished, in {path}"
+
+
 def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     for name, methods in turned.items():
         (folder / f"{name}.svg").write_text(draw.svg(STUDIES[name], methods), encoding="utf-8")
         print(folder / f"{name}.svg")
 
 
-def _with_progress(names: list[str]) -> dict[str, dict[str, Turned]]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as progress:
-        bar = progress.add_task("knobs", total=len(names))
-        found = {}
+def _turn(names: list[str], turned: dict[str, dict[str, Turned]]) -> None:
+    """Turn the knobs one after the other; each is in ``turned`` as soon as it is done."""
+    runs = sum(len(STUDIES[name].runs) for name in names)
+    with progress() as step:
         for name in names:
-            progress.update(bar, description=STUDIES[name].title)
-            found[name] = STUDIES[name].turn()
-            progress.advance(bar)
-        return found
+            STUDIES[name].turn(lambda: step("knobs and methods", runs), turned.setdefault(name, {}))

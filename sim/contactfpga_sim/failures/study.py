@@ -54,9 +54,15 @@ class Study:
     format: str = "{:,g}"
     """How a value is written."""
 
-    def turn(self) -> dict[str, Turned]:
-        """Every value, for every method."""
-        return {name: Turned(self.values, tuple(map(run, self.values))) for name, run in self.runs.items()}
+    def turn(
+        self, step: Callable[[], None] = lambda: None, so_far: dict[str, Turned] | None = None
+    ) -> dict[str, Turned]:
+        """Every value, for every method; ``step()`` is called after each of these, and it is in ``so_far`` at once."""
+        found = {} if so_far is None else so_far
+        for name, run in self.runs.items():
+            found[name] = Turned(self.values, tuple(map(run, self.values)))
+            step()
+        return found
 
 
 @dataclasses.dataclass(frozen=True)

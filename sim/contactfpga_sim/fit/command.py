@@ -6,16 +6,13 @@ import argparse
 import json
 import shlex
 import sys
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
-from rich import box
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
+from contactfpga import outputs, terminal
 from contactfpga.commands.cover import UNSOLVED
+from contactfpga.commands.tables import tables
+from contactfpga.interrupt import Interrupted
 from contactfpga.skin import Skin
 from contactfpga_sim import pool
 from contactfpga_sim.fit import show
@@ -23,22 +20,41 @@ from contactfpga_sim.fit.candidates import METHODS, SCANS, Candidate, candidates
 from contactfpga_sim.fit.goals import Goals
 from contactfpga_sim.fit.search import fit
 from contactfpga_sim.fit.sources import default_count, source
-from contactfpga_sim.fit.trial import Fit, Task
+from contactfpga_sim.fit.trial import Fit, SoFar, Task
 
 
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
+    output = outputs.file(args.output) if args.output else None
     task, tried = asked(args)
-    with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-        found = fit(task, tried, executor, step)
-    if args.output and found.answer:
-        command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
-        Path(args.output).write_text(show.toml(found, command), encoding="utf-8")
+    so_far: SoFar = {}
+    try:
+        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+            found = fit(task, tried, executor, step, so_far)
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(so_far, len(tried), args.json)) from None
     if args.json:
-        print(json.dumps(show.plain(found)))
+        print(json.dumps(show.plain(found)), flush=True)
     else:
-        _print(found, args.output)
+        _print(found)
+    if output and found.answer:
+        command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
+        output.write_text(show.toml(found, command), encoding="utf-8")
+        if not args.json:
+            print(f"Skin: {output}")
     return 0 if found.answer and not found.broken else UNSOLVED
+
+
+def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
+    """Print what is known of the candidates; what is to be said of that."""
+    again = "the same command goes on from there"
+    if not so_far:
+        return f"interrupted before the first of {of} candidates was measured; {again}"
+    if as_json:
+        print(json.dumps(show.plain_so_far(so_far.values())), flush=True)
+    else:
+        _table(show.rows_so_far(so_far.values()))
+    return f"interrupted; of {of} candidates {len(so_far)} were measured, and no answer was chosen; {again}"
 
 
 def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
@@ -85,22 +101,18 @@ def _known(option: str, names: Sequence[str] | None, known: Sequence[str]) -> Se
     return names or known
 
 
-def _print(found: Fit, output: str | None) -> None:
-    console = Console() if sys.stdout.isatty() else Console(width=160)
-    console.print(_table(show.rows(found), bold="the answer"))
-    console.print(_table(show.reported(found)))
+def _print(found: Fit) -> None:
+    _table(show.rows(found), bold="the answer")
+    _table(show.reported(found), keys=1)
     for line in show.notes(found):
-        console.print(line, highlight=False, markup=False)
-    if output and found.answer:
-        console.print(f"Skin: {output}", highlight=False, markup=False)
+        terminal.say(line)
 
 
-def _table(rows: Iterable[Sequence[str]], bold: str | None = None) -> Table:
-    head, *lines = rows
-    table = Table(box=box.SIMPLE_HEAD)
-    for index, name in enumerate(head):
-        last = index == len(head) - 1
-        table.add_column(name, justify="left" if index < 2 or last else "right", overflow="fold")
-    for line in lines:
-        table.add_row(*map(escape, line), style="bold" if line[-1] == bold else None)
-    return table
+def _table(rows: Sequence[Sequence[str]], keys: int = 4, bold: str | None = None) -> None:
+    """Print; of the Skins what tells them apart comes first, and the verdict last."""
+    console = terminal.console()
+    styles = {number: "bold" for number, row in enumerate(rows[1:]) if row[-1] == bold}
+    texts = [len(rows[0]) - 1] if keys > 1 else []
+    for table in tables(rows, console.width, keys=keys, texts=texts, styles=styles):
+        console.print(table)
+        console.print()

@@ -11,14 +11,19 @@ from contactfpga_hdl import sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim import kept, size
 from contactfpga_sim.fit.candidates import SHEET
-from contactfpga_sim.fit.trial import Step, Trial, gathered
+from contactfpga_sim.fit.trial import SoFar, Step, Trial, gathered
 
 DEVICE = sizes.UP5K
 """For which LUT4 are counted."""
 
 
 def cheapest(
-    name: str, trials: Iterable[Trial], limit: Callable[[Sequence[Trial]], float], executor: Executor, step: Step
+    name: str,
+    trials: Iterable[Trial],
+    limit: Callable[[Sequence[Trial]], float],
+    executor: Executor,
+    step: Step,
+    so_far: SoFar | None = None,
 ) -> list[Trial]:
     """Those of the trials that can have as many LUT4 as ``limit``, which is given those found so far, or fewer; with
     their LUT4, the cheapest first.
@@ -33,7 +38,13 @@ def cheapest(
         over = [one for one in found if one.luts is not None and one.luts > most]
         left = [one for one in left if not any(_finer(one, other) for other in over)]
         batch = [one for one in left if not any(_finer(one, other) for other in left)]
-        luts = gathered(name, {one.skin: (luts_of, one.skin) for one in batch}, executor, step, len(found))
+        luts: dict[Skin, int] = {}
+        try:
+            gathered(name, {one.skin: (luts_of, one.skin) for one in batch}, executor, step, len(found), luts)
+        finally:
+            for one in batch:
+                if so_far is not None and one.skin in luts:
+                    so_far[one.candidate] = dataclasses.replace(one, luts=luts[one.skin])
         found += [dataclasses.replace(one, luts=luts[one.skin]) for one in batch]
         left = [one for one in left if one.skin not in luts]
     return sorted(found, key=lambda one: one.cost)

@@ -7,6 +7,7 @@ import shlex
 import sys
 from collections.abc import Callable
 
+from contactfpga import interrupt
 from contactfpga.commands import fit_flags
 from contactfpga_sim import figures, pool
 from contactfpga_sim.fit import show
@@ -48,4 +49,4 @@ TABLES = {name: _table(arguments) for name, arguments in EXAMPLES.items()}
 
 
 if __name__ == "__main__":
-    sys.exit(figures.main(TABLES))
+    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))

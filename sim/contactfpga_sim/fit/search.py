@@ -13,7 +13,7 @@ from contactfpga_sim.fit.candidates import SHEET, Candidate
 from contactfpga_sim.fit.cost import cheapest, second
 from contactfpga_sim.fit.goals import Measured
 from contactfpga_sim.fit.measuring import errors_of, speed_of
-from contactfpga_sim.fit.trial import Fit, Step, Task, Trial, gathered
+from contactfpga_sim.fit.trial import Fit, SoFar, Step, Task, Trial, gathered
 
 CHECKED = 2
 """Of the answer's reported touches, so many go through the compiled gateware as well."""
@@ -21,19 +21,27 @@ CHECKED = 2
 ZONES_ON_HOST = "reports no zones: say with --host-us how long the host takes to find them"
 
 
-def fit(task: Task, tried: Iterable[Candidate], executor: Executor, step: Step = lambda name, of: None) -> Fit:
+def fit(
+    task: Task,
+    tried: Iterable[Candidate],
+    executor: Executor,
+    step: Step = lambda name, of: None,
+    so_far: SoFar | None = None,
+) -> Fit:
     """Choose; ``step(kind of work, pieces of that kind)`` is called after each piece. What was worked out before with
-    the same code is kept. Neither the order of the candidates nor that of the sources makes a difference."""
+    the same code is kept. Neither the order of the candidates nor that of the sources makes a difference. ``so_far`` is
+    there for those who end the search before it is done."""
+    so_far = {} if so_far is None else so_far
     ordered = sorted(tried, key=lambda one: repr(one.settings))
     impossible = [Trial(one, refusals=(f"Skin refuses: {one.refusal}",)) for one in ordered if one.skin is None]
-    trials = _judged(task, [one for one in ordered if one.skin is not None], executor, step)
+    trials = _judged(task, [one for one in ordered if one.skin is not None], executor, step, so_far)
     if all(trial.refusals for trial in trials):
         return _none(task, sorted(trials, key=lambda one: one.excess), impossible, executor, step)
-    passed = cheapest("synthesis", [one for one in trials if not one.refusals], second, executor, step)
+    passed = cheapest("synthesis", [one for one in trials if not one.refusals], second, executor, step, so_far)
     answer, runner_up = passed[0], passed[1] if len(passed) > 1 else None
     reported = _reported(task, passed[:2], executor, step, CHECKED)
     refused = [] if task.quick else [one for one in trials if one.refusals]
-    sized = cheapest("synthesis of the refused", refused, lambda _: answer.cost[0], executor, step)
+    sized = cheapest("synthesis of the refused", refused, lambda _: answer.cost[0], executor, step, so_far)
     cheaper = tuple(one for one in sized if one.cost <= answer.cost)
     return Fit(
         task,
@@ -52,7 +60,7 @@ def _none(task: Task, trials: list[Trial], impossible: list[Trial], executor: Ex
     return Fit(task, None, None, tuple(trials), tuple(impossible), 0, _reported(task, nearest, executor, step, 0), ())
 
 
-def _judged(task: Task, tried: Sequence[Candidate], executor: Executor, step: Step) -> list[Trial]:
+def _judged(task: Task, tried: Sequence[Candidate], executor: Executor, step: Step, so_far: SoFar) -> list[Trial]:
     """All that were measured on the scenes to choose with, with the limits that they miss."""
     sheets: dict[Settings, dict[Settings, Skin]] = {}
     for one in tried:
@@ -60,28 +68,32 @@ def _judged(task: Task, tried: Sequence[Candidate], executor: Executor, step: St
         sheets.setdefault(_sheet(one), {}).setdefault(_sees(one), one.skin)
     jobs: dict[Hashable, tuple[Any, ...]] = {}
     for source in task.sources:
-        jobs |= {
-            (source, sheet): (errors_of, task, source, list(skins.values()), False) for sheet, skins in sheets.items()
-        }
-        jobs |= {(source, one.skin): (speed_of, task, source, one.skin, False, 0) for one in tried}
-    found = gathered("scenes", jobs, executor, step)
-    seen = {
-        (source, sees): errors
+        for sheet, skins in sheets.items():
+            jobs[source, sheet] = (errors_of, task, source, list(skins.values()), False)
+            same = [one.skin for one in tried if _sheet(one) == sheet]
+            jobs |= {(source, skin): (speed_of, task, source, skin, False, 0) for skin in same}
+    found: dict[Hashable, Any] = {}
+    try:
+        gathered("scenes", jobs, executor, step, found=found)
+    finally:
+        for one in tried:
+            if all((source, part) in found for source in task.sources for part in (_sheet(one), one.skin)):
+                so_far[one] = _trial(task, one, sheets, found)
+    return [so_far[one] for one in tried]
+
+
+def _trial(
+    task: Task, one: Candidate, sheets: dict[Settings, dict[Settings, Skin]], found: dict[Hashable, Any]
+) -> Trial:
+    place = list(sheets[_sheet(one)]).index(_sees(one))
+    measured = tuple(
+        _with_host(task, one.skin, Measured(found[source, _sheet(one)][place], found[source, one.skin]))
         for source in task.sources
-        for sheet, skins in sheets.items()
-        for sees, errors in zip(skins, found[source, sheet], strict=True)
-    }
-    trials = []
-    for one in tried:
-        measured = tuple(
-            _with_host(task, one.skin, Measured(seen[source, _sees(one)], found[source, one.skin]))
-            for source in task.sources
-        )
-        trial = Trial(one, measured, _words(task, measured), max(map(task.goals.excess, measured)))
-        if trial.skin.report == "cells" and task.host_us is None:
-            trial = dataclasses.replace(trial, refusals=(ZONES_ON_HOST, *trial.refusals), excess=math.inf)
-        trials.append(trial)
-    return trials
+    )
+    trial = Trial(one, measured, _words(task, measured), max(map(task.goals.excess, measured)))
+    if trial.skin.report == "cells" and task.host_us is None:
+        return dataclasses.replace(trial, refusals=(ZONES_ON_HOST, *trial.refusals), excess=math.inf)
+    return trial
 
 
 Settings = tuple[tuple[str, Any], ...]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from contactfpga_sim.chart.errors import METRICS, Interval
@@ -33,6 +33,17 @@ def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:
     if len({line[place] for line in lines}) == 1:
         table = [line[:place] + line[place + 1 :] for line in table]
     return table
+
+
+def rows_so_far(trials: Iterable[Trial]) -> list[list[str]]:
+    """The head, and a line for each Skin that was measured when the search was ended, the nearest one first."""
+    nearest = sorted(trials, key=lambda one: (one.excess, one.cost))
+    return [list(HEADS), *(_row(one, "; ".join(one.refusals) or "meets the limits") for one in nearest)]
+
+
+def plain_so_far(trials: Iterable[Trial]) -> dict[str, Any]:
+    """The same for JSON."""
+    return {"interrupted": True, "measured": [_trial(one) for one in sorted(trials, key=lambda one: one.excess)]}
 
 
 def _row(trial: Trial, verdict: str) -> list[str]:

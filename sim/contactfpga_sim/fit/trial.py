@@ -13,6 +13,9 @@ from contactfpga_sim.fit.candidates import Candidate
 from contactfpga_sim.fit.goals import Goals, Measured
 from contactfpga_sim.fit.sources import Source
 
+SoFar = dict[Candidate, "Trial"]
+"""What is known of each candidate while the search goes on; all of them but those that Skin refuses."""
+
 Step = Callable[[str, int], None]
 """Called after each piece of work with its kind, and how many pieces of that kind there are."""
 
@@ -93,11 +96,18 @@ class Fit:
 
 
 def gathered(
-    name: str, jobs: dict[Any, tuple[Any, ...]], executor: Executor, step: Step, before: int = 0
+    name: str,
+    jobs: dict[Any, tuple[Any, ...]],
+    executor: Executor,
+    step: Step,
+    before: int = 0,
+    found: dict[Any, Any] | None = None,
 ) -> dict[Any, Any]:
-    """What each job, a function with its arguments, gives; ``before``: pieces of this kind that are done already."""
-    futures: dict[Any, Future[Any]] = {key: executor.submit(*job) for key, job in jobs.items()}
-    for future in as_completed(futures.values()):
-        future.result()
+    """What each job, a function with its arguments, gives; ``before``: pieces of this kind that are done already;
+    ``found``: where it is put as soon as it is there."""
+    futures: dict[Future[Any], Any] = {executor.submit(*job): key for key, job in jobs.items()}
+    found = {} if found is None else found
+    for future in as_completed(futures):
+        found[futures[future]] = future.result()
         step(name, before + len(jobs))
-    return {key: future.result() for key, future in futures.items()}
+    return found

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from contactfpga import interrupt
 from contactfpga.skin import Skin
 from contactfpga_sim.mutants import netlist, proof, trial
 from contactfpga_sim.mutants.netlist import STAGES, Mutant
@@ -152,4 +153,4 @@ def _run(names: Sequence[str], each: int, seed: int, jobs: int) -> list[Result]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 
+from contactfpga import interrupt
 from contactfpga_sim.proofs import (
     adaptive,
     divide,
@@ -81,4 +82,4 @@ def _progress(text: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interrupt.guarded(main))

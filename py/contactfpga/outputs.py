@@ -1,0 +1,51 @@
+"""Where a command writes: looked at before the work begins, so that no result is lost for want of a place."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+
+from contactfpga.errors import ContactFPGAError
+
+
+class OutputError(ContactFPGAError):
+    """What was worked out could not be written there."""
+
+
+def folder(path: str | Path, option: str = "--output") -> Path:
+    """The folder, made where there is none; raises :class:`OutputError` where nothing can be written into it."""
+    place = Path(path)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=place):
+            pass
+    except FileExistsError:
+        raise OutputError(f"{option} is {str(place)!r}; that is no folder") from None
+    except (OSError, ValueError) as error:
+        raise OutputError(_refused(option, place, error)) from None
+    return place
+
+
+def file(path: str | Path, option: str = "--output") -> Path:
+    """A file that can be written, with its folder; nothing of it is changed yet."""
+    place = Path(path)
+    folder(place.parent, option)
+    if place.is_dir():
+        raise OutputError(f"{option} is {str(place)!r}; that is a folder, and a file is needed")
+    new = not os.path.lexists(place)
+    try:
+        with open(place, "ab"):
+            pass
+    except (OSError, ValueError) as error:
+        raise OutputError(_refused(option, place, error)) from None
+    if new:
+        with contextlib.suppress(OSError):
+            place.unlink()
+    return place
+
+
+def _refused(option: str, place: Path, error: Exception) -> str:
+    reason = getattr(error, "strerror", None) or str(error)
+    return f"{option} is {str(place)!r}, which cannot be written: {reason}"

@@ -1,0 +1,152 @@
+"""What the place that a command writes to can show: how wide it is, which characters, whether it can be rewritten.
+
+Every command asks here, so that all of them agree. Text that goes to a file or a pipe is not wrapped, and no character
+is sent that the encoding has no place for.
+"""
+
+from __future__ import annotations
+
+import codecs
+import dataclasses
+import os
+import sys
+import textwrap
+import unicodedata
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PIPE_WIDTH = 160
+"""Of tables and pictures that go where nothing has a width."""
+
+USUAL_WIDTH, USUAL_HEIGHT = 80, 24
+"""Of a terminal that does not tell its size."""
+
+NARROWEST = 20
+"""Less than this is taken for this."""
+
+_NEAREST = {
+    "·": "|",
+    "…": "...",
+    "–": "-",
+    "—": "-",
+    "−": "-",
+    "²": "2",
+    "³": "3",
+    "µ": "u",
+    "μ": "u",
+    "×": "x",
+    "δ": "d",
+    "Ω": "Ohm",
+    "°": "deg",
+    "≤": "<=",
+    "≥": ">=",
+}
+"""What stands for a character in an encoding that lacks it."""
+
+_ERRORS = "contactfpga.nearest"
+
+
+@dataclasses.dataclass(frozen=True)
+class Terminal:
+    """What a stream can show."""
+
+    width: int
+    height: int | None
+    """Lines; None where there is no end of them."""
+    unicode: bool
+    """All characters, not ASCII alone."""
+    wraps: bool
+    """Long lines are to be broken at the width, as somebody reads along."""
+    live: bool
+    """What was written can be written over."""
+
+
+def of(stream: TextIO | None = None) -> Terminal:
+    """What standard output, or another stream, can show now."""
+    stream = sys.stdout if stream is None else stream
+    size = _size(stream)
+    asked = _columns_asked()
+    usual = PIPE_WIDTH if size is None else size.columns or USUAL_WIDTH
+    return Terminal(
+        width=max(NARROWEST, asked or usual),
+        height=None if size is None else size.lines or USUAL_HEIGHT,
+        unicode=(getattr(stream, "encoding", None) or "utf-8").lower().startswith("utf"),
+        wraps=size is not None,
+        # What stands in for a stream hands lines on, below which something else is drawn.
+        live=size is not None
+        and stream in (sys.__stdout__, sys.__stderr__)
+        and os.environ.get("TERM", "") not in ("", "dumb", "unknown"),
+    )
+
+
+def _size(stream: TextIO) -> os.terminal_size | None:
+    """None where the stream is no terminal."""
+    try:
+        return os.get_terminal_size(stream.fileno()) if stream.isatty() else None
+    except (OSError, ValueError):
+        return None
+
+
+def _columns_asked() -> int | None:
+    text = os.environ.get("COLUMNS", "")
+    return int(text) if text.isascii() and text.isdigit() and int(text) else None
+
+
+def prepare() -> None:
+    """From now on no character ends a command because the encoding of its output lacks it."""
+    codecs.register_error(_ERRORS, _nearest)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors=_ERRORS)
+
+
+def _nearest(error: UnicodeError) -> tuple[str | bytes, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    if all("\udc80" <= character <= "\udcff" for character in text):  # bytes of a file's name, as they were
+        return bytes(ord(character) - 0xDC00 for character in text), error.end
+    return "".join(map(_ascii, text)), error.end
+
+
+def _ascii(character: str) -> str:
+    if character in _NEAREST:
+        return _NEAREST[character]
+    return unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode() or "?"
+
+
+def wrapped(text: str, width: int, hang: int = 0) -> str:
+    """The text in lines no longer than the width, but for words that are; all but the first are indented by ``hang``.
+
+    Lines of the text stay lines, and those after the first stay whole: they are there to be copied.
+    """
+    first, *rest = text.split("\n")
+    lines = textwrap.wrap(first, width, subsequent_indent=" " * hang, break_long_words=False, break_on_hyphens=False)
+    return "\n".join([*(lines or [""]), *rest])
+
+
+def say(text: str, stream: TextIO | None = None, hang: int = 0) -> None:
+    """Print, wrapped where somebody reads along."""
+    stream = sys.stdout if stream is None else stream
+    shown = of(stream)
+    print(wrapped(text, shown.width, hang) if shown.wraps else text, file=stream, flush=True)
+
+
+def listed(start: str, items: Iterable[str], width: int, between: str = ", ") -> str:
+    """``start`` and the items with ``between`` between them, wrapped so that no item is broken."""
+    # Spaces of an item hold together as these do; they are spaces again in the end.
+    text = between.join(item.replace(" ", "\xa0") for item in items)
+    return wrapped(f"{start}{text}", width, 2).replace("\xa0", " ")
+
+
+def console(stream: TextIO | None = None) -> Console:
+    """Rich's console for standard output, or another stream, with what is known here."""
+    from rich.console import Console
+
+    stream = sys.stdout if stream is None else stream
+    shown = of(stream)
+    # A terminal that can be rewritten can be resized too, which rich follows by itself.
+    return Console(file=stream, width=None if shown.live else shown.width, highlight=False)
