@@ -201,7 +201,10 @@ def test_another_protocol_version(board):
 
 
 def test_a_board_tells_what_it_is():
-    with FakeBoard(SKIN.replace(name="left arm", settle_us=6.0)) as fake, contactfpga.open(fake.path, timeout=LONG) as opened:
+    with (
+        FakeBoard(SKIN.replace(name="left arm", settle_us=6.0)) as fake,
+        contactfpga.open(fake.path, timeout=LONG) as opened,
+    ):
         assert opened.sheet == SKIN.sheet
         assert (opened.name, opened.clock_hz, opened.baud) == ("left arm", SKIN.clock_hz, SKIN.baud)
         with pytest.raises(contactfpga.ContactFPGAError, match=r"only `board.sheet` is known .*skin='my.toml'"):

@@ -121,8 +121,7 @@ def test_frames_with_zones_missing_or_wrong_are_all_suspect():
     skin = skin_of(7, 6).replace(zone_capacity=1)
     host, wire = Conversation("x"), Wire(skin)
     frames = b"".join(
-        wire.zones([(1, 0, 0)], zones=4, cells=4, flags=["overflow"], sequence=number, time=number)
-        for number in (0, 1)
+        wire.zones([(1, 0, 0)], zones=4, cells=4, flags=["overflow"], sequence=number, time=number) for number in (0, 1)
     )
     zones = host.receive(wire.hello() + frames, 0.0)[-1].zones
     assert zones[0].ghost

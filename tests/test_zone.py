@@ -19,7 +19,6 @@ from contactfpga.conversation import Conversation
 from contactfpga.stats import Stats
 from contactfpga.zone import DTYPE
 from contactfpga_sim import golden
-from contactfpga_sim import golden
 from contactfpga_sim.shapes import variants
 
 SKIN = contactfpga.Skin(rows=12, columns=20, pitch_x_mm=4.0, pitch_y_mm=7.5, settle_us=20.0)

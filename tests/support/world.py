@@ -175,7 +175,9 @@ class World:
         if whole and self.rng.random() < self.lose:
             return
         if whole and self.rng.random() < self.corrupt:
-            word = int.from_bytes(data, "little") ^ self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(8 * len(data) - 16)
+            word = int.from_bytes(data, "little") ^ self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(
+                8 * len(data) - 16
+            )
             data = word.to_bytes(len(data), "little")
         if self.rng.random() < self.repeat:
             start = self.rng.randrange(len(self._history))
