@@ -4,7 +4,7 @@ import random
 
 import numpy as np
 import pytest
-from wire import Wire, crc16, request
+from wire import Wire, crc16, request, requests_in
 
 import contactfpga
 from contactfpga import protocol
@@ -235,7 +235,7 @@ def test_bursts_go_through_the_driver_alike(name, packet, behind, record_propert
 @CASES
 def test_the_hunt_sees_the_shortest_error_that_the_crc_cannot(name, packet, behind):
     """The generator itself, 17 bits, passes wherever it makes no zero byte and leaves the check's marks."""
-    before = b"" if packet.startswith(b"\\0") else Wire(SKINS[name]).prefix
+    before = b"" if packet.startswith(b"\0") else Wire(SKINS[name]).prefix
     hunt = Hunt(packet + behind, crc16(before))
     passing = 0
     for bit in range(8 * (len(packet) - 4) - 16):
@@ -244,7 +244,7 @@ def test_the_hunt_sees_the_shortest_error_that_the_crc_cannot(name, packet, behi
         assert hunt.survivors(np.array([GENERATOR]), bit)[0] == whole, f"bit {bit}"
         passing += whole
         if whole:
-            assert variant[-4:-1] == protocol.check_bytes(variant[:-4].lstrip(b"\\0"), before)
+            assert variant[-4:-1] == protocol.check_bytes(variant[:-4].lstrip(b"\0"), before)
     assert passing > 0 or len(packet) < 10
 
 
@@ -257,14 +257,14 @@ REQUESTS = [request(number, hello) for number, hello in ((0x15A2D1, False), (0x4
 @pytest.mark.parametrize("packet", REQUESTS)
 def test_no_burst_makes_a_request_that_was_not_sent(packet, record_property):
     """All bursts of up to 16 bits; what a board takes is written from docs/protocol.md in tests/support."""
-    stream = packet + request(0x123456 | 1)
-    sent = requests_in(stream.split(b"\\0"))
+    stream = packet + request(0x123456 | 1)[1:]
+    sent = requests_in(stream.split(b"\0"))
     assert len(sent) == 2
     assert packet == protocol.encode_request(*sent[0])
     hunt, hits = Hunt(stream), 0
     for bit in range(8 * len(packet)):
         for error in ALL_BURSTS[hunt.survivors(ALL_BURSTS, bit)]:
-            taken = requests_in(flipped(stream, int(error), bit).split(b"\\0"))
+            taken = requests_in(flipped(stream, int(error), bit).split(b"\0"))
             assert set(taken) <= set(sent), f"burst {error:#x} from bit {bit}"
             hits += 1
     record_property("cases", 8 * len(packet) * len(ALL_BURSTS))
