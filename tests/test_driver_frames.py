@@ -120,7 +120,8 @@ def test_frames_come_in_async_for(board):
         async for zones in queue:
             found.append(zones.sequence)
             if len(found) == count:
-                return found
+                break
+        return found
 
     async def both(opened):
         queue = opened.subscribe()

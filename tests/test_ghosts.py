@@ -7,10 +7,11 @@ import re
 import numpy as np
 import pytest
 from scipy import ndimage
-from wire import Wire, seal
+from wire import Wire
 
 from contactfpga import Skin, protocol
-from contactfpga.receiver import Receiver
+from contactfpga.conversation import Arrival, Conversation
+from contactfpga.protocol import HelloReader
 from contactfpga_hdl.boards import BOARDS
 from contactfpga_hdl.build import plan_for
 from contactfpga_sim import bench_native
@@ -27,14 +28,15 @@ def skin_of(rows, columns, report="moments"):
 
 def received(skin, *frames, **options):
     """What the host makes of these (rows, columns) bool frames, one after the other."""
-    receiver, wire = Receiver("x"), Wire(skin)
+    host, wire = Conversation("x"), Wire(skin)
     data = wire.hello()
     for number, cells in enumerate(frames):
+        options |= {"sequence": number, "time": 96 * number}
         if skin.report == "cells":
-            data += wire.cells(cells, sequence=number, **options)
+            data += wire.cells(cells, **options)
         else:
-            data += wire.zones([moments(zone) for zone in zones_of(cells)], sequence=number, **options)
-    return [item for item in receiver.feed(data, 0.0) if not isinstance(item, protocol.Hello)]
+            data += wire.zones([moments(zone) for zone in zones_of(cells)], **options)
+    return [event.zones for event in host.receive(data, 0.0) if isinstance(event, Arrival)]
 
 
 def zones_of(cells):
@@ -117,11 +119,11 @@ def test_no_ghost_is_missed_while_a_switch_changes(seed, record_property):
 
 def test_frames_with_zones_missing_or_wrong_are_all_suspect():
     skin = skin_of(7, 6).replace(zone_capacity=1)
-    receiver, wire = Receiver("x"), Wire(skin)
+    host, wire = Conversation("x"), Wire(skin)
     frames = b"".join(
-        wire.zones([(1, 0, 0)], zones=4, cells=4, flags=["overflow"], sequence=number) for number in (0, 1)
+        wire.zones([(1, 0, 0)], zones=4, cells=4, flags=["overflow"], sequence=number, time=number) for number in (0, 1)
     )
-    *_, zones = receiver.feed(wire.hello() + frames, 0.0)
+    zones = host.receive(wire.hello() + frames, 0.0)[-1].zones
     assert zones[0].ghost
     assert zones.flags == {"overflow", "ghost"}
 
@@ -141,18 +143,8 @@ def test_the_hello_tells_that_there_are_no_diodes():
     for skin in (skin_of(4, 5), skin_of(4, 5, "cells"), Skin(rows=4, columns=5, settle_us=20.0, diodes="row2col")):
         packet = protocol.encode_hello(skin)
         assert packet == Wire(skin).hello()
-        hello = protocol.decode_hello(protocol.unseal(packet[:-1]))
-        assert hello.skin().ghosts == hello.ghosts == (skin.diodes == "none")
-
-
-def test_a_hello_without_diodes_that_cannot_be_is_refused():
-    """With 8-connectivity, or with barycenters that the board divides."""
-    hello = bytearray(Wire(skin_of(4, 5)).plain_hello())
-    for options in (0x80, 0x81 | 0x18):
-        hello[2] = options
-        receiver = Receiver("x")
-        assert receiver.feed(seal(bytes(hello)) * 2, 0.0) == []
-        assert receiver.stats.damaged == {"content": 1}  # the first piece is never damage
+        hello = HelloReader().take(protocol.unseal(packet[1:-1], b""))
+        assert hello.sheet.ghosts == (skin.diodes == "none")
 
 
 def test_json_tells_ghosts():

@@ -4,12 +4,11 @@ import random
 
 import numpy as np
 import pytest
-from wire import Wire
+from wire import Wire, crc16, request, requests_in
 
 import contactfpga
 from contactfpga import protocol
-from contactfpga.receiver import Receiver
-from contactfpga.zone import Zones
+from contactfpga.conversation import Arrival, Conversation
 
 SKINS = {
     "reference": contactfpga.Skin(),
@@ -39,8 +38,8 @@ def _frame(name, rng, count):
         "time": rng.randrange(1 << 24),
         "sequence": rng.randrange(256),
         "overwritten": rng.randrange(16),
-        "stuck": rng.choice([0, 0, 3]),
-        "flags": rng.choice([[], [], ["requested"], ["mismatch"]]),
+        "heard": rng.choice([0, 0, 3]),
+        "flags": rng.choice([[], [], ["fault"], ["mismatch"]]),
     }
     if skin.report == "cells":
         return wire.cells([[rng.random() < 0.3 for _ in range(skin.columns)] for _ in range(skin.rows)], **trailer)
@@ -66,19 +65,27 @@ CASES = pytest.mark.parametrize(
 )
 
 
+class AnyTime:
+    """Takes every frame: which ones fit those before is not what these tests are about."""
+
+    before, known = None, True
+
+    def take_hello(self, hello, now):
+        pass
+
+    def take_frame(self, frame, widths, now):
+        return frame.time_us
+
+
 def accepted(name, stream):
-    """What the driver makes of ``stream``: frames and hellos, as values that compare."""
-    receiver = Receiver("x")
-    receiver.feed(Wire(SKINS[name]).hello(), 0.0)
-    found = set()
-    for item in receiver.feed(stream, 0.0):
-        if isinstance(item, Zones):
-            fields = item.to_dict()
-            fields.pop("time_us")
-            found.add(repr((item.frame.time_us, sorted(fields.items()))))
-        else:
-            found.add(repr(item))
-    return found
+    """What a host that knows the board makes of ``stream``: frames, hellos and errors, as values that compare."""
+    host = Conversation("x")
+    host.receive(Wire(SKINS[name]).hello(sent=7, heard=1000), 0.0)
+    host._timeline = AnyTime()
+    return {
+        repr(event.zones.to_dict() | {"heard": event.zones.frame.heard}) if isinstance(event, Arrival) else repr(event)
+        for event in host.receive(stream, 0.0)
+    }
 
 
 def flipped(stream, error, bit):
@@ -140,7 +147,8 @@ class Hunt:
     CRC decides; which states pass is found by trying all 65,536.
     """
 
-    def __init__(self, stream):
+    def __init__(self, stream, start=0xFFFF):
+        self.start = start
         self.stream = np.frombuffer(stream, np.uint8)
         self.zeros = np.flatnonzero(self.stream == 0)
         self._passing = {}
@@ -152,7 +160,7 @@ class Hunt:
         end = int(self.zeros[self.zeros >= first][0])  # the delimiter of the packet in which the error begins
         until = first + 3 if first + 3 <= end - 3 else max(first + 3, end + 1)
         begun = np.full(len(errors), self.stream[:first].tobytes().rfind(b"\0") + 1)
-        state = np.full(len(errors), 0xFFFF, np.uint16)
+        state = np.full(len(errors), self.start, np.uint16)
         found = np.zeros(len(errors), bool)
         states, values = {}, {}
         for index in range(int(begun[0]), until):
@@ -165,7 +173,7 @@ class Hunt:
                     passes = _checks(states[index - 3], *(values[index - 3 + place] for place in range(3)))
                     found |= ends & (index - begun >= 5) & passes
                 begun = np.where(ends, index + 1, begun)
-                state = np.where(ends, np.uint16(0xFFFF), state)
+                state = np.where(ends, np.uint16(self.start), state)
         return found | (begun != end + 1) & self.passing(until)[state]
 
     def passing(self, start):
@@ -185,6 +193,17 @@ def _checks(crc, *check):
     return np.logical_and.reduce([value == (part | 0x80) for value, part in zip(check, parts)])
 
 
+class Hunts:
+    """Both checks that a piece may pass: the one of frames, and that of hellos."""
+
+    def __init__(self, name, stream):
+        starts = (crc16(Wire(SKINS[name]).prefix), 0xFFFF)
+        self._hunts = [Hunt(stream, start) for start in starts]
+
+    def survivors(self, errors, bit):
+        return np.logical_or.reduce([hunt.survivors(errors, bit) for hunt in self._hunts])
+
+
 ALL_BURSTS = np.arange(1, 1 << 16, 2)
 """Every burst of up to 16 bits that begins with its first bit."""
 
@@ -194,7 +213,7 @@ def test_no_burst_up_to_16_bits(name, packet, behind, record_property):
     """All of them that begin in the packet or its delimiter. What passes the check bytes goes to the driver."""
     stream = packet + behind
     sent = accepted(name, stream)
-    hunt = Hunt(stream)
+    hunt = Hunts(name, stream)
     for bit in range(8 * len(packet)):
         for error in ALL_BURSTS[hunt.survivors(ALL_BURSTS, bit)]:
             assert accepted(name, flipped(stream, int(error), bit)) <= sent, f"burst {error:#x} from bit {bit}"
@@ -216,16 +235,39 @@ def test_bursts_go_through_the_driver_alike(name, packet, behind, record_propert
 @CASES
 def test_the_hunt_sees_the_shortest_error_that_the_crc_cannot(name, packet, behind):
     """The generator itself, 17 bits, passes wherever it makes no zero byte and leaves the check's marks."""
-    hunt = Hunt(packet + behind)
+    before = b"" if packet.startswith(b"\0") else Wire(SKINS[name]).prefix
+    hunt = Hunt(packet + behind, crc16(before))
     passing = 0
     for bit in range(8 * (len(packet) - 4) - 16):
         variant = flipped(packet, GENERATOR, bit)
-        whole = 0 not in variant[:-1]
+        whole = 0 not in variant[1:-1] and (variant[0] == 0) == (packet[0] == 0)
         assert hunt.survivors(np.array([GENERATOR]), bit)[0] == whole, f"bit {bit}"
         passing += whole
         if whole:
-            assert variant[-4:-1] == protocol.check_bytes(variant[:-4])
+            assert variant[-4:-1] == protocol.check_bytes(variant[:-4].lstrip(b"\0"), before)
     assert passing > 0 or len(packet) < 10
+
+
+# ---- requests
+
+
+REQUESTS = [request(number, hello) for number, hello in ((0x15A2D1, False), (0x4081, True), (0x1FFFFF, False))]
+
+
+@pytest.mark.parametrize("packet", REQUESTS)
+def test_no_burst_makes_a_request_that_was_not_sent(packet, record_property):
+    """All bursts of up to 16 bits; what a board takes is written from docs/protocol.md in tests/support."""
+    stream = packet + request(0x123456 | 1)[1:]
+    sent = requests_in(stream.split(b"\0"))
+    assert len(sent) == 2
+    assert packet == protocol.encode_request(*sent[0])
+    hunt, hits = Hunt(stream), 0
+    for bit in range(8 * len(packet)):
+        for error in ALL_BURSTS[hunt.survivors(ALL_BURSTS, bit)]:
+            taken = requests_in(flipped(stream, int(error), bit).split(b"\0"))
+            assert set(taken) <= set(sent), f"burst {error:#x} from bit {bit}"
+            hits += 1
+    record_property("cases", 8 * len(packet) * len(ALL_BURSTS))
 
 
 # ---- the line itself, with start and stop bits

@@ -1,15 +1,25 @@
 """Zones as the user sees them: order, mm, points and normals, the numpy view."""
 
+import io
+import json
 import math
 import random
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
+from scipy import ndimage
 from wire import Wire
 
 import contactfpga
-from contactfpga.receiver import Receiver
+from contactfpga import labels
+from contactfpga.batch import Batch
+from contactfpga.conversation import Conversation
+from contactfpga.stats import Stats
 from contactfpga.zone import DTYPE
+from contactfpga_sim import golden
+from contactfpga_sim.shapes import variants
 
 SKIN = contactfpga.Skin(rows=12, columns=20, pitch_x_mm=4.0, pitch_y_mm=7.5, settle_us=20.0)
 RADIUS_MM = 40.0
@@ -17,10 +27,10 @@ CYLINDER = SKIN.replace(surface="cylinder", radius_mm=RADIUS_MM)
 
 
 def zones_of(moments, skin=SKIN, **options):
-    receiver, wire = Receiver("x"), Wire(skin)
-    receiver.feed(wire.hello(), 0.0)
-    (zones,) = receiver.feed(wire.zones(moments, **options), 0.0)
-    return zones
+    host, wire = Conversation("x"), Wire(skin)
+    host.receive(wire.hello(sent=options.get("sequence", 0)), 0.0)
+    (arrival,) = host.receive(wire.zones(moments, **options), 0.0)
+    return arrival.zones
 
 
 def test_area_and_barycenter_in_mm():
@@ -47,13 +57,13 @@ def test_a_plane_lies_at_z_0():
 
 
 def test_a_cylinder_has_its_axis_in_z():
-    """A quarter of the circumference along x turns the x axis into the y axis. (The hello's pitch has 7 digits.)"""
+    """A quarter of the circumference along x turns the x axis into the y axis."""
     quarter = CYLINDER.replace(pitch_x_mm=RADIUS_MM * math.pi / 2 / 10)
     first, last = zones_of([(1, 0, 0), (2, 20, 6)], quarter)
     assert first.point_mm == (RADIUS_MM, 0.0, 0.0)
     assert first.normal == (1.0, 0.0, 0.0)
-    assert last.point_mm == pytest.approx((0.0, RADIUS_MM, 22.5), abs=1e-4)
-    assert last.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-5)
+    assert last.point_mm == pytest.approx((0.0, RADIUS_MM, 22.5), abs=1e-12)
+    assert last.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
 
 
 def test_points_of_a_cylinder_lie_on_it_with_normals_that_point_outwards():
@@ -116,9 +126,9 @@ def test_a_zone_does_not_change():
 
 
 def test_the_text_names_what_matters():
-    zones = zones_of([(4, 34, 6)], sequence=7, time=1_500_000, flags=["requested"])
+    zones = zones_of([(4, 34, 6)], sequence=7, time=1_500_000, flags=["fault"])
     text = repr(zones)
-    assert "1 zone, 4 cells pressed, frame 7 at 1.500000 s, requested" in text
+    assert "1 zone, 4 cells pressed, frame 7 at 1.500000 s, fault" in text
     assert "4 cells, 120 mm2 at x 34.00 mm, y 11.25 mm" in text
     assert str(zones) == text
 
@@ -129,5 +139,51 @@ def test_a_frame_flagged_mismatch_reaches_the_user_whatever_it_holds():
     assert zones.flags == {"mismatch"}
     assert len(zones) == 2
     assert zones.pressed == 9
-    assert sum(math.isnan(zone.x_mm) for zone in zones) == 1
-    assert np.isnan(zones.array["x_mm"]).sum() == 1
+    first, last = zones
+    assert (first.area_cells, first.x_mm) == (4, 34.0)
+    assert (last.area_cells, last.x_mm, last.y_mm, last.point_mm, last.normal) == (0, None, None, None, None)
+    assert np.isnan(zones.array["x_mm"]).tolist() == [False, True]
+    assert "0 cells, 0 mm2 nowhere" in repr(zones)
+    assert json.loads(json.dumps(zones.to_dict(), allow_nan=False))["zones"][1]["x_mm"] is None
+    assert len(Batch.of([zones]).zones) == 2
+
+
+@pytest.mark.parametrize("moments", [[(0, 3, 3)], [(1, 31, 15)], [(1, 200, 3)], [(255, 0, 0), (0, 0, 0)]])
+def test_a_frame_flagged_mismatch_can_be_shown(moments):
+    """Whatever the records hold: zones beyond the sheet are not drawn."""
+    from contactfpga.commands.zones import render
+
+    zones = zones_of(moments, cells=9, flags=["mismatch"])
+    board = SimpleNamespace(port="x", stats=Stats(), skin=SKIN)
+    text = io.StringIO()
+    Console(file=text, width=200).print(render(board, zones))
+    assert "mismatch" in text.getvalue()
+
+
+# ---- cells
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_zones_of_cells_are_found_on_the_host_as_scipy_finds_them(rng, connectivity):
+    structure = np.ones((3, 3)) if connectivity == 8 else None
+    for _ in range(150):
+        rows, columns = rng.randrange(1, 25), rng.randrange(1, 25)
+        skin = contactfpga.Skin(rows=rows, columns=columns, report="cells", connectivity=connectivity, settle_us=100.0)
+        cells = np.array([[rng.random() < rng.choice([0.3, 0.6]) for _ in range(columns)] for _ in range(rows)])
+        host, wire = Conversation("x"), Wire(skin)
+        host.receive(wire.hello(), 0.0)
+        zones = host.receive(wire.cells(cells.tolist()), 0.0)[0].zones
+        labels, count = ndimage.label(cells, structure)
+        assert zones.total_zones == len(zones) == count
+        expected = []
+        for label in range(1, count + 1):
+            y, x = np.nonzero(labels == label)
+            expected.append((len(x), int(x.sum()), int(y.sum())))
+        assert sorted((zone.area_cells, zone.sum_x, zone.sum_y) for zone in zones) == sorted(expected)
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_the_host_finds_the_zones_that_the_golden_model_finds(connectivity):
+    for _, cells in variants(12, 20):
+        found = sorted(map(tuple, labels.moments(labels.label(cells, connectivity)).tolist()))
+        assert found == sorted(golden.zones(cells, connectivity))

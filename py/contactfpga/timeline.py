@@ -35,7 +35,7 @@ class Timeline:
         self._next = 0  # frames sent before the next one
         self._waiting = 0  # unexplained frames since the last hello
         self._time_us: int | None = None  # of the last frame; None: a hello has come since
-        self._last_us = 0
+        self._last_us = -1
         self._epoch = 0
         self._now = 0.0
         self._patience_s = MOST_S
@@ -61,7 +61,7 @@ class Timeline:
         first = self._next
         if self._restarted or hello.sent < self._next or (hello.epoch + 1) * _EPOCH_US <= late_us:
             self._stats.restarts += 1
-            self.before, self._last_us, first = None, 0, 0
+            self.before, self._last_us, first = None, -1, 0
         self._stats.lost += max(0, hello.sent - first - self._waiting)
 
     def take_frame(self, frame: Frame, widths: Widths, now: float) -> int | None:
@@ -98,6 +98,6 @@ class Timeline:
         if self._time_us is None:  # from one epoch before the hello's to three after it
             first_us = (self._epoch - 1) * _EPOCH_US
             time_us = first_us + (frame.time_us - first_us) % _WRAP_US
-            return time_us if time_us >= 0 else None
+            return time_us if time_us > self._last_us else None
         step_us = (frame.time_us - self._time_us) % _WRAP_US
         return self._time_us + step_us if 0 < step_us <= MOST_US else None

@@ -141,8 +141,8 @@ class VirtualBoard:
     """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes, among it a function
-    of the simulated time in s that returns the pressed cells, (rows, columns) bool. ``contactfpga.open(VirtualBoard())``
-    makes a board of it as of any port; what the function raises comes out of the call that waits for a frame.
+    of the simulated time in s that returns the pressed cells, (rows, columns) bool.
+    ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port; what the function raises comes out of the call that waits for a frame.
     """
 
     def __init__(self, skin: Skin | None = None, scene: scenes.Source = None):

@@ -7,6 +7,9 @@ ZONE = (4, 10, 6)
 
 SCAN_US = 96
 
+CHUNK = 700
+"""Bytes that a read of :class:`DirectPort` returns at most."""
+
 
 class ModelBoard:
     """``frame()`` and ``hello()`` are what it sends next; ``hear()`` takes what the host sent."""
@@ -50,3 +53,27 @@ class ModelBoard:
         for number, _ in found:
             self.heard = number
         return found
+
+
+class DirectPort(ModelBoard):
+    """A port in simulated time, as ``contactfpga.open`` takes it, that answers each request at once, in pieces."""
+
+    def __init__(self, skin):
+        super().__init__(skin)
+        self._out = b""
+        self._seconds = 0.0
+
+    def write(self, data):
+        for _, hello in self.hear(data):
+            self._out += (self.hello() if hello else b"") + self.frame()
+
+    def read(self, seconds):
+        data, self._out = self._out[:CHUNK], self._out[CHUNK:]
+        self._seconds += 0.0 if data else seconds
+        return data
+
+    def clock(self):
+        return self._seconds
+
+    def close(self):
+        pass

@@ -44,7 +44,7 @@ class World:
         self.down_us = down_us  # from the board's last byte to the host; bytes come in chunks of this time
         self.lose = 0.0  # share of packets that vanish
         self.corrupt = 0.0  # share of packets with flipped bits
-        self.repeat = 0.0  # share of packets after which older bytes come once more
+        self.repeat = 0.0  # share of packets after which older frames come once more
         self.lose_requests = 0.0
         self.unplugged = False
         self.closed = False
@@ -53,14 +53,25 @@ class World:
         self.board = ModelBoard(skin)
         self.life = 0
         self._history = []
+        self._cut = b""  # has arrived and was not read yet
         self._to_board = []  # (time, bytes)
         self._to_host = []  # (time, bytes)
         self._power_up(self.now_us)
 
     # ---- what happens to the board
 
-    def restart(self, skin=None, torn=False):
-        """Power fails, or another bitstream is loaded; ``torn``: in the middle of a packet."""
+    def skip(self, us):
+        """Time passes on a line that carries nothing."""
+        end = self.now_us + us
+        lost = round(us / self.scan_us)
+        self.now_us = self._sample_us = self._free_us = end
+        self._next_hello = end + HELLO_US
+        self.board.sent += lost if self._on_us <= end else 0
+        self._waiting, self._to_board = None, []
+
+    def restart(self, skin=None, torn=False, mute=False):
+        """Power fails, or another bitstream is loaded; ``torn``: in the middle of a packet; ``mute``: the first hello
+        is lost."""
         if torn:
             data = self.board.frame()
             self._send(data[: self.rng.randrange(1, len(data) - 1)], whole=False)
@@ -68,9 +79,12 @@ class World:
             self.skin = skin
             self.board = ModelBoard(skin)
         self.life += 1
+        self._history = []
         self.board.power_up()
         self._to_board = []
         self._power_up(self.now_us + BOOT_US)
+        if mute:
+            self._hello_due = None
 
     def _power_up(self, when):
         self._on_us = self._sample_us = when
@@ -92,12 +106,18 @@ class World:
         end = self.now_us + round(seconds * 1e6)
         while True:
             self._check()
-            data = b""
+            data, self._cut = self._cut, b""
             while self._to_host and self._to_host[0][0] <= self.now_us:
                 data += self._to_host.pop(0)[1]
             if data or self.now_us >= end:
-                return data
+                return self._piece(data)
             self._step(end)
+
+    def _piece(self, data):
+        """Bytes come cut anywhere."""
+        cut = self.rng.randrange(1, len(data) + 1) if data else 0
+        self._cut = data[cut:]
+        return data[:cut]
 
     def write(self, data):
         self._check()
@@ -164,14 +184,15 @@ class World:
         self.board.moments = [zone]
         since = begun - self._on_us
         self.truth.append(Truth(begun, since, self.life, index, zone, self.skin.pitch_x_mm))
-        self._send(self.board.frame(time=since, heard=heard))
+        data = self.board.frame(time=since, heard=heard)
+        self._send(data)
+        self._history = (self._history + [data])[-300:]
 
     def _send(self, data, whole=True):
         self._free_us = max(self._free_us, self.now_us) + round(len(data) * BYTE_US)
         arrival = self._free_us + self.down_us
         if self.down_us:  # a bridge hands over what it has every so often
             arrival = -(-arrival // self.down_us) * self.down_us
-        self._history = (self._history + [data])[-300:]
         if whole and self.rng.random() < self.lose:
             return
         if whole and self.rng.random() < self.corrupt:
@@ -179,7 +200,7 @@ class World:
                 8 * len(data) - 16
             )
             data = word.to_bytes(len(data), "little")
-        if self.rng.random() < self.repeat:
+        if self._history and self.rng.random() < self.repeat:
             start = self.rng.randrange(len(self._history))
             data += b"".join(self._history[start : start + self.rng.randrange(1, 40)])
         self._to_host.append((arrival, data))
@@ -188,7 +209,7 @@ class World:
 class Witness:
     """Holds the frames that a host passes on against what the board sent."""
 
-    def __init__(self, world):
+    def __init__(self, world, life=0):
         self.world = world
         self.place = -1
 
