@@ -1,4 +1,4 @@
-"""Requests: what the host sends, which of it the board takes for one, and which number it repeats (docs/protocol.md)."""
+"""Requests: what the host sends, what the board takes for one, and which number it repeats (docs/protocol.md)."""
 
 from __future__ import annotations
 

@@ -21,14 +21,15 @@ _HELLO_REGION = 3
 
 
 def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
-    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are
-    taken, and one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its end, as
-    ``frames_are_packed`` shows.
+    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken, and
+    one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its end,
+    as ``frames_are_packed`` shows.
 
-    Claimed: what is sent of a frame at that place is what the packer wrote there, and of a hello what the protocol
-    says, but for the digits of its state: of these each is one, and the first two are those of the frames sent; after as many bytes as it has come the check bytes and one delimiter, and only then the next frame or hello
-    begins. A byte stays until it is taken; the next one is offered two clocks later. Of complete frames each one is
-    sent or counted as overwritten; sequence numbers have no gap. The packer is told these numbers from the clock after
+    Claimed: what is sent of a frame at that place is what the packer wrote there. What is sent of a hello is what the
+    protocol says, but for the digits of its state; each of these is a digit, and the first two are those of the frames
+    sent. After as many bytes as a packet has come the check bytes and one delimiter, and only then the next packet
+    begins. A byte stays until it is taken; the next one is offered two clocks later. Each complete frame is sent or
+    counted as overwritten, and sequence numbers have no gap. The packer is told these numbers from the clock after
     ``decide`` until ``commit``.
     """
     m = proof.m

@@ -14,8 +14,8 @@ _REST, _READ, _WRITE = range(3)
 
 
 def digits_are_the_counts(proof: Proof, counter: str) -> None:
-    """Free: pulses of both counters at any time, hold, and the place that is read. Assumed: none comes while one of its kind
-    waits.
+    """Free: pulses of both counters at any time, hold, and the place that is read. Assumed: no pulse comes while one of its
+    kind waits.
 
     Claimed: with no carry under way or waiting, the digits of the counter make up how many pulses there were, modulo
     what they can hold; ``digit`` is that of the place a clock before; other places hold 0.
@@ -66,8 +66,8 @@ def _others(at, counter: str):
 _BUGS = (
     Bug("the epoch begins a place late", Odometer, "elaborate", "Mux(sent_waits, LIVE_DIGITS, _EPOCH)",
         "Mux(sent_waits, LIVE_DIGITS, _EPOCH + 1)"),
-    Bug("a pulse is lost while the other counter's waits", Odometer, "elaborate", "epoch_waits.eq(epoch_waits & sent_waits)",
-        "epoch_waits.eq(0)"),
+    Bug("a pulse is lost while the other counter's waits", Odometer, "elaborate",
+        "epoch_waits.eq(epoch_waits & sent_waits)", "epoch_waits.eq(0)"),
 )  # fmt: skip
 CASES = (
     Case("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),
