@@ -1,18 +1,22 @@
 """Any Amaranth component as native code: evaluation, cache and builds at the same time."""
 
+import ast
 import ctypes
 import dataclasses
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from amaranth.hdl import Cat, Const, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from contactfpga import Skin
 from contactfpga_sim import native
 
+ROOT = Path(__file__).parents[1]
 DRIVER = """
 #include "clocked.h"
 static Clocked model;
@@ -97,3 +101,15 @@ def test_processes_that_start_together_share_one_build(tmp_path):
     assert int(told[0][0]) > 32
     assert sum("building" in err for _, err in told) == 1
     assert len(list(tmp_path.glob("*.so"))) == 1
+
+
+def test_the_key_of_a_skin_covers_its_name_and_all_that_the_gateware_imports():
+    assert native.skin_key(Skin(name="left")) != native.skin_key(Skin(name="right"))
+    imported = set()
+    for path in (ROOT / "hdl").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module == "contactfpga":
+                imported |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("contactfpga."):
+                imported.add(node.module.split(".")[1])
+    assert imported - {"errors", "limits"} <= set(native.HOST_SOURCES)

