@@ -44,8 +44,9 @@ class World:
         self.down_us = down_us  # from the board's last byte to the host; bytes come in chunks of this time
         self.lose = 0.0  # share of packets that vanish
         self.corrupt = 0.0  # share of packets with flipped bits
-        self.repeat = 0.0  # share of packets after which older frames come once more
+        self.repeat = 0.0  # share of packets after which some that arrived come once more
         self.lose_requests = 0.0
+        self.repeated = False
         self.unplugged = False
         self.closed = False
         self.now_us = 0
@@ -184,9 +185,7 @@ class World:
         self.board.moments = [zone]
         since = begun - self._on_us
         self.truth.append(Truth(begun, since, self.life, index, zone, self.skin.pitch_x_mm))
-        data = self.board.frame(time=since, heard=heard)
-        self._send(data)
-        self._history = (self._history + [data])[-300:]
+        self._send(self.board.frame(time=since, heard=heard))
 
     def _send(self, data, whole=True):
         self._free_us = max(self._free_us, self.now_us) + round(len(data) * BYTE_US)
@@ -196,11 +195,12 @@ class World:
         if whole and self.rng.random() < self.lose:
             return
         if whole and self.rng.random() < self.corrupt:
-            word = int.from_bytes(data, "little") ^ self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(
-                8 * len(data) - 16
-            )
-            data = word.to_bytes(len(data), "little")
+            error = self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(8 * len(data) - 16)
+            data = (int.from_bytes(data, "little") ^ error).to_bytes(len(data), "little")
+        elif whole and data[0]:  # a hello begins with a zero byte
+            self._history = (self._history + [data])[-300:]
         if self._history and self.rng.random() < self.repeat:
+            self.repeated = True
             start = self.rng.randrange(len(self._history))
             data += b"".join(self._history[start : start + self.rng.randrange(1, 40)])
         self._to_host.append((arrival, data))
@@ -225,4 +225,5 @@ class Witness:
                 if since_us is not None:
                     assert sent.begun_us >= since_us, f"scanned {since_us - sent.begun_us} us before it was asked for"
                 return sent
-        raise AssertionError(f"never sent, or sent before the last one: {zones}")
+        last = truth[self.place] if self.place >= 0 else None
+        raise AssertionError(f"never sent, or sent before the last one, {last}: {zones}")
