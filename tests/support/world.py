@@ -1,4 +1,4 @@
-"""A board that scans, a line, and a bridge that delays, loses, corrupts and repeats bytes: a port in simulated time.
+"""A board that scans, a line, and a bridge that delays, loses and corrupts bytes: a port in simulated time.
 
 All times are whole microseconds of the world's clock. What the board sent is kept in :attr:`World.truth`, so that
 whatever a host makes of the bytes can be held against it.
@@ -44,16 +44,13 @@ class World:
         self.down_us = down_us  # from the board's last byte to the host; bytes come in chunks of this time
         self.lose = 0.0  # share of packets that vanish
         self.corrupt = 0.0  # share of packets with flipped bits
-        self.repeat = 0.0  # share of packets after which some that arrived come once more
         self.lose_requests = 0.0
-        self.repeated = False
         self.unplugged = False
         self.closed = False
         self.now_us = 0
         self.truth = []
         self.board = ModelBoard(skin)
         self.life = 0
-        self._history = []
         self._cut = b""  # has arrived and was not read yet
         self._to_board = []  # (time, bytes)
         self._to_host = []  # (time, bytes)
@@ -80,7 +77,6 @@ class World:
             self.skin = skin
             self.board = ModelBoard(skin)
         self.life += 1
-        self._history = []
         self.board.power_up()
         self._to_board = []
         self._power_up(self.now_us + BOOT_US)
@@ -197,12 +193,6 @@ class World:
         if whole and self.rng.random() < self.corrupt:
             error = self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(8 * len(data) - 16)
             data = (int.from_bytes(data, "little") ^ error).to_bytes(len(data), "little")
-        elif whole and data[0]:  # a hello begins with a zero byte
-            self._history = (self._history + [data])[-300:]
-        if self._history and self.rng.random() < self.repeat:
-            self.repeated = True
-            start = self.rng.randrange(len(self._history))
-            data += b"".join(self._history[start : start + self.rng.randrange(1, 40)])
         self._to_host.append((arrival, data))
 
 
