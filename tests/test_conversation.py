@@ -232,11 +232,26 @@ def test_a_lost_frame_is_no_restart_at_any_time_of_the_wrap(second):
     assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (0, 5, 0)
 
 
+def test_frames_that_come_twice_are_passed_on_once(rng):
+    """Until the next hello nothing more is, as the board may have been restarted."""
+    for _ in range(30):
+        line, sent = Line(), []
+        line.board.heard = 3
+        line.hello()
+        for _ in range(rng.randrange(1, 300)):
+            sent.append(line.board.frame())
+        passed = line.give(*sent)
+        start = rng.randrange(len(sent))
+        assert line.give(*sent[start : start + rng.randrange(1, 100)]) == []
+        line.hello()
+        assert line.give(*sent[start : start + 3]) == []
+        line.hello()
+        passed += line.frame()
+        assert [zones.time_us for zones in passed] == [SCAN_US * (1 + index) for index in range(len(sent) + 1)]
+        assert (line.stats.lost, line.stats.restarts) == (0, 0)
+
+
 # ---- restarts
-
-
-def restarted(line):
-    line.board.power_up()
 
 
 def test_a_restart_is_told_by_its_hello():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.derived import EPOCH_BITS
 from contactfpga.hello import Hello
-from contactfpga.protocol import Frame
+from contactfpga.protocol import Frame, may_number
 from contactfpga.stats import Stats
 from contactfpga.widths import SEQUENCE_BITS, TIME_BITS, Widths
 
@@ -31,7 +31,7 @@ class Timeline:
         """The last frame since power-up that was explained."""
         self._stats = stats
         self._live = live
-        self._greeted = self._known = self._restarted = False
+        self._greeted = self._known = self._forgot = False
         self._next = 0  # frames sent before the next one
         self._waiting = 0  # unexplained frames since the last hello
         self._time_us: int | None = None  # of the last frame; None: a hello has come since
@@ -51,7 +51,7 @@ class Timeline:
             self._compare(hello)
         self._greeted = True
         self._next, self._epoch, self._time_us = hello.sent, hello.epoch, None
-        self._known, self._restarted, self._waiting = True, False, 0
+        self._known, self._forgot, self._waiting = True, False, 0
         self._now = now
         longest = Widths(hello.sheet).max_frame_bytes
         self._patience_s = MOST_S + 2 * longest * 10 / hello.baud
@@ -59,7 +59,8 @@ class Timeline:
     def _compare(self, hello: Hello) -> None:
         late_us = self._last_us - BEGUN_US  # the scanner's clock is at most a scan behind the frames
         first = self._next
-        if self._restarted or hello.sent < self._next or (hello.epoch + 1) * _EPOCH_US <= late_us:
+        forgot = self._forgot and not may_number(hello.heard)
+        if forgot or hello.sent < self._next or (hello.epoch + 1) * _EPOCH_US <= late_us:
             self._stats.restarts += 1
             self.before, self._last_us, first = None, -1, 0
         self._stats.lost += max(0, hello.sent - first - self._waiting)
@@ -91,7 +92,7 @@ class Timeline:
         before = self.before
         if before is not None:
             if before.heard and not frame.heard:
-                self._restarted = True
+                self._forgot = True
                 return None
             if self._gap(frame) and frame.time_us < BEGUN_US and frame.heard != before.heard:
                 return None  # a frame was lost, or this is one of the first since a restart

@@ -142,7 +142,9 @@ class VirtualBoard:
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene` takes, among it a function
     of the simulated time in s that returns the pressed cells, (rows, columns) bool.
-    ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port; what the function raises comes out of the call that waits for a frame.
+
+    ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
+    call that waits for a frame.
     """
 
     def __init__(self, skin: Skin | None = None, scene: scenes.Source = None):

@@ -1,4 +1,4 @@
-"""A board that scans, a line, and a bridge that delays, loses, corrupts and repeats bytes: a port in simulated time.
+"""A board that scans, a line, and a bridge that delays, loses and corrupts bytes: a port in simulated time.
 
 All times are whole microseconds of the world's clock. What the board sent is kept in :attr:`World.truth`, so that
 whatever a host makes of the bytes can be held against it.
@@ -44,7 +44,6 @@ class World:
         self.down_us = down_us  # from the board's last byte to the host; bytes come in chunks of this time
         self.lose = 0.0  # share of packets that vanish
         self.corrupt = 0.0  # share of packets with flipped bits
-        self.repeat = 0.0  # share of packets after which older frames come once more
         self.lose_requests = 0.0
         self.unplugged = False
         self.closed = False
@@ -52,7 +51,6 @@ class World:
         self.truth = []
         self.board = ModelBoard(skin)
         self.life = 0
-        self._history = []
         self._cut = b""  # has arrived and was not read yet
         self._to_board = []  # (time, bytes)
         self._to_host = []  # (time, bytes)
@@ -79,7 +77,6 @@ class World:
             self.skin = skin
             self.board = ModelBoard(skin)
         self.life += 1
-        self._history = []
         self.board.power_up()
         self._to_board = []
         self._power_up(self.now_us + BOOT_US)
@@ -184,9 +181,7 @@ class World:
         self.board.moments = [zone]
         since = begun - self._on_us
         self.truth.append(Truth(begun, since, self.life, index, zone, self.skin.pitch_x_mm))
-        data = self.board.frame(time=since, heard=heard)
-        self._send(data)
-        self._history = (self._history + [data])[-300:]
+        self._send(self.board.frame(time=since, heard=heard))
 
     def _send(self, data, whole=True):
         self._free_us = max(self._free_us, self.now_us) + round(len(data) * BYTE_US)
@@ -196,13 +191,8 @@ class World:
         if whole and self.rng.random() < self.lose:
             return
         if whole and self.rng.random() < self.corrupt:
-            word = int.from_bytes(data, "little") ^ self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(
-                8 * len(data) - 16
-            )
-            data = word.to_bytes(len(data), "little")
-        if self._history and self.rng.random() < self.repeat:
-            start = self.rng.randrange(len(self._history))
-            data += b"".join(self._history[start : start + self.rng.randrange(1, 40)])
+            error = self.rng.randrange(1, 1 << 16, 2) << self.rng.randrange(8 * len(data) - 16)
+            data = (int.from_bytes(data, "little") ^ error).to_bytes(len(data), "little")
         self._to_host.append((arrival, data))
 
 
@@ -225,4 +215,5 @@ class Witness:
                 if since_us is not None:
                     assert sent.begun_us >= since_us, f"scanned {since_us - sent.begun_us} us before it was asked for"
                 return sent
-        raise AssertionError(f"never sent, or sent before the last one: {zones}")
+        last = truth[self.place] if self.place >= 0 else None
+        raise AssertionError(f"never sent, or sent before the last one, {last}: {zones}")
