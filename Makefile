@@ -21,14 +21,14 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart chart-page fits failures arm-page formal campaign mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart chart-page fits failures arm-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
 help: ## list the targets
 	@echo "contactfpga: contact zones from a sheet of switches"
 	@echo
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' Makefile
 	@echo
 	@echo "  make sim PYTHON=/path/to/python3.12   chooses the Python with which .venv is created (make distclean to change it)"
 	@echo
@@ -100,6 +100,9 @@ formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=
 
 campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long tests that `make test` leaves out
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
+
+soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
+	$(PY) -m contactfpga_sim.soak $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (half an hour and more)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import collections
 import contextlib
-import math
 from collections.abc import AsyncIterator, Iterator
 from typing import TYPE_CHECKING
 
 from contactfpga.batch import Batch
 from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
+from contactfpga.values import is_finite
 from contactfpga.zone import Zones
 
 if TYPE_CHECKING:
@@ -113,8 +113,9 @@ class Subscription:
     def skip_to(self, zones: Zones) -> None:
         """Drop this frame and all that came before it."""
         with self._link.changed:
-            while zones in self._items:
-                self._items.popleft()
+            if zones in self._items:
+                while self._items.popleft() is not zones:
+                    pass
 
     def keep_last(self) -> None:
         """Drop all frames but the last one; raises what a hello gave cause for."""
@@ -140,6 +141,6 @@ def frame_of(found: object) -> Zones:
 
 def checked(timeout: float) -> float:
     """A timeout in seconds as a float; raises ValueError unless it is positive and finite."""
-    if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0 < timeout < math.inf:
+    if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
