@@ -223,7 +223,8 @@ def stream_of_frames(board, skip=0):
     """Sends frames for a while once the board was asked; ``skip`` sequence numbers are left out on the way."""
 
     def send():
-        wait_until(lambda: board.asked)
+        wait_until(lambda: board.sent >= 2)  # both answers that opening the port takes
+        time.sleep(0.1)
         for index in range(200):
             if index == 100:
                 for _ in range(skip):
