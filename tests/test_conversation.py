@@ -159,11 +159,30 @@ def test_after_a_pause_no_frame_is_passed_on_before_a_hello(pause_s, live):
         assert line.frame() == []
         assert line.stats.unexplained == 1
     line.board.sent += 1000
+    if live:
+        line.host.receive(b"", line.now)
+        line.pause(1.0)
     line.hello()
     expected = line.board.time_us
     assert line.frame()[0].time_us == expected
     assert line.stats.lost == 1000
     assert line.stats.restarts == 0
+
+
+def test_a_hello_that_waited_while_nobody_read_tells_no_time():
+    """A computer that slept: its buffer holds a hello, and what came after it was dropped."""
+    line = Line()
+    line.hello()
+    line.frame()
+    waiting = line.board.hello()
+    line.pause(100.0)
+    assert line.give(waiting, line.board.frame(), line.board.frame()) == []
+    line.pause(0.1)
+    assert line.frame() == []
+    line.pause(1.0)
+    line.hello()
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
 
 
 def test_frames_that_wait_some_seconds_keep_their_times():
@@ -375,5 +394,6 @@ def test_the_line_below_a_frame_says_what_was_lost():
     line.hello()
     (zones,) = line.frame(flags=["fault"])
     board = SimpleNamespace(port="x", stats=Stats(lost=3))
-    assert "stuck" in status(board, zones)
-    assert "frames, 3 lost, " in status(board, zones)
+    told = str(status(board, zones, 200))
+    assert "stuck" in told
+    assert "frames, 3 lost, " in told

@@ -7,6 +7,7 @@ from model_board import SCAN_US, ModelBoard
 from wire import Wire
 
 import contactfpga
+from contactfpga import cli
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
@@ -75,3 +76,16 @@ def test_recording_of_another_skin(tmp_path):
 def test_recording_that_does_not_exist():
     with pytest.raises(contactfpga.PortNotFound, match=r"replay:///no/such\.bin cannot be opened"):
         contactfpga.open("replay:///no/such.bin")
+
+
+def test_doctor_of_a_recording_says_where_it_ends(tmp_path, capsys):
+    """It once printed that all was well and ended with status 1."""
+    file, model = tmp_path / "frames.bin", ModelBoard(SKIN)
+    file.write_bytes(model.hello() + b"".join(model.frame() for _ in range(30)))
+    assert cli.main(["doctor", f"replay://{file}"]) == 0
+    out = capsys.readouterr().out
+    assert "note  the recording ends here" in out
+    assert "ok    30 frames, 1 hellos" in out
+    file.write_bytes(model.hello())
+    assert cli.main(["doctor", f"replay://{file}"]) == 1
+    assert "holds no frame" in capsys.readouterr().out

@@ -65,3 +65,21 @@ def test_no_frame_is_too_long_for_the_reader(monkeypatch):
     monkeypatch.setattr("contactfpga.conversation.LONGEST_PACKET", 1556)
     with pytest.raises(contactfpga.ReadTimeout):
         check(64, 64, 4, "moments")
+
+
+@pytest.mark.parametrize(
+    "skin",
+    [
+        Skin(rows=2, surface="cylinder", radius_mm=25.464791),  # its ends nearly meet, as a rounded radius would
+        Skin(rows=1, columns=1, pitch_x_mm=0.01, pitch_y_mm=1000.0),
+        Skin(rows=3, columns=2, settle_us=10_000.0, release_us=10_000.0, clock_hz=1_000_000, baud=1200, name="ä" * 16),
+        Skin(diodes="none", connectivity=4, clock_hz=400_000_000),
+    ],
+)
+def test_what_a_skin_accepts_the_host_accepts(skin):
+    port = DirectPort(skin)
+    port.moments = [(1, 0, 0)]
+    for expected in (None, skin):
+        with contactfpga.open(port, expected) as board:
+            assert board.read().sheet == skin.sheet
+            assert (board.clock_hz, board.baud, board.name) == (skin.clock_hz, skin.baud, skin.name)

@@ -70,7 +70,7 @@ class AnyTime:
 
     before, known = None, True
 
-    def take_hello(self, hello, now):
+    def take_hello(self, hello, now, fresh):
         pass
 
     def take_frame(self, frame, widths, now):

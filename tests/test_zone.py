@@ -151,13 +151,14 @@ def test_a_frame_flagged_mismatch_reaches_the_user_whatever_it_holds():
 @pytest.mark.parametrize("moments", [[(0, 3, 3)], [(1, 31, 15)], [(1, 200, 3)], [(255, 0, 0), (0, 0, 0)]])
 def test_a_frame_flagged_mismatch_can_be_shown(moments):
     """Whatever the records hold: zones beyond the sheet are not drawn."""
+    from contactfpga.commands.live import Room
     from contactfpga.commands.zones import render
 
     zones = zones_of(moments, cells=9, flags=["mismatch"])
     board = SimpleNamespace(port="x", stats=Stats(), skin=SKIN)
-    text = io.StringIO()
-    Console(file=text, width=200).print(render(board, zones))
-    assert "mismatch" in text.getvalue()
+    console = Console(file=io.StringIO(), width=200)
+    console.print(render(board, zones, Room(console, 200, None, True)))
+    assert "mismatch" in console.file.getvalue()
 
 
 # ---- cells

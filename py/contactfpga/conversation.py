@@ -7,6 +7,7 @@ Freshness, losses, restarts, hellos and times are decided here and in the two pa
 from __future__ import annotations
 
 import dataclasses
+import math
 import random
 
 from contactfpga import framing, protocol
@@ -18,7 +19,7 @@ from contactfpga.requests import Requests
 from contactfpga.sheet import Sheet
 from contactfpga.skin import Skin
 from contactfpga.stats import Stats
-from contactfpga.timeline import Timeline
+from contactfpga.timeline import MOST_S, Timeline
 from contactfpga.widths import LONGEST_PACKET, Widths
 from contactfpga.zone import Zones
 
@@ -60,6 +61,8 @@ class Conversation:
         self._reader = protocol.HelloReader()
         self._widths: Widths | None = None
         self._rest = b""
+        self._noticed = math.inf
+        self._doubted = -math.inf
         self._begun = False  # the first piece is cut off by when we began to listen; it is no damage
         self._damage = False
 
@@ -68,6 +71,7 @@ class Conversation:
 
         Until the time ``until`` the request is sent again where it seems lost. :meth:`data_to_send` has what to send.
         """
+        self._notice(now)
         return self._requests.ask(now, until, hello=not self._timeline.known)
 
     def data_to_send(self) -> bytes:
@@ -78,6 +82,7 @@ class Conversation:
         """What ``data`` completes, in order. ``now`` is the time of its arrival in seconds; call it every now and then
         also when nothing came, as then a request may have to be sent again."""
         self.stats.bytes += len(data)
+        self._notice(now)
         *packets, self._rest = (self._rest + data).split(b"\0")
         events = []
         for packet in packets:
@@ -88,6 +93,12 @@ class Conversation:
             self._rest = b""
         self._requests.poll(now, hello=not self._timeline.known)
         return events
+
+    def _notice(self, now: float) -> None:
+        if self._live and now - self._noticed > MOST_S:
+            self._timeline.doubt(now)
+            self._doubted = now
+        self._noticed = now
 
     def _packet(self, packet: bytes, now: float) -> Event | None:
         try:
@@ -157,7 +168,7 @@ class Conversation:
         if expected is not None and hello.fingerprint != expected.fingerprint:
             self.sheet = self._widths = None
             return SkinMismatch(f"{self.port} was built from {difference(hello, expected)}")
-        self._timeline.take_hello(hello, now)
+        self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
         self._requests.take_hello(hello.heard)
         longest = Widths(hello.sheet).max_frame_bytes
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud

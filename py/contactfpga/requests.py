@@ -66,6 +66,10 @@ class Requests:
         self._out.clear()
         return data
 
+    def sent_since(self, number: int, moment: float) -> bool:
+        """Whether this is the number sent last, and was sent since that moment."""
+        return number == self._number and self._sent_at >= moment
+
     def take_hello(self, heard: int) -> None:
         """A hello that repeats this number."""
         if self._stage is _Stage.GREETING and heard == self._number:

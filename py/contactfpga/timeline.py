@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from contactfpga.derived import EPOCH_BITS
 from contactfpga.hello import Hello
 from contactfpga.protocol import Frame, may_number
@@ -16,6 +18,8 @@ MOST_US = _EPOCH_US
 """Hellos come twice a second, so that a frame is no later than this after the hello or the frame before it."""
 MOST_S = 8.0
 """Half the time in which a frame's time wraps: after a longer pause nobody knows how often it did."""
+SETTLED_S = 1.0
+"""So long after a pause in which nobody read, all that waited meanwhile has been read."""
 BEGUN_US = 1 << 21
 """A board may have been restarted so long ago without a hello that arrived."""
 
@@ -38,6 +42,7 @@ class Timeline:
         self._last_us = -1
         self._epoch = 0
         self._now = 0.0
+        self._doubted = -math.inf
         self._patience_s = MOST_S
 
     @property
@@ -45,13 +50,20 @@ class Timeline:
         """Whether the next frame's time can be explained, as far as that is known by now."""
         return self._known
 
-    def take_hello(self, hello: Hello, now: float) -> None:
-        """The board says how many frames it has sent, and roughly when this was."""
+    def doubt(self, now: float) -> None:
+        """Nobody has read for long: what is read now may have waited, with a break before what comes next."""
+        self._known = False
+        self._doubted = now
+
+    def take_hello(self, hello: Hello, now: float, fresh: bool) -> None:
+        """The board says how many frames it has sent, and roughly when this was. ``fresh``: it answers a request sent
+        since :meth:`doubt`."""
         if self._greeted:
             self._compare(hello)
         self._greeted = True
         self._next, self._epoch, self._time_us = hello.sent, hello.epoch, None
-        self._known, self._forgot, self._waiting = True, False, 0
+        self._known = fresh or now >= self._doubted + SETTLED_S
+        self._forgot, self._waiting = False, 0
         self._now = now
         longest = Widths(hello.sheet).max_frame_bytes
         self._patience_s = MOST_S + 2 * longest * 10 / hello.baud

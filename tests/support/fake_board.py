@@ -52,7 +52,7 @@ class FakeBoard(ModelBoard):
         self.answers = True
         self.greets = True
         self.old = False  # speaks protocol 1
-        self.stream = b""  # sent over and over, as fast as the port takes it
+        self.stream = b""  # sent over and over, as fast as the port takes it; or a function that makes more
         self.slice = 1 << 16  # bytes written at once
         self.delay_s = 0.0  # from a request to the answer
         self.asked = 0
@@ -114,7 +114,7 @@ class FakeBoard(ModelBoard):
                 _, writable, _ = select.select([], [self._master], [], 0.005)
                 if writable:
                     with self._lock:
-                        self._write(self.stream)
+                        self._write(self.stream() if callable(self.stream) else self.stream)
 
     def __enter__(self):
         return self
