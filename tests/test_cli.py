@@ -365,7 +365,6 @@ def test_bad_skin_file_is_named(tmp_path, run):
         (["build", "icestick"], "amaranth.build", "boards"),
         (["build", "icestick"], "amaranth_boards.icestick", "boards"),
         (["chart"], "scipy.optimize", "chart"),
-        (["chart"], "rich", "chart"),
         (["fit", "bumper"], "rich.console", "chart"),
         (["fit", "bumper"], "scipy.optimize", "chart"),
         (["board"], "contactfpga_sim.pty_board", "sim"),

@@ -55,8 +55,8 @@ BREAKS = {
     ("stuck", "columns shorted to the rows' level"): (0, 1),
     ("baud", "host faster, frames"): (5.5, 5.75),
     ("baud", "host slower, frames"): (4.25, 4.5),
-    ("baud", "host faster, requests"): (12, None),
-    ("baud", "host slower, requests"): (6.25, 6.5),
+    ("baud", "host faster, requests"): (3.75, 4.0),
+    ("baud", "host slower, requests"): (5.5, 5.75),
     ("noise", "half a bit to two bits long"): (10, 30),
     ("host", "every frame of `contactfpga.open()`"): (16, 20),
     ("clock", "board with `clock_hz` off"): (0.1, 0.3),
@@ -71,8 +71,9 @@ TOLD = {
     ("stuck", "columns shorted to the rows' level"): {"stuck"},
     ("baud", "host faster, frames"): {"OnlyNoise"},
     ("baud", "host slower, frames"): {"OnlyNoise"},
+    ("baud", "host faster, requests"): {"ReadTimeout"},
     ("baud", "host slower, requests"): {"ReadTimeout"},
-    ("noise", "half a bit to two bits long"): {"lost", "damaged", "OnlyNoise"},
+    ("noise", "half a bit to two bits long"): {"lost", "damaged"},
     ("host", "every frame of `contactfpga.open()`"): {"lost", "unexplained"},
 }
 """What is wrong here is told at every value, by nothing else than these."""

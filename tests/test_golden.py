@@ -75,12 +75,18 @@ def test_bytes_and_line_of_the_reference_skin_by_hand():
     assert trace.bytes[: len(hello)] == [(2 + 40 * place, value) for place, value in enumerate(hello)]
     assert trace.line[0] == (3, 0)
     # The empty frame's end mark is put in at 1145 and packed at 1147, so it waits long before the hello ends:
-    # taken one cycle after the delimiter, its first byte goes when the UART is free.
+    # it is replaced by the second scan's, taken one cycle after the delimiter, whose first byte goes when the UART is free.
     delimiter = 2 + 40 * (len(hello) - 1)
     assert trace.bytes[len(hello)][0] == delimiter + 40
     (begun, plain), *_ = packets(skin, trace)[1:]
     frame = protocol.decode_frame(plain, Derived(skin))
-    assert (begun, frame.sequence, frame.time_us, frame.cells, frame.zones) == (delimiter + 40, 0, 61 // 12, 0, 0)
+    assert (begun, frame.sequence, frame.time_us, frame.cells, frame.zones) == (
+        delimiter + 40,
+        0,
+        (SCAN + 61) // 12,
+        0,
+        0,
+    )
 
 
 def test_last_byte_of_a_one_zone_frame_keeps_the_stated_bound():

@@ -33,7 +33,7 @@ def bits(bench, bit_clocks, levels, idle=3):
     sim = bench(dut)
     levels = [1] * idle + levels + [1] * 12 * bit_clocks
     sim.drive(dut.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
-    bit, level, bad = (sim.watch(dut.bits[name]) for name in ("bit", "level", "bad"))
+    bit, level, bad = (sim.watch(port) for port in (dut.bits.bit, dut.bits.level, dut.bits.bad))
     sim.run(len(levels))
     return (
         [(cycle, level[cycle]) for cycle, value in enumerate(bit.values) if value],

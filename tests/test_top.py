@@ -95,10 +95,10 @@ def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, de
     sim = bench(top)
     sim.drive(top.columns, lambda cycle: sum(1 << x for x in range(1, columns, 2)))  # a run in every other column
     transfer, byte = sim.watch(top.byte_transfer), sim.watch(top.byte_data)
-    sim.run(5000)
+    sim.run(7500)
     data = bytes(value for taken, value in zip(transfer.values, byte.values) if taken)
-    packets = [plain(packet) for packet in data.split(b"\0")[:-1]]
-    frames = [packet for packet in packets if packet[-1] >> 3 & 3 != 0]
+    packets = [plain(packet) for packet in data.split(b"\0")[:-1] if packet]
+    frames = [packet for packet in packets if packet[-1] >> 4 != 4]
     assert len(frames) > 3
     counted = 35 + (rows * columns).bit_length() + ((rows + 1) // 2 * ((columns + 1) // 2)).bit_length()
     size = math.ceil((counted + 4) / 8) + 1

@@ -158,7 +158,7 @@ class Scanner(wiring.Component):
             m.d.sync += prescaler.eq(prescaler + 1)
             with m.If(prescaler == per_us - 1):
                 m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
-        watch_epoch(m, time, self.epoch)
+        watch_epoch(m, time, self.epoch, late=ahead < 0)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         # What comes while columns are shifted in came after their sample: it asks for the next frame.
         begins = (self._begins_row if late else self._sampled) & self._first
@@ -173,9 +173,10 @@ class Scanner(wiring.Component):
             m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked), self.tag.heard.eq(heard_now)]
 
 
-def watch_epoch(m: Module, time: Signal, epoch: Signal) -> None:
-    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us."""
+def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:
+    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
     highest = time[EPOCH_BITS - 1]
+    counts = Signal(init=not late)  # not when 0 is first reached
     before = Signal(name="before_epoch")
-    m.d.sync += before.eq(highest)
+    m.d.sync += [counts.eq(counts | ~highest), before.eq(highest & counts)]
     m.d.comb += epoch.eq(before & ~highest)

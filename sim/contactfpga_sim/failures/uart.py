@@ -100,10 +100,10 @@ class Heard:
     """Counters that are not 0, and errors."""
 
 
-def heard(line: Line, data: bytes) -> Heard:
-    """The receiver's frames and counters."""
+def heard(line: Line, data: bytes, greeted: bytes = b"") -> Heard:
+    """The host's frames and counters; ``greeted`` came before, as it was sent."""
     sent = _decoded(b"".join(packet + bytes([protocol.DELIMITER]) for packet in line.frames))[0]
-    frames, conversation = _decoded(data)
+    frames, conversation = _decoded(greeted + data)
     stats = conversation.stats
     right = sum(1 for frame in frames if frame in set(sent))
     counters = {"lost": stats.lost, "damaged": stats.damaged.total()}

@@ -89,8 +89,10 @@ BAUD = Study(
 
 
 def _noise(rate_hz: float) -> Outcome:
+    """The port was opened before the noise began."""
     line = recorded(200)
-    return _of_line(heard(line, line.noisy(rate_hz, seed=1).read(Derived(SKIN).bit_clocks)))
+    noisy = line.noisy(rate_hz, seed=1).read(Derived(SKIN).bit_clocks)
+    return _of_line(heard(line, noisy, greeted=protocol.encode_hello(SKIN)))
 
 
 NOISE = Study(
