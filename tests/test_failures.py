@@ -56,7 +56,7 @@ BREAKS = {
     ("baud", "host faster, frames"): (5.5, 5.75),
     ("baud", "host slower, frames"): (4.25, 4.5),
     ("baud", "host faster, requests"): (3.75, 4.0),
-    ("baud", "host slower, requests"): (5.5, 5.75),
+    ("baud", "host slower, requests"): (6.25, 6.5),
     ("noise", "half a bit to two bits long"): (10, 30),
     ("host", "every frame of `contactfpga.open()`"): (16, 20),
     ("clock", "board with `clock_hz` off"): (0.1, 0.3),

@@ -75,7 +75,7 @@ def test_bytes_and_line_of_the_reference_skin_by_hand():
     assert trace.bytes[: len(hello)] == [(2 + 40 * place, value) for place, value in enumerate(hello)]
     assert trace.line[0] == (3, 0)
     # The empty frame's end mark is put in at 1145 and packed at 1147, so it waits long before the hello ends:
-    # it is replaced by the second scan's, taken one cycle after the delimiter, whose first byte goes when the UART is free.
+    # it is replaced by the second scan's. That is taken one cycle after the delimiter, and goes when the UART is free.
     delimiter = 2 + 40 * (len(hello) - 1)
     assert trace.bytes[len(hello)][0] == delimiter + 40
     (begun, plain), *_ = packets(skin, trace)[1:]

@@ -36,8 +36,9 @@ class Expected:
 
 
 def expected(skin, pressed, requests=types.MappingProxyType({})):
-    """The rules of docs/timing.md for the pressed columns in each cycle, whatever row is driven; ``requests``: cycle and
-    the bits that frames repeat."""
+    """The rules of docs/timing.md for the pressed columns in each cycle, whatever row is driven.
+
+    ``requests``: by cycle, the bits that frames repeat."""
     megahertz = skin.clock_hz // 1_000_000
     S, L = round(skin.settle_us * megahertz), round(skin.release_us * megahertz)
     T, R, cycles = S + L, skin.rows, len(pressed)

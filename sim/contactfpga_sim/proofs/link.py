@@ -21,9 +21,9 @@ _HELLO_REGION = 3
 
 
 def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
-    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken, and
-    one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its end,
-    as ``frames_are_packed`` shows.
+    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken,
+    and one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its
+    end, as ``frames_are_packed`` shows.
 
     Claimed: what is sent of a frame at that place is what the packer wrote there. What is sent of a hello is what the
     protocol says, but for the digits of its state; each of these is a digit, and the first two are those of the frames
