@@ -197,7 +197,7 @@ def test_the_current_follows_its_loop():
 
 
 def test_the_supply_limits_how_fast_the_current_rises():
-    plant = Plant(PAPER.but(motor={"supply_v": 1.5, "current_gain": 1000.0}, run={"step_s": 1e-7}))
+    plant = Plant(PAPER.but(motor={"supply_v": 1.5, "current_gain": 1000.0}, run={"step_s": 1e-7, "duration_s": 0.05}))
     state = plant.step(0.0, (-0.1, 0.0, 0.0), 1.2, 1e-7)
     assert state[2] == pytest.approx(1.5 / 0.5e-3 * 1e-7, rel=1e-3)
 

@@ -62,9 +62,11 @@ def frame_ends(trace):
         if value != protocol.DELIMITER:
             packet.append(value)
             continue
-        plain = protocol.unseal(bytes(packet))
+        if not packet:  # in front of a hello
+            continue
+        plain = protocol.unseal(bytes(packet), protocol.check_prefix(SKIN))
         packet.clear()
-        if protocol.kind_of(plain) == protocol.KIND_ZONES and protocol.decode_frame(plain, Derived(SKIN)).cells:
+        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, Derived(SKIN)).cells:
             ends.append((cycle + 1 + 10 * Derived(SKIN).bit_clocks) / SKIN.clock_hz - LEAD)
     return ends
 

@@ -34,7 +34,8 @@ def ran_before(found, monkeypatch):
     assert asked == [(PAPER, "paper", pytest.approx(6e-3), None)]
 
 
-def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before):
+def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
     assert cli.main(["arm", "--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     full = next(line for line in lines if line.startswith("speed stays positive"))  # has a cell in every column

@@ -74,7 +74,7 @@ TOLD = {
     ("baud", "host faster, requests"): {"ReadTimeout"},
     ("baud", "host slower, requests"): {"ReadTimeout"},
     ("noise", "half a bit to two bits long"): {"lost", "damaged"},
-    ("host", "every frame of `contactfpga.open()`"): {"lost", "unexplained"},
+    ("host", "every frame of `contactfpga.open()`"): {"lost"},
 }
 """What is wrong here is told at every value, by nothing else than these."""
 

@@ -68,18 +68,9 @@ def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     left = campaign.left_by(skin, mutants, stimuli.quick(skin))
     killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
     told = [killed[stage] for stage in ("label", "link")]
-    proved = proof.equivalent(skin, [*told, *left[:4]], limit_s=1)
+    proved = proof.equivalent(skin, [*told, *left[:6]], limit_s=4)
     assert not any(proved[: len(told)])
     assert any(proved[len(told) :])
-
-
-def test_only_noise_tells_a_receiver_that_takes_any_pulse_for_a_byte():
-    skin = SKINS["8x8"]
-    mutants = [m for m in netlist.candidates(skin) if m.place == "serial.py:64" and "-mode const1" in m.change]
-    model = netlist.model(skin, mutants)
-    stimulus = next(stimulus for stimulus in stimuli.quick(skin) if stimulus.noise)
-    left = trial.survivors(skin, model, range(1, len(mutants) + 1), [stimulus._replace(noise=())])
-    assert len(trial.survivors(skin, model, left, [stimulus])) < len(left)
 
 
 def equals(graph, bits, value):

@@ -243,8 +243,14 @@ DEFECTS = {
 }
 
 
-@pytest.mark.parametrize("defect", DEFECTS)
+RARE = {restart_by_the_sequence}
+"""Found in some thousand histories; a test of the conversation has it in each second of the wrap."""
+
+
+@pytest.mark.parametrize(
+    "defect", [pytest.param(defect, marks=pytest.mark.campaign if defect in RARE else ()) for defect in DEFECTS]
+)
 def test_a_defect_that_is_put_back_is_found(monkeypatch, defect):
     defect(monkeypatch)
     with pytest.raises(DEFECTS[defect], match=r"never sent|asked for|no frame within"):
-        run_state_machine_as_test(History, settings=settings(BUDGET, max_examples=1000))
+        run_state_machine_as_test(History, settings=settings(BUDGET, max_examples=5000))

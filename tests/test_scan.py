@@ -226,7 +226,7 @@ def test_a_request_is_answered_once_by_the_next_frame_to_start(bench):
     skin = skin_of("3x5")
     strobe = 33 + 8 + 1  # of frame 1
     for at, frame in ((strobe - 1, 1), (strobe, 2), (strobe + 1, 2), (0, 0)):
-        tags = run(bench, skin, [0] * (33 * 4 + 1), {at}).tags
+        tags = run(bench, skin, [0] * (33 * 4 + 1), {at: 1}).tags
         assert [tag[2] for tag in tags.values()] == [int(index == frame) for index in range(4)]
 
 

@@ -20,12 +20,12 @@ def zones(skin, *found, cells=None):
         SimpleNamespace(
             area_cells=area,
             area_mm2=area * skin.pitch_x_mm * skin.pitch_y_mm,
-            x_mm=x * skin.pitch_x_mm,
-            y_mm=y * skin.pitch_y_mm,
+            x_mm=None if x is None else x * skin.pitch_x_mm,
+            y_mm=None if y is None else y * skin.pitch_y_mm,
         )
         for area, x, y in found
     )
-    frame.skin, frame.cells = skin, cells
+    frame.sheet, frame.cells = skin.sheet, cells
     return frame
 
 
@@ -73,7 +73,7 @@ def test_the_barycenter_stands_where_it_is():
 
 
 def test_zones_that_lie_nowhere_are_left_out():
-    assert (draw(zones(Skin(), (0, float("nan"), float("nan")), (4, 1e9, -1e9))).kinds == CENTER).sum() == 0
+    assert (draw(zones(Skin(), (0, None, None), (4, 1e9, -1e9))).kinds == CENTER).sum() == 0
 
 
 @pytest.mark.parametrize("scale", SCALES)
@@ -117,7 +117,7 @@ def test_in_ascii_no_pressed_cell_is_lost(scale):
 
 def test_switches_that_are_known_to_be_absent_are_left_blank():
     skin = Skin(mask=((0, 0), (15, 15)))
-    drawing = draw(zones(skin))
+    drawing = draw(zones(skin), mask=skin.mask)
     assert np.argwhere(drawing.kinds == MASKED)[:, 0].tolist() == [0, 0, 15, 15]
     assert drawing.text.startswith("  · ")
     assert "blank: no switch" in drawing.legend

@@ -4,6 +4,7 @@ import pytest
 from amaranth.hdl import Mux, Signal
 
 from contactfpga.skin import Skin
+from contactfpga_hdl.link import hello_words
 from contactfpga_hdl.scan import Scanner
 from contactfpga_sim import bench_unknown
 from contactfpga_sim.bench_unknown import Unknown, forget, initialised
@@ -92,7 +93,8 @@ def test_a_bracket_that_is_read_while_it_is_written_is_seen(monkeypatch):
 
 
 def test_only_what_is_named_keeps_its_value():
-    hello, frame = r"  reg [7:0] \link.store[3] ", r"  reg [7:0] \link.store[2] "
+    first = hello_words(SMALL).start
+    hello, frame = rf"  reg [7:0] \link.store[{first}] ", rf"  reg [7:0] \link.store[{first - 1}] "
     text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", initialised(SMALL))
-    assert known == {r"\link.store[3]": "8'h41"}
+    assert known == {rf"\link.store[{first}]": "8'h41"}
     assert text == f"{hello};\n{frame};\n  reg busy ;\n  wire x = y;\n"

@@ -12,6 +12,9 @@ from contactfpga_hdl.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.pack import Packer
 from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
 
+_HELLO_REGION = 3
+"""The others hold frames."""
+
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
@@ -31,8 +34,8 @@ class Link(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._hello = protocol.encode_hello(skin)[: -CHECK_BYTES - 1]  # from its leading delimiter on
-        self._offset_bits = max(self.derived.max_stored_bytes, len(self._hello)).bit_length()
+        self._hello = _stored_hello(skin)
+        self._offset_bits = _offset_bits(skin)
         self.packer = Packer(skin, self._offset_bits)
         super().__init__(
             {
@@ -135,11 +138,8 @@ class Link(wiring.Component):
         return longer, longer >= limit
 
     def _send(self, m):
-        region = 1 << self._offset_bits
-        hello = 3 * region
-        m.submodules.store = store = memory.Memory(
-            shape=8, depth=hello + len(self._hello), init=[0] * hello + list(self._hello)
-        )
+        init = [0] * hello_words(self.skin).start + list(self._hello)
+        m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = store.read_port(), store.write_port()
         self._offset = Signal(self._offset_bits)
         self._sends_hello = Signal()
@@ -153,7 +153,7 @@ class Link(wiring.Component):
             write.en.eq(self.packer.write.en),
             write.addr.eq(Cat(self.packer.write.offset, self._filling)),
             write.data.eq(self.packer.write.data),
-            read.addr.eq(Cat(self._offset, Mux(self._sends_hello, 3, self._sending))),
+            read.addr.eq(Cat(self._offset, Mux(self._sends_hello, _HELLO_REGION, self._sending))),
         ]
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
@@ -225,3 +225,19 @@ class Link(wiring.Component):
         with m.If(self._fetches):
             m.d.sync += live.eq(digit)
         m.d.comb += self._digit.eq(live | odometer.digit)  # of which one is 0
+
+
+def hello_words(skin: Skin) -> range:
+    """Where the hello lies in the memory."""
+    first = _HELLO_REGION << _offset_bits(skin)
+    return range(first, first + len(_stored_hello(skin)))
+
+
+def _stored_hello(skin: Skin) -> bytes:
+    """The hello from its leading delimiter on, without its check."""
+    return protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
+
+
+def _offset_bits(skin: Skin) -> int:
+    """Of a place in a region of the memory, which holds any frame or the hello."""
+    return max(Derived(skin).max_stored_bytes, len(_stored_hello(skin))).bit_length()

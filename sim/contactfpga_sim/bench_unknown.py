@@ -24,15 +24,16 @@ from contactfpga_sim.record import OutOfTime, Stimulus
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
+from contactfpga_hdl.link import hello_words
 
 RESET_CLOCKS = 4
 """Clocks of reset after power-up. The iCE40 boards give 181, an ECP5 as many as its global reset takes."""
 
-INITIALISED = (r"link\.store\[\d+\] += 8'h(?!00)", r"debounce\.state\[")
-"""Memory words that the design needs at power-up and the bitstream brings: the hello's bytes, of which none is zero,
-and the states of debounce. They are put there after the first clock: until then unknown registers may write anywhere.
-In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial` there are
-zeros, too: :func:`initialised`."""
+INITIALISED = (r"link\.odometer\.digits\[", r"debounce\.state\[")
+"""Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the odometer's
+digits and the states of debounce. They are put there after the first clock: until then unknown registers may write
+anywhere. In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial`
+there are more zeros: :func:`initialised`."""
 
 _GATES = (
     f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "
@@ -45,12 +46,13 @@ class Unknown(AssertionError):
 
 
 def initialised(skin: Skin) -> tuple[str, ...]:
-    """:data:`INITIALISED`, and of the memory of the labeller `serial` the half that stays zero."""
+    """:data:`INITIALISED`, the hello's bytes, and of the memory of the labeller `serial` the half that stays zero."""
+    words = (*INITIALISED, rf"link\.store\[({'|'.join(map(str, hello_words(skin)))})\]")
     if skin.labeller != "serial" or skin.report == "cells":
-        return INITIALISED
+        return words
     places = skin.columns if skin.connectivity == 4 else -(-skin.columns // 2)
     half = 1 << (places - 1).bit_length()
-    return (*INITIALISED, rf"label\.groups\[({'|'.join(map(str, range(half, 2 * half)))})\]")
+    return (*words, rf"label\.groups\[({'|'.join(map(str, range(half, 2 * half)))})\]")
 
 
 def available() -> bool:

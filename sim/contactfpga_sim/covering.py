@@ -167,7 +167,7 @@ def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
 def traffic(
     skin: Skin, gaps: Iterable[int], start: int, cycles: int, rng: np.random.Generator
 ) -> list[tuple[int, bytes]]:
-    """What a host sends from ``start`` on, with these gaps after each part: requests, and packets that are none, as they
+    """What a host sends from ``start`` on, with these gaps after each part: requests, and packets that are none as they
     are damaged, cut off, of another kind, or any bytes."""
     byte = 10 * facts(skin).bit_clocks
     sent = []

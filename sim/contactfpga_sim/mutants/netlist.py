@@ -23,6 +23,7 @@ STAGES = {
     "link": "link",
     "transmitter": "serial",
     "receiver": "serial",
+    "request": "serial",
 }
 """Modules of the design, as Top names them, and the stage they count for."""
 

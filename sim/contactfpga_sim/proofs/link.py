@@ -21,7 +21,7 @@ _HELLO_REGION = 3
 
 
 def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
-    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken,
+    """Free: items at any time, what tag and summary say, wishes for a hello, the numbers it tells, when bytes are taken
     and one place of a frame and one of the hello that are followed. Assumed: a complete frame was written as far as its
     end, as ``frames_are_packed`` shows.
 
