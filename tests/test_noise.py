@@ -94,7 +94,7 @@ def test_a_wrong_byte_costs_its_frame_and_a_wrong_delimiter_the_next_one_as_well
     for line in lines[:1]:
         for at, byte in enumerate(line.hit):
             delimiter = at == len(line.hit) - 1
-            for wrong in set(range(256)) - {byte}:
+            for wrong in sorted(set(range(256)) - {byte})[at % 3 :: 3]:  # a third each place, all values over some
                 lost = line.lost(line.hit[:at] + bytes([wrong]) + line.hit[at + 1 :])
                 assert lost == ([HIT, HIT + 1] if delimiter else [HIT])
                 cases += 1
