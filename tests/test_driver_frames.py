@@ -238,6 +238,7 @@ def test_the_reader_ends_with_its_board(board):
 def test_ctrl_c_ends_a_call_that_waits(board):
     code = f"""
 import signal, threading, time, os, contactfpga
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
 board = contactfpga.open({board.path!r}, timeout=60)
 board.latest(60)
 threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()

@@ -111,6 +111,7 @@ def test_the_gateware_being_built_is_no_more_than_that(arguments, word, keys, tm
     well_ended(*interrupted(arguments, lambda terminal: word in terminal.said, keys, tmp_path / "cache"))
 
 
+@pytest.mark.campaign  # which has the tools for it
 @pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
 def test_place_and_route_ends_too(keys, tmp_path):
     def ready(terminal):
