@@ -222,11 +222,11 @@ def test_close_wakes_a_call_that_waits_in_another_thread(board, call):
 
 def test_a_board_that_nobody_holds_gives_its_port_back(board):
     for _ in range(3):
-        opened = contactfpga.open(board.path, timeout=LONG)
+        opened = contactfpga.open(board.path, timeout=LONG)  # refused while the port is held
         opened.next(LONG)
         del opened
         gc.collect()
-        time.sleep(0.3)
+        wait_until(lambda: not [thread for thread in threading.enumerate() if board.path in thread.name])
 
 
 def test_the_reader_ends_with_its_board(board):

@@ -40,6 +40,6 @@ class Stats:
     skin_changes: int = 0
     """Hellos that told of another Skin than the one before."""
     restarts: int = 0
-    """Times the board began to count its frames anew."""
+    """How often the board was restarted, as its hellos tell."""
     bytes: int = 0
     """All bytes received."""

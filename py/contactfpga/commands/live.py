@@ -35,7 +35,7 @@ class Room:
     unicode: bool
 
     def without(self, lines: int) -> Room:
-        """What is left above so many lines."""
+        """The room that is left when so many lines are taken."""
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
