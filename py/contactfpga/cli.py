@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga import interrupt, limits, terminal
+from contactfpga import __version__, interrupt, limits, terminal
 from contactfpga.commands import cover_flags, fit_flags, numbers
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.regular import told
@@ -89,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Contact zones of a switch-matrix skin.",
         epilog="Without a board: contactfpga zones sim://",
     )
-    parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     _zones(commands.add_parser("zones", help="show the contact zones, live"))
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))
