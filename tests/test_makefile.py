@@ -88,7 +88,7 @@ def test_the_python_that_is_named_may_have_spaces_in_its_path(tmp_path):
     assert f": {named}\n" in done.stdout
 
 
-def test_a_python_that_does_not_exist_is_told(tmp_path):
+def test_a_python_that_does_not_exist_is_reported(tmp_path):
     done = make(clone(tmp_path / "clone"), "check", "PYTHON=/no such/python")
     assert done.returncode == 2
     assert "    /no such/python: not found\n" in done.stderr
