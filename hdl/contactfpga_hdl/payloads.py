@@ -42,7 +42,7 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
     the frame before.
     """
-    slots = {"slots": derived.max_frame_slots.bit_length()} if derived.skin.scan == "adaptive" else {}
+    slots = {} if derived.scan.even else {"slots": derived.max_frame_slots.bit_length()}
     return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
 
 

@@ -4,20 +4,16 @@ from amaranth.hdl import Module, Mux
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.debounce.even import Debounce
-from contactfpga_hdl.debounce.timed import TimedDebounce
-from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver, Transmitter
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.divide import Divide
-from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.pins import column_pins, connect_pins, row_pins
-from contactfpga_hdl.scan.raster import Scanner
 
 
 class Top(wiring.Component):
@@ -35,7 +31,7 @@ class Top(wiring.Component):
     def __init__(self, skin: Skin, probes: bool = False):
         self.skin = skin
         self.probes = probes
-        derived = Derived(skin)
+        self.derived = derived = Derived(skin)
         ports = {
             **row_pins(skin),
             **column_pins(skin),
@@ -61,8 +57,8 @@ class Top(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        bit_clocks = Derived(self.skin).bit_clocks
-        m.submodules.scan = scan = Scanner(self.skin) if self.skin.scan == "raster" else AdaptiveScanner(self.skin)
+        bit_clocks = self.derived.bit_clocks
+        m.submodules.scan = scan = self.derived.scan.load_gateware()(self.skin)
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
@@ -92,17 +88,19 @@ class Top(wiring.Component):
         return m
 
     def _debounced(self, m, scan):
-        if self.skin.debounce == "none":
+        if not self.derived.debounced:
             return scan.rows
-        adaptive = self.skin.scan == "adaptive"
-        m.submodules.debounce = debounce = TimedDebounce(self.skin) if adaptive else Debounce(self.skin)
+        even = self.derived.scan.even
+        chosen = debounces.find(self.skin.debounce)
+        make = chosen.load_gateware() if even else chosen.load_timed_gateware()
+        m.submodules.debounce = debounce = make(self.skin)
         wiring.connect(m, scan.rows, debounce.raw)
-        if adaptive:
+        if not even:
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
     def _zones(self, m, rows, scan, link):
-        m.submodules.label = label = LABELLERS[self.skin.labeller](self.skin)
+        m.submodules.label = label = self.derived.labeller.load_gateware()(self.skin)
         m.submodules.audit = audit = Audit(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)

@@ -7,6 +7,8 @@ from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga_hdl import top
+from contactfpga_hdl.label import run, serial
+from contactfpga_hdl.scan import raster
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, predict
@@ -14,9 +16,12 @@ from contactfpga_sim.golden import Timeline, predict
 SKIN = Skin(rows=4, columns=6)
 CYCLES = 4 * 72 * 8
 
-# boundary: the stage whose output it is, by its name in the top or the Skin's labeller, and the name of that output
+# Stages that a Skin chooses, and where their classes are; the others are in the top.
+CHOSEN = {"scan": (raster, "Scanner"), "run": (run, "RunLabeller"), "serial": (serial, "SerialLabeller")}
+
+# boundary: the stage whose output it is, and the name of that output
 STAGES = {
-    "rows": ("Scanner", "rows"),
+    "rows": ("scan", "rows"),
     "records": ("labeller", "records"),
     "items": ("Divide", "items"),
     "bytes": ("Link", "bytes"),
@@ -87,8 +92,8 @@ def test_a_fault_in_the_gateware_is_named(monkeypatch, record_property, boundary
     expected = predict(skin, timeline, CYCLES)
     assert compare(expected, bench_amaranth.run(skin, timeline, CYCLES)) > 100
     stage, port = STAGES[boundary]
-    table, name = (top.LABELLERS, labeller) if stage == "labeller" else (vars(top), stage)
-    monkeypatch.setitem(table, name, faulty(table[name], port, fault))
+    module, name = CHOSEN[labeller] if stage == "labeller" else CHOSEN.get(stage, (top, stage))
+    monkeypatch.setattr(module, name, faulty(getattr(module, name), port, fault))
     with pytest.raises(Mismatch) as found:
         compare(expected, bench_amaranth.run(skin, timeline, CYCLES))
     assert found.value.boundary == boundary

@@ -16,9 +16,9 @@ from contactfpga import Skin, cli
 from contactfpga.cover import CoverError, elastic, line, sense
 from contactfpga.cover.design import FREE, design
 from contactfpga.cover.foams import FOAMS, Foam, find
-from contactfpga.cover.latency import latency_s
 from contactfpga.cover.sense import Model, Sheet
 from contactfpga.cover.task import Task
+from contactfpga.skin.latency import latency_s
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRST, SECOND = (ROOT / "examples" / f"paper-{name}-design.toml" for name in ("first", "second"))

@@ -8,7 +8,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
-from contactfpga_hdl.label import LABELLERS
+from contactfpga.choices.labellers import LABELLERS
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.divide import Divide
@@ -56,7 +56,7 @@ class Chain(wiring.Component):
         self.link = Link(skin)
         self.divide = Divide(skin) if skin.report == "barycenter" else None
         self.audit = Bitmap(skin) if skin.report == "cells" else Audit(skin)
-        self.front = self.audit if skin.report == "cells" else LABELLERS[skin.labeller](skin)
+        self.front = self.audit if skin.report == "cells" else LABELLERS[skin.labeller].load_gateware()(skin)
         super().__init__(
             {"rows": In(self.front.rows.signature.flip()), "ends": Out(1), "stalled": Out(1), "packed": Out(1)}
         )

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin
+from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label import LABELLERS
 from contactfpga_hdl.label.steps import place_of
 
 pytestmark = pytest.mark.parametrize("labeller", ["run", "serial"])  # the exact ones
@@ -140,7 +140,7 @@ def moments(zone):
 
 @functools.cache
 def bench_of(bench, rows, columns, connectivity, labeller):
-    dut = LABELLERS[labeller](skin_of(rows, columns, connectivity, labeller))
+    dut = LABELLERS[labeller].load_gateware()(skin_of(rows, columns, connectivity, labeller))
     return dut, bench(dut)
 
 

@@ -21,7 +21,7 @@ def places():
     return label_figures.every_place(label_figures.touches(SQUARE))
 
 
-@pytest.mark.parametrize("labeller", label_figures.LABELLERS)
+@pytest.mark.parametrize("labeller", label_figures.EXACT)
 @pytest.mark.parametrize("connectivity", [8, 4])
 def test_the_last_two_rows_alone_decide_how_late_the_last_record_is(labeller, connectivity):
     rng = np.random.default_rng(3)
@@ -45,7 +45,7 @@ def test_every_place_is_every_offset_of_the_frame():
     assert {row.tobytes(): number for row, number in zip(rows, count.tolist())} == expected
 
 
-@pytest.mark.parametrize("labeller", label_figures.LABELLERS)
+@pytest.mark.parametrize("labeller", label_figures.EXACT)
 @pytest.mark.parametrize("connectivity", [8, 4])
 def test_the_gateware_is_as_late_as_the_page_says(places, labeller, connectivity):
     """The worst touch goes through the compiled labeller; the row of the table is that of a new run."""

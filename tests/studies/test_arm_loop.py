@@ -8,9 +8,9 @@ import time
 import numpy as np
 import pytest
 
-from contactfpga.cover.latency import latency_s
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.latency import latency_s
 from contactfpga.wire import protocol
 from contactfpga_sim.golden import Timeline, predict
 from contactfpga_sim.studies.arm.case import Case

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import os
 import re
@@ -20,11 +21,19 @@ from amaranth.hdl import Cat, Elaboratable, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import placed, synthesis
 from contactfpga_hdl.board.build import BitstreamFailed, tool
-from contactfpga_hdl.label import RunLabeller, SerialLabeller
 from contactfpga_hdl.top import Top
+
+
+def _whole(labeller: Labeller, skin: Skin) -> wiring.Component:
+    return Top(skin.replace(labeller=labeller))
+
+
+def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
+    return labeller.load_gateware()(skin)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,12 +61,10 @@ ECP5 = Device(
 )
 DEVICES = (UP5K, ECP5)
 SIZES = (8, 16, 32, 64)
+_EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
 DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
-    "whole, `run`": Top,
-    "whole, `serial`": lambda skin: Top(skin.replace(labeller="serial")),
-    "labeller `run`": RunLabeller,
-    "labeller `serial`": SerialLabeller,
-}
+    f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
+} | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
 SEEDS = 5
 LIMIT_S = 200
 """For some seeds the router goes on for ever: they are passed over. Runs that end take up to a minute of the

@@ -132,7 +132,7 @@ class Link(wiring.Component):
 
     def _wait(self, waited, limit):
         """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
-        if self.skin.scan == "raster":
+        if self.derived.scan.even:
             return waited + 1, waited == limit - 1
         longer = waited + self.tag.slots
         return longer, longer >= limit

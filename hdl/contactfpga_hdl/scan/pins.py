@@ -5,6 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
+from contactfpga.choices import scans
 from contactfpga.skin import Skin
 
 
@@ -78,7 +79,7 @@ class DirectRows(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        first = 1 if self.skin.scan == "raster" else (1 << self.skin.rows) - 1
+        first = 1 if scans.find(self.skin.scan).even else (1 << self.skin.rows) - 1
         selected = Signal(self.skin.rows, init=first)
         with m.If(self.drive):
             m.d.sync += selected.eq(self.pattern)

@@ -8,6 +8,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
+from contactfpga.choices import scans
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
@@ -44,7 +45,8 @@ class RowChain(wiring.Component):
                 m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
         with m.Else():
             m.d.sync += self.pins.row_latch.eq(0)
-        if self.skin.scan == "adaptive":  # a pattern that was shifted anew, for idle rows, may not be in when they hit
+        # A pattern that was shifted again, for idle rows, may not be in when they hit.
+        if not scans.find(self.skin.scan).even:
             with m.If(self.release):
                 m.d.sync += [busy.eq(0), left.eq(lines), clock.eq(0)]
         with m.If(self.drive):

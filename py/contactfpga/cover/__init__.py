@@ -10,5 +10,18 @@ from contactfpga.cover.hertz import Ball
 from contactfpga.cover.patch import Ellipse, Part, Rectangle
 from contactfpga.cover.press import MODELS, Cover, Load
 from contactfpga.cover.switch import Switch
+from contactfpga.cover.table import load as load_cover
 
-__all__ = ["MODELS", "Ball", "Cover", "CoverError", "Ellipse", "Load", "NoSolution", "Part", "Rectangle", "Switch"]
+__all__ = [
+    "MODELS",
+    "Ball",
+    "Cover",
+    "CoverError",
+    "Ellipse",
+    "Load",
+    "NoSolution",
+    "Part",
+    "Rectangle",
+    "Switch",
+    "load_cover",
+]

@@ -17,9 +17,9 @@ from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.foams import Foam
 from contactfpga.cover.hertz import Ball
 from contactfpga.cover.impact import Impact
-from contactfpga.cover.latency import latency_s
 from contactfpga.cover.sense import Sense, Sheet
 from contactfpga.cover.task import Task
+from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"
 """Name of the candidate whose modulus follows from the time."""

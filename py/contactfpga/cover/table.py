@@ -1,14 +1,27 @@
-"""The `[cover]` part of a Skin's file."""
+"""The table `[cover]` in a Skin's file."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 from typing import Any
 
 from contactfpga.cover.answer import MAX_LENGTH_M, CoverError
 from contactfpga.cover.press import Cover
 from contactfpga.cover.switch import Switch
+from contactfpga.inputs import tomlfile
+
+
+def load(path: str | Path) -> Cover | None:
+    """The cover in a Skin's file; None where it has no table ``[cover]``. Raises CoverError."""
+    values = tomlfile.load(path, CoverError)
+    if "cover" not in values:
+        return None
+    try:
+        return read(values["cover"])
+    except CoverError as error:
+        raise CoverError(f"{path}: {error}") from None
 
 
 def read(values: Any) -> Cover:

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
+from contactfpga.cover import load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
@@ -125,10 +126,11 @@ class SimTransport:
         """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
         asked = sim_address.parse(name)
         skin = Skin.load(asked.skin) if asked.skin is not None else None
+        cover = load_cover(asked.skin) if asked.skin is not None else None
         try:
             from contactfpga_sim.board.virtual import VirtualBoard
 
-            return cls(name, VirtualBoard(skin=skin, scene=_scene(asked)))
+            return cls(name, VirtualBoard(skin=skin, scene=_scene(asked), cover=cover))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet

@@ -6,6 +6,9 @@ import functools
 import math
 from typing import TYPE_CHECKING
 
+from contactfpga.choices import debounces, labellers, scans
+from contactfpga.choices.labellers import Labeller
+from contactfpga.choices.scans import Scan
 from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
 from contactfpga.skin.widths import TIME_BITS as TIME_BITS
@@ -28,9 +31,23 @@ STUCK_MAX = (1 << STUCK_BITS) - 1
 class Derived(Widths):
     """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
 
+    skin: Skin
+
     def __init__(self, skin: Skin):
         super().__init__(skin.sheet)
         self.skin = skin
+
+    @functools.cached_property
+    def labeller(self) -> Labeller:
+        return labellers.find(self.skin.labeller)
+
+    @functools.cached_property
+    def scan(self) -> Scan:
+        return scans.find(self.skin.scan)
+
+    @functools.cached_property
+    def debounced(self) -> bool:
+        return bool(debounces.find(self.skin.debounce).gateware)
 
     # ---- times, in clocks unless named otherwise
 
@@ -92,13 +109,13 @@ class Derived(Widths):
 
     @property
     def choice_clocks(self) -> int:
-        """From a strobe until an adaptive scan can drive its next rows; 0 in a raster scan, which knows them."""
-        return max(self.row_levels, 2) + 4 if self.skin.scan == "adaptive" else 0
+        """From a strobe until the scan can drive its next rows; 0 where it knows them beforehand."""
+        return self.scan.choice_clocks(self)
 
     @property
     def max_frame_slots(self) -> int:
         """The most row times that a frame can take."""
-        return self.skin.rows + (2 * self.row_levels + 2 if self.skin.scan == "adaptive" else 0)
+        return self.scan.max_frame_slots(self)
 
     @property
     def frame_clocks(self) -> int:
@@ -113,62 +130,40 @@ class Derived(Widths):
     def min_row_clocks(self) -> int:
         """A row must last until debounce and labeller are done with the one before it, end mark and all, and a frame
         until the one before it is packed: the scanner's tag is kept for no longer."""
-        if self.skin.scan == "adaptive":
-            return max(self._handing_clocks, *map(self._packing_clocks, range(self.skin.rows + 1)))
-        packed = self._packed_clocks + self._items_clocks(self.max_items)
-        return max(self.skin.columns + 6, 10, self.label_clocks + 1, math.ceil(packed / self.skin.rows))
+        return self.scan.min_row_clocks(self)
 
     @property
-    def _debounce_clocks(self) -> int:
-        return 0 if self.skin.debounce == "none" else self.skin.columns + 3
+    def debounce_clocks(self) -> int:
+        """How much later a row leaves the debounce."""
+        return self.skin.columns + 3 if self.debounced else 0
 
     @property
-    def _packed_clocks(self) -> int:
+    def packed_clocks(self) -> int:
         """From the offer of a frame's last row to the end of its packing, but for the bytes packed in this time."""
-        return 1 + self._debounce_clocks + self.label_clocks + 2 + 4
+        return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
-    @property
-    def _handing_clocks(self) -> int:
-        """An adaptive scan hands on all that a slot tells before the next one's strobe: a row that was driven alone,
-        then all others as empty, a row a clock, up to the end mark."""
-        serial = self.skin.labeller == "serial" and self.skin.report != "cells"
-        busy = self.label_clocks if serial else self.label_clocks - 2
-        empty = self.skin.columns + 2 if serial else 1
-        return self._debounce_clocks + 2 * busy + self.skin.rows * empty + 8
-
-    def _packing_clocks(self, rows: int) -> int:
-        """What a row time must last at least for a frame with this many pressed rows to be packed before the next
-        frame ends, in which all of these are driven again, and all others together."""
-        if self.skin.report == "cells":
-            items = self.skin.rows
-        elif self.skin.connectivity == 8:
-            items = min(rows, math.ceil(self.skin.rows / 2)) * math.ceil(self.skin.columns / 2)
-        else:
-            items = math.ceil(rows * self.skin.columns / 2)
-        clocks = self._packed_clocks + self.skin.rows + self._items_clocks(min(items, self.max_items))
-        return math.ceil(clocks / min(rows + 1, self.skin.rows))
-
-    def _items_clocks(self, items: int) -> int:
+    def items_clocks(self, items: int) -> int:
         """For a frame's items and trailer, a byte a clock; where items are divided that takes longer than packing."""
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
-        if self.skin.report != "barycenter":
+        if not self.report.divided:
             return plain + stuffing
         return items * self.item_clocks + self.item_bytes + self.trailer_bytes + stuffing
 
     @property
     def keep_alive_frames(self) -> int:
-        """A frame is sent at the latest after this many scans; in an adaptive scan, after so many row times."""
+        """A frame is sent at the latest after this many scans; where frames differ in length, after this many row
+        times."""
         clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
-        if self.skin.scan == "adaptive":
-            return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
-        return math.floor(clocks / self.frame_clocks + 1e-9)
+        if self.scan.even:
+            return math.floor(clocks / self.frame_clocks + 1e-9)
+        return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
 
     @property
     def hello_frames(self) -> int:
-        """A hello is due after this many scans; in an adaptive scan, after so many row times."""
-        scans = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
-        return scans * self.skin.rows if self.skin.scan == "adaptive" else scans
+        """A hello is due after this many scans; where frames differ in length, after this many row times."""
+        periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
+        return periods if self.scan.even else periods * self.skin.rows
 
     @property
     def press_scans(self) -> int:
@@ -210,7 +205,7 @@ class Derived(Widths):
     @property
     def item_clocks(self) -> int:
         """The most clocks from an item to the next while many wait."""
-        divided = self.quotient_bits + 1 if self.skin.report == "barycenter" else 0
+        divided = self.quotient_bits + 1 if self.report.divided else 0
         return max(self.item_bytes, divided)
 
     # ---- sizes of tables and chains
@@ -231,15 +226,17 @@ class Derived(Widths):
     @property
     def label_clocks(self) -> int:
         """The most clocks from a frame's last row to its end mark."""
-        if self.skin.report == "cells":
-            return 3
-        columns = self.skin.columns
-        return {
-            "run": self.open_zones + 3,
-            "serial": columns + self.open_zones + 2,
-            "projection": columns + 3,
-            "single": columns + 4,
-        }[self.skin.labeller]
+        return self.labeller.end_clocks(self) if self.report.zones else 3
+
+    @property
+    def label_row_clocks(self) -> int:
+        """The most clocks from a row to the next one that the labeller, or what stands in its place, can take."""
+        return self.labeller.row_clocks(self) if self.report.zones else 1
+
+    @property
+    def label_empty_row_clocks(self) -> int:
+        """The same for an empty row below an empty row."""
+        return self.labeller.empty_row_clocks(self) if self.report.zones else 1
 
     @functools.cached_property
     def backlog(self) -> int:
@@ -250,11 +247,10 @@ class Derived(Widths):
         are packed before the next one comes. An adaptive scan lets empty rows out, so that every row may close as many
         zones, and bitmap rows of two frames may wait.
         """
-        adaptive = self.skin.scan == "adaptive"
-        if self.skin.report == "cells":
-            return 2 * self.skin.rows + 2 if adaptive else 4
+        if not self.report.zones:
+            return 4 if self.scan.even else 2 * self.skin.rows + 2
         busy = self.open_zones * self.item_clocks
-        late = max(0.0, 1 - (1 if adaptive else 2) * self.row_clocks / busy)
+        late = max(0.0, 1 - (2 if self.scan.even else 1) * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
 
 

@@ -6,13 +6,15 @@ import dataclasses
 import hashlib
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 
-from contactfpga.cover import Cover, CoverError, table
+from contactfpga.choices.debounces import Debounce, DebounceName
+from contactfpga.choices.labellers import Labeller, LabellerName
+from contactfpga.choices.reports import REPORTS, ReportName
+from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
-from contactfpga.inputs.values import shown
-from contactfpga.skin import limits
+from contactfpga.skin import checks, limits
 from contactfpga.skin.sheet import Sheet, max_zones
 
 
@@ -36,7 +38,7 @@ class Skin:
     """Distance between columns in mm."""
     pitch_y_mm: float = 10.0
     """Distance between rows in mm."""
-    surface: str = "plane"
+    surface: Literal["plane", "cylinder"] = "plane"
     """``plane``, or ``cylinder``: columns run around the link's z axis, rows along it."""
     radius_mm: float | None = None
     """Radius of the sheet on a cylinder in mm; None on a plane."""
@@ -45,44 +47,44 @@ class Skin:
     connectivity: int = 8
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
-    diodes: str = "col2row"
+    diodes: Literal["col2row", "row2col", "none"] = "col2row"
     """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down; ``none``:
     as ``col2row``, but with no diodes rows float while they are not selected, and three pressed corners of a rectangle
     make the fourth read pressed: what that may have made is flagged ``ghost``."""
-    scan: str = "raster"
+    scan: ScanName | Scan = "raster"
     """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched."""
     settle_us: float = 5.0
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
     """Time without a driven row before the next one, in us."""
-    row_drive: str = "direct"
+    row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin a row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
     row_chains: int = 1
     """Chains of 74HC595 that are shifted at once; chain j drives rows j n to j n + n - 1, n = ceil(rows / chains)."""
-    column_read: str = "direct"
+    column_read: Literal["direct", "74hc165"] = "direct"
     """``direct``: a pin a column; ``74hc165``: columns on shift registers, which settle and release may have to wait
     for."""
     column_chains: int = 1
     """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
     shift_hz: int = limits.SHIFT_HZ
     """The shift clock in Hz at most; it is clock_hz divided by a whole number, at least 2."""
-    debounce: str = "none"
+    debounce: DebounceName | Debounce = "none"
     """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
     debounce_press_us: float = 5000.0
     """sym_defer_pk: how long a press must last to count; asym_eager_defer_pk: how long it then holds; us."""
     debounce_release_us: float = 5000.0
     """How long a release must last to count, in us."""
 
-    labeller: str = "run"
+    labeller: LabellerName | Labeller = "run"
     """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
     a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
     cells are one zone."""
-    report: str = "moments"
+    report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
     rounded; ``cells``: the pressed cells as a bitmap."""
     barycenter_bits: int = limits.BARYCENTER_BITS
     """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upwards."""
-    send: str = "always"
+    send: Literal["always", "on_change"] = "always"
     """``always``: every frame; ``on_change``: a frame whose cells differ from the last one, or a keep-alive."""
     keep_alive_ms: float = 100.0
     """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
@@ -95,38 +97,24 @@ class Skin:
     baud: int = 3_000_000
     """Bits a second on the wire."""
 
-    if TYPE_CHECKING:
-        cover: Cover | None = None
-    else:
-        # No field: fields are what gateware and golden model are built from and the fingerprint tells apart.
-        cover: dataclasses.InitVar[Cover | None] = None
-    """The soft cover, through which scenes press the switches; None: a switch closes when it is touched. The gateware
-    does not know it: Skins that differ in nothing else are equal and have one fingerprint."""
-
-    def __post_init__(self, cover: Cover | None = None) -> None:  # noqa: RUF033  # to type checkers it is a field
-        if cover is not None and not isinstance(cover, Cover):
-            raise SkinError(f"cover is {shown(cover)}; it must be a contactfpga.cover.Cover")
-        self._keep(cover=cover)
-        self._keep(**limits.check_types(self))
-        self._keep(mask=limits.check_sheet(self))
-        limits.check_link(self)
+    def __post_init__(self) -> None:
+        self._keep(**checks.check_types(self))
+        self._keep(mask=checks.check_sheet(self))
+        checks.check_link(self)
         if self.zone_capacity is None:
             self._keep(zone_capacity=self._default_capacity())
-        limits.check_timing(self)
+        checks.check_timing(self)
 
     @classmethod
     def load(cls, path: str | Path) -> Skin:
-        """Read a Skin from a TOML file whose keys are the fields of this class."""
+        """Read a Skin from a TOML file whose keys are the fields of this class. A table ``[cover]`` is not the Skin's:
+        :func:`contactfpga.cover.load_cover` reads it."""
         values = tomlfile.load(path, SkinError)
-        known = [*(field.name for field in dataclasses.fields(cls)), "cover"]
+        values.pop("cover", None)
+        known = [field.name for field in dataclasses.fields(cls)]
         unknown = sorted(set(values) - set(known))
         if unknown:
-            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}")
-        if "cover" in values:
-            try:
-                values["cover"] = table.read(values["cover"])
-            except CoverError as error:
-                raise SkinError(f"{path}: {error}") from None
+            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, and the table [cover]")
         return cls(**values)
 
     def replace(self, **changes: Any) -> Skin:
@@ -145,7 +133,7 @@ class Skin:
         for name, value in dataclasses.asdict(self).items():
             if value is not None:
                 lines.append(f"{name} = {json.dumps(value)}")
-        return "\n".join(lines) + "\n" + (table.write(self.cover) if self.cover else "")
+        return "\n".join(lines) + "\n"
 
     @property
     def fingerprint(self) -> bytes:
@@ -203,4 +191,4 @@ class Skin:
     def _default_capacity(self) -> int:
         small = self.rows <= 32 and self.columns <= 32
         most = self.max_zones() if small else min(self.max_zones(), 256)
-        return min(most, limits.MAX_DIVIDED_ZONES) if self.report == "barycenter" else most
+        return min(most, limits.MAX_DIVIDED_ZONES) if REPORTS[self.report].divided else most

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 
+from contactfpga.choices.reports import REPORTS, Report
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import CHECK_BYTES
@@ -22,6 +23,10 @@ class Widths:
 
     def __init__(self, sheet: Sheet):
         self.sheet = sheet
+
+    @property
+    def report(self) -> Report:
+        return REPORTS[self.sheet.report]
 
     @functools.cached_property
     def cells(self) -> int:
@@ -54,7 +59,7 @@ class Widths:
         An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
         sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
         """
-        if self.sheet.report != "barycenter":
+        if not self.report.divided:
             return self.area_bits, self.sum_x_bits, self.sum_y_bits
         x_bits, y_bits = (
             max(1, (lines - 1 << self.sheet.barycenter_bits).bit_length())
@@ -89,11 +94,11 @@ class Widths:
     @functools.cached_property
     def item_bytes(self) -> int:
         """Bytes of one item of a frame: a zone or a bitmap row."""
-        return self.bitmap_row_bytes if self.sheet.report == "cells" else self.record_bytes
+        return self.record_bytes if self.report.zones else self.bitmap_row_bytes
 
     @functools.cached_property
     def max_items(self) -> int:
-        return self.sheet.rows if self.sheet.report == "cells" else self.zone_capacity
+        return self.zone_capacity if self.report.zones else self.sheet.rows
 
     @functools.cached_property
     def max_stored_bytes(self) -> int:

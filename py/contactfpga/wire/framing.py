@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import binascii
 
+from contactfpga.choices.reports import REPORTS
+
 VERSION = 2
 DELIMITER = 0
 CHECK_BYTES = 3
@@ -13,7 +15,7 @@ FLAG_BITS = 4
 KIND_BITS = 4
 
 KIND_HELLO = 4
-KINDS = {"moments": 5, "cells": 6, "barycenter": 7}
+KINDS = {report.name: report.kind for report in REPORTS.values()}
 """Kind of a frame, by the Skin's ``report``."""
 
 OLD_KINDS = (2, 3)

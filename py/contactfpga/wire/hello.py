@@ -7,6 +7,7 @@ import struct
 import zlib
 from typing import TYPE_CHECKING
 
+from contactfpga.choices.reports import REPORTS
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
 
@@ -20,7 +21,7 @@ _PITCH = struct.Struct("<dd")
 _RADIUS = struct.Struct("<d")
 _RATES = struct.Struct("<II")
 _CHECK = struct.Struct("<I")
-_REPORTS = ("moments", "cells", "barycenter")
+_REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda report: report.code))
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
 

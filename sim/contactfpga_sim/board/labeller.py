@@ -122,12 +122,11 @@ class LabelBench:
 
 
 def _model(skin: Skin) -> native.Model:
-    def elaborate() -> Any:
-        from contactfpga_hdl.label import LABELLERS
-
-        return LABELLERS[skin.labeller](skin)
-
     derived = Derived(skin)
+
+    def elaborate() -> Any:
+        return derived.labeller.load_gateware()(skin)
+
     return native.Model(
         title=f"the {skin.rows}x{skin.columns} labeller {skin.labeller}",
         driver="label.cpp",

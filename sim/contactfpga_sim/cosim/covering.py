@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.choices.debounces import DEBOUNCES
+from contactfpga.choices.labellers import LABELLERS
+from contactfpga.choices.reports import REPORTS
 from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import request
@@ -18,10 +21,10 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "sheet": ((1, 1), (1, 9), (9, 1), (5, 7), (12, 4), (16, 16), (3, 33)),
     "connectivity": (8, 4),
     "diodes": ("col2row", "row2col"),
-    "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
+    "debounce": tuple(DEBOUNCES),
     "debounce_scans": ((0, 0), (1, 2), (2, 0), (3, 1)),
-    "labeller": ("run", "serial", "projection", "single"),
-    "report": ("moments", "barycenter", "cells"),
+    "labeller": tuple(LABELLERS),
+    "report": tuple(REPORTS),
     "barycenter_bits": (4, 0, 3),
     "send": ("always", "on_change"),
     "mask": ("none", "cells", "column"),

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
+from contactfpga.choices import debounces
 
-def debounced(samples: np.ndarray, method: str, press: int, release: int) -> np.ndarray:
+
+@dataclasses.dataclass(frozen=True)
+class DebounceRule:
+    """The golden rule of a debounce, for one switch."""
+
+    even: Callable[[list[bool], int, int], list[bool]]
+    """What the switch counts as, from what it reads, a sample per scan; press and release in scan periods."""
+    timed: Callable[[Timed, Switch, bool, int], None]
+    """The same sample by sample: changes the switch's state by what it reads in a slot."""
+
+
+def _rule(method: object) -> DebounceRule:
+    found: DebounceRule = debounces.find(method).load_golden()
+    return found
+
+
+def debounced(samples: np.ndarray, method: object, press: int, release: int) -> np.ndarray:
     """Debounce (F, R, C) bool samples, one a scan and switch; ``press`` and ``release`` in scan periods.
 
     Returns (F, R, C) bool: what each switch counts as from its sample of that scan on.
     """
-    if method == "none":
-        return samples
-    rule = {"sym_defer_pk": _sym_defer, "asym_eager_defer_pk": _asym_eager_defer}[method]
+    rule = _rule(method).even
     result = np.zeros_like(samples)
     for place in np.ndindex(*samples.shape[1:]):
         one = samples[(slice(None), *place)]
@@ -61,10 +77,10 @@ class Timed:
     than one scan period less behind its beginning: with samples a scan period apart, when it is over.
     """
 
-    def __init__(self, method: str, press: int, release: int, rows: int):
-        self._rule = {"none": self._none, "sym_defer_pk": self._sym, "asym_eager_defer_pk": self._eager}[method]
+    def __init__(self, method: object, press: int, release: int, rows: int):
+        self._rule = _rule(method).timed
         self._press, self._release, self._rows = press, release, rows
-        self._switches: dict[tuple[int, int], _Switch] = {}
+        self._switches: dict[tuple[int, int], Switch] = {}
 
     def take(self, cells: np.ndarray, slots: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
         """(R, C) bool samples of a frame; ``slots`` tells when, for the rows that were driven alone.
@@ -76,8 +92,8 @@ class Timed:
             for column in range(cells.shape[1]):
                 reads, place = bool(cells[row, column]), (row, column)
                 if reads or place in self._switches:
-                    switch = self._switches.setdefault(place, _Switch())
-                    self._rule(switch, reads, slot)
+                    switch = self._switches.setdefault(place, Switch())
+                    self._rule(self, switch, reads, slot)
                     counts[place] = switch.pressed
                     if not switch.pressed and switch.since is None:
                         del self._switches[place]
@@ -86,10 +102,10 @@ class Timed:
     def _over(self, since: int, slot: int, scans: int) -> bool:
         return slot - since > (scans - 1) * self._rows
 
-    def _none(self, switch: _Switch, reads: bool, slot: int) -> None:
+    def none(self, switch: Switch, reads: bool, slot: int) -> None:
         switch.pressed = reads
 
-    def _sym(self, switch: _Switch, reads: bool, slot: int) -> None:
+    def sym(self, switch: Switch, reads: bool, slot: int) -> None:
         if reads == switch.pressed:
             switch.since = None
             return
@@ -99,7 +115,7 @@ class Timed:
         if self._over(switch.since, slot, time):
             switch.pressed, switch.since = reads, None
 
-    def _eager(self, switch: _Switch, reads: bool, slot: int) -> None:
+    def eager(self, switch: Switch, reads: bool, slot: int) -> None:
         if not switch.pressed:
             switch.pressed, switch.ignored_since = reads, slot
             return
@@ -119,9 +135,16 @@ class Timed:
 
 
 @dataclasses.dataclass
-class _Switch:
+class Switch:
+    """State of a switch."""
+
     pressed: bool = False
     since: int | None = None
     """The slot since when it reads otherwise."""
     ignored_since: int | None = None
     """The slot of its press, while what it reads is ignored."""
+
+
+NONE = DebounceRule(lambda reads, press, release: reads, Timed.none)
+SYM_DEFER = DebounceRule(_sym_defer, Timed.sym)
+ASYM_EAGER_DEFER = DebounceRule(_asym_eager_defer, Timed.eager)

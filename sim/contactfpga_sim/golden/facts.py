@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.choices import scans
+
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
+    from contactfpga_sim.golden.scan import ScanRule
 
 
 def exact(value: float) -> Fraction:
@@ -86,9 +89,10 @@ class Facts:
         """Clocks of the pulse that takes the columns."""
         return 0 if self.skin.column_read == "direct" else self.shift_bit
 
-    @property
-    def adaptive(self) -> bool:
-        return self.skin.scan == "adaptive"
+    @functools.cached_property
+    def scan(self) -> ScanRule:
+        found: ScanRule = scans.find(self.skin.scan).load_golden()
+        return found
 
     @functools.cached_property
     def halvings(self) -> int:
@@ -97,19 +101,19 @@ class Facts:
 
     @functools.cached_property
     def choice(self) -> int:
-        """Clocks that an adaptive scan takes to choose its next rows."""
-        return 4 + max(2, self.halvings) if self.adaptive else 0
+        """Clocks that the scan takes to choose its next rows."""
+        return self.scan.choice(self)
 
     @functools.cached_property
     def frame_slots(self) -> int:
         """The most row times that a frame takes."""
-        return self.rows + (2 * self.halvings + 2 if self.adaptive else 0)
+        return self.scan.frame_slots(self)
 
     @functools.cached_property
     def release(self) -> int:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
-        chosen = self.choice + self.row_shift if self.adaptive else 0
+        chosen = self.choice + self.row_shift if self.choice else 0
         return max(asked, self.load + self.column_shift, latch, chosen)
 
     @functools.cached_property
@@ -145,10 +149,10 @@ class Facts:
     @functools.cached_property
     def keep_alive_slots(self) -> int:
         """Row times after which an unchanged frame is sent: so many that one more frame could take too long."""
-        if self.adaptive:
-            row_us = Fraction(self.row_clocks, self.clocks_per_us)
-            return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
-        return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+        if self.scan.even:
+            return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+        row_us = Fraction(self.row_clocks, self.clocks_per_us)
+        return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
 
     @functools.cached_property
     def hello_slots(self) -> int:

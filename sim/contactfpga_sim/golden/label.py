@@ -1,31 +1,41 @@
 """When a labeller lets its zones out: where zones end is geometry, how many clocks that takes is the labeller's rule in
-docs/timing.md. The rule of ``run``, clusters and steps, is here, that of ``serial`` in :mod:`label_serial`; those that
-are not exact have their own idea of a zone in :mod:`label_shadows`."""
+docs/timing.md. The clocks of ``run``, clusters and steps, are here, those of ``serial`` in :mod:`label_serial`;
+labellers that are not exact have their own idea of a zone in :mod:`label_shadows`."""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga_sim.golden import label_serial, label_shadows
-from contactfpga_sim.golden.work import Departure, Labelling
+from contactfpga.choices import labellers
+from contactfpga.choices.labellers import Labeller, LabellerName
+from contactfpga_sim.golden import label_serial, volume
+from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
 from contactfpga_sim.golden.zones import flood, moments
 
+StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
 
-def labelling(cells: np.ndarray, connectivity: int, labeller: str = "run") -> Labelling:
+
+def labelling(cells: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> Labelling:
     """Clocks and departures for an (R, C) bool frame."""
     cells = np.ascontiguousarray(cells, bool)
-    return _labelling(cells.tobytes(), cells.shape, connectivity, labeller)
+    return _labelling(cells.tobytes(), cells.shape, connectivity, labellers.find(labeller))
 
 
 @functools.lru_cache(maxsize=4096)
-def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: str) -> Labelling:
+def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: Labeller) -> Labelling:
     cells = np.frombuffer(packed, bool).reshape(shape)
-    if labeller in BY_SHADOW:
-        return BY_SHADOW[labeller](cells)
+    rule: LabellerRule = labeller.load_golden()
+    return rule.frame(cells, connectivity)
+
+
+def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks) -> Labelling:
+    """The work of an exact labeller on an (R, C) bool frame; ``strip_clocks``: its rule for two adjacent rows."""
+    shape = cells.shape
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
-    strips = [RULES[labeller](above[y : y + 2], connectivity) for y in range(shape[0])]
+    strips = [strip_clocks(above[y : y + 2], connectivity) for y in range(shape[0])]
     labels, count = flood(cells, connectivity)
     above_labels = np.vstack([np.zeros((1, shape[1]), int), labels])
     departures = []
@@ -67,8 +77,5 @@ def runs(row: np.ndarray) -> int:
     return int(row[0]) + int(np.sum(row[1:] & ~row[:-1]))
 
 
-RULES = {"run": run_clocks, "serial": label_serial.cluster_clocks}
-"""Of the exact ones, by the name that ``labeller`` has in a Skin."""
-
-BY_SHADOW = {"projection": label_shadows.projection, "single": label_shadows.single}
-"""Of the others; connectivity makes no difference to them."""
+RUN = LabellerRule(functools.partial(exact, strip_clocks=run_clocks), volume.run_clocks)
+SERIAL = LabellerRule(functools.partial(exact, strip_clocks=label_serial.cluster_clocks), label_serial.strip_clocks)

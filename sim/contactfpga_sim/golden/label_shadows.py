@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.work import Departure, Labelling
+from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
 
 
-def projection(cells: np.ndarray) -> Labelling:
-    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band."""
+def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:
+    """Zones of an (R, C) bool frame by their shadows: bands of rows, and runs of columns within a band.
+    ``connectivity`` makes no difference."""
     rows, columns = cells.shape
     pressed = np.any(cells, axis=1)
     walks = [bool(pressed[y] or (y and pressed[y - 1])) for y in range(rows)]
@@ -22,8 +23,8 @@ def projection(cells: np.ndarray) -> Labelling:
     return _work(walks, columns, departures)
 
 
-def single(cells: np.ndarray) -> Labelling:
-    """All pressed cells of an (R, C) bool frame as one zone."""
+def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
+    """All pressed cells of an (R, C) bool frame as one zone. ``connectivity`` makes no difference."""
     rows, columns = cells.shape
     any_pressed = bool(cells.any())
     walks = [*np.any(cells[:-1], axis=1).tolist(), any_pressed]
@@ -46,3 +47,7 @@ def _runs(line: np.ndarray) -> list[tuple[int, int]]:
 def _moments(cells: np.ndarray) -> tuple[int, int, int]:
     y, x = np.nonzero(cells)
     return len(x), int(x.sum()), int(y.sum())
+
+
+PROJECTION = LabellerRule(projection)
+SINGLE = LabellerRule(single)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import adaptive, debounce, divide, label, request, scan, uart
+from contactfpga_sim.golden import divide, label, request, scan, uart
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
@@ -22,7 +21,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
     known = facts(skin)
     heard = request.heard(timeline.received, known.bit_clocks)
-    scanned, counted, contact = (_adaptive if known.adaptive else _raster)(known, timeline, heard.requests, cycles)
+    scanned, counted, contact = known.scan.scanned(known, timeline, heard.requests, cycles)
     trace = Trace(cycles)
     link = Link(known, State(known, scanned, heard))
     for cycle in (0, *(one.cycle + 1 for one in heard.requests if one.hello)):
@@ -41,46 +40,13 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
 def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
     """(cycle, rows) of every change of the rows that are driven in cycles 0 to ``cycles`` - 1; bit r is row r."""
     known = facts(skin)
-    if known.adaptive:
-        scanner = adaptive.Scanner(known, timeline, [])
-        while not scanner.slots or scanner.slots[-1].end < cycles:
-            scanner.frame()
-        changes = adaptive.driven(known, scanner.slots)
-    else:
-        changes = scan.driven(known, cycles)
-    return [change for change in changes if change[0] < cycles]
+    return [change for change in known.scan.driven(known, timeline, cycles) if change[0] < cycles]
 
 
 def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
     """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
     known = facts(skin)
-    if not known.adaptive:
-        return [known.row_shift + number * known.scan_clocks for number in range(cycles // known.scan_clocks + 2)]
-    scanner, found = adaptive.Scanner(known, timeline, []), [known.row_shift]
-    while found[-1] <= cycles:
-        scanner.frame()
-        found.append(scanner.slots[-1].end)
-    return found
-
-
-Scanned = tuple[list[scan.Scan], Iterable[np.ndarray], list[tuple[int, int]]]
-"""Frames, their cells as they count once debounced, and changes of the contact pin."""
-
-
-def _raster(facts: Facts, timeline: Timeline, requests: list[request.Request], cycles: int) -> Scanned:
-    scanned = scan.scans(facts, timeline, requests, cycles // facts.scan_clocks + 1)
-    counted = debounce.debounced(
-        np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
-    )
-    return scanned, counted, scan.contact(facts, scanned)
-
-
-def _adaptive(facts: Facts, timeline: Timeline, requests: list[request.Request], cycles: int) -> Scanned:
-    scanner = adaptive.Scanner(facts, timeline, requests)
-    frames = [scanner.frame()]
-    while scanner.slots[-1].end < cycles:
-        frames.append(scanner.frame())
-    return [one for one, _ in frames], [counted for _, counted in frames], scanner.contact
+    return known.scan.beginnings(known, timeline, cycles)
 
 
 class Labeller:

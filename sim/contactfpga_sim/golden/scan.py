@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from contactfpga_sim.golden.debounce import debounced
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.trace import Timeline
@@ -35,6 +36,69 @@ class Scan:
     """Row times it took."""
     alone: frozenset[int]
     """Rows that were driven alone."""
+
+
+Scanned = tuple[list[Scan], Iterable[np.ndarray], list[tuple[int, int]]]
+"""Frames, their cells as they count once debounced, and changes of the contact pin."""
+
+
+class ScanRule:
+    """The golden rule of a scan."""
+
+    even: bool
+    """Every frame takes the same time, every row once."""
+
+    def choice(self, facts: Facts) -> int:
+        """Clocks that the scan takes to choose its next rows."""
+        raise NotImplementedError
+
+    def frame_slots(self, facts: Facts) -> int:
+        """The most row times that a frame takes."""
+        raise NotImplementedError
+
+    def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
+        """The frames of cycles 0 to ``cycles`` - 1, or more, with the requests in the order of their coming."""
+        raise NotImplementedError
+
+    def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
+        """(cycle, rows) of every change of the rows that are driven, up to ``cycles`` and beyond; bit r is row r."""
+        raise NotImplementedError
+
+    def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
+        """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
+        raise NotImplementedError
+
+
+class Raster(ScanRule):
+    """Row after row, each for the same time."""
+
+    even = True
+
+    def choice(self, facts: Facts) -> int:
+        return 0
+
+    def frame_slots(self, facts: Facts) -> int:
+        return facts.rows
+
+    def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
+        scanned = scans(facts, timeline, requests, cycles // facts.scan_clocks + 1)
+        counted = debounced(
+            np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
+        )
+        return scanned, counted, contact(facts, scanned)
+
+    def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
+        changes = []
+        for slot in range(cycles // facts.row_clocks + 1):
+            start = facts.row_shift + slot * facts.row_clocks
+            changes += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
+        return changes
+
+    def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
+        return [facts.row_shift + number * facts.scan_clocks for number in range(cycles // facts.scan_clocks + 2)]
+
+
+RASTER = Raster()
 
 
 def strobe(facts: Facts, slot: int) -> int:
@@ -121,12 +185,3 @@ def _stuck(facts: Facts, timeline: Timeline, slots: range) -> int:
         if stuck is not None:
             columns |= np.asarray(stuck, bool)
     return int(np.sum(columns & ~facts.mask.all(axis=0)))
-
-
-def driven(facts: Facts, cycles: int) -> list[tuple[int, int]]:
-    """(cycle, rows) of every change of the rows that are driven, up to ``cycles`` and beyond; bit r is row r."""
-    changes = []
-    for slot in range(cycles // facts.row_clocks + 1):
-        start = facts.row_shift + slot * facts.row_clocks
-        changes += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
-    return changes

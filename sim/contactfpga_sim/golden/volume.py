@@ -9,7 +9,9 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.golden import label_serial
+from contactfpga.choices import labellers
+from contactfpga.choices.labellers import Labeller, LabellerName
+from contactfpga_sim.golden.work import LabellerRule
 
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 
@@ -38,7 +40,7 @@ class Departures:
         return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
 
-def all_departures(frames: np.ndarray, connectivity: int, labeller: str = "run") -> Departures:
+def all_departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> Departures:
     """Every zone of (N, R, C) bool frames, and when it leaves."""
     frames = np.asarray(frames, bool)
     count, rows, columns = frames.shape
@@ -53,13 +55,15 @@ def all_departures(frames: np.ndarray, connectivity: int, labeller: str = "run")
     )
 
 
-def row_clocks(frames: np.ndarray, connectivity: int, labeller: str = "run") -> tuple[np.ndarray, np.ndarray]:
+def row_clocks(
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run"
+) -> tuple[np.ndarray, np.ndarray]:
     """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks from one to the next that can be handed over,
     and to the end mark if it is the last."""
-    return _RULES[labeller](np.asarray(frames, bool), connectivity)[1:]
+    return _clocks(np.asarray(frames, bool), connectivity, labeller)[1:]
 
 
-def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: str = "run") -> np.ndarray:
+def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> np.ndarray:
     """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
     found = all_departures(frames, connectivity, labeller)
     result = np.zeros(len(frames), int)
@@ -89,7 +93,15 @@ def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
         inner[...] = np.append(least.ravel(), nothing)[least]
 
 
-def _departures(frames: np.ndarray, connectivity: int, labeller: str) -> Departures:
+def _clocks(
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rule: LabellerRule = labellers.find(labeller).load_golden()
+    assert rule.strips is not None, f"{labeller} has no rule for many frames at once"
+    return rule.strips(frames, connectivity)
+
+
+def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> Departures:
     count, rows, columns = frames.shape
     labels = min_labels(frames, connectivity)
     roots, zone = np.unique(labels[frames], return_inverse=True)
@@ -98,7 +110,7 @@ def _departures(frames: np.ndarray, connectivity: int, labeller: str) -> Departu
     last_row = np.zeros(total, int)
     np.maximum.at(last_row, zone, y)
     leaves = np.minimum(last_row + 1, rows - 1)
-    last_clock = _RULES[labeller](frames, connectivity)[0]
+    last_clock = _clocks(frames, connectivity, labeller)[0]
     clock = np.zeros(total, int)
     for place in (0, 1):  # the zone's cells in the row before the one worked, and in that row itself
         near = y == leaves[zone] - 1 + place
@@ -134,9 +146,7 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
     return reached, steps
 
 
-def _run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of ``run``, for every row of (N, R, C) bool frames: :attr:`contactfpga_sim.golden.work.LabellerRule.strips`."""
     last_step, steps = _strips(frames, connectivity)
     return last_step + 2, steps + 1, steps + 3
-
-
-_RULES = {"run": _run_clocks, "serial": label_serial.strip_clocks}

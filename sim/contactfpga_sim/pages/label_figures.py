@@ -4,12 +4,13 @@ recordings, and over the shapes that break labellers.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 
+from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import volume
 from contactfpga_sim.scenes.cells import to_words
@@ -17,7 +18,7 @@ from contactfpga_sim.scenes.families import FAMILIES, placements
 from contactfpga_sim.scenes.scene import CONTACTS
 from contactfpga_sim.scenes.shapes import variants
 
-LABELLERS = ("run", "serial")
+EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
 
 TOUCHES = 400
 """Scenes of each family; each has its own place within a cell, angle and size."""
@@ -34,7 +35,7 @@ def labeller_table() -> str:
     ]
     for size in (16, 32, 64):
         places = every_place(touches(Skin(rows=size, columns=size, settle_us=15.0)))
-        for labeller in LABELLERS:
+        for labeller in EXACT:
             for connectivity in (8, 4):
                 skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
                 lines.append(labeller_row(skin, places))
@@ -53,27 +54,29 @@ def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
 
 def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
     """Over all (n, R, C) bool frames of each recording, as if the sheet ended after any of its rows."""
-    lines = [
-        "| recording | sheet | connectivity | `run`: median / 99 % / worst, bound "
-        "| `serial`: median / 99 % / worst, bound |",
-        "|---|---|---|---|---|",
-    ]
+    heads = (
+        "recording",
+        "sheet",
+        "connectivity",
+        *(f"`{labeller.name}`: median / 99 % / worst, bound" for labeller in EXACT),
+    )
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for name, frames in recordings.items():
         _, rows, columns = frames.shape
         places = counted(last_rows(frames), columns)
         for connectivity in (8, 4):
             found = (
                 f"{spread(*places, connectivity, labeller)}, {bound(columns, connectivity, labeller)}"
-                for labeller in LABELLERS
+                for labeller in EXACT
             )
             lines.append(f"| {name} | {rows}x{columns} | {connectivity} | {' | '.join(found)} |")
     return "\n".join(lines)
 
 
-def bound(columns: int, connectivity: int, labeller: str) -> int:
-    """Clocks that no frame exceeds."""
-    more = math.ceil(columns / 2) if connectivity == 8 else columns
-    return more + 4 if labeller == "run" else columns + more + 1
+def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
+    """Clocks from a frame's last row to its last record that no frame exceeds: the end mark comes a clock later."""
+    skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
+    return Derived(skin).label_clocks - 1
 
 
 def worst_last_record_clocks(skin: Skin) -> int:
@@ -121,7 +124,7 @@ def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
     return (different.view("<u8").reshape(-1, 2, 1) >> bits & np.uint64(1)).astype(bool), count
 
 
-def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: str) -> str:
+def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> str:
     """Median, 99 % and worst of the clocks to the last record, each of the (k, 2, C) rows being there ``count`` times.
 
     The clocks are the golden model's, which the gateware keeps.

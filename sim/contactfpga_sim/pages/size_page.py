@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from contactfpga.choices.labellers import Labeller
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import boards, build, sizes
@@ -66,17 +67,17 @@ def labellers_table() -> str:
         "|---" * (3 + len(sizes.DEVICES)) + "|",
     ]
     for side, published in LINK_RUN_CCA.items():
-        lines += [own_labeller_row(side, name) for name in ("run", "serial")]
+        lines += [own_labeller_row(side, labeller) for labeller in label_figures.EXACT]
         lines.append(labeller_row(side, "LinkRunCCA", published.clocks, published.luts_and_mhz))
     return "\n".join(lines)
 
 
-def own_labeller_row(side: int, name: str) -> str:
+def own_labeller_row(side: int, labeller: Labeller) -> str:
     """One of our labellers on a square sheet."""
-    clocks = label_figures.worst_last_record_clocks(Skin(rows=side, columns=side, labeller=name, settle_us=15.0))
-    design = sizes.DESIGNS[f"labeller `{name}`"]
+    clocks = label_figures.worst_last_record_clocks(Skin(rows=side, columns=side, labeller=labeller, settle_us=15.0))
+    design = sizes.DESIGNS[f"labeller `{labeller.name}`"]
     found = [size.measure(lambda: design(sizes.square(side)), device) for device in sizes.DEVICES]
-    return labeller_row(side, f"`{name}`", clocks, [(one.luts, one.fmax_mhz) for one in found])
+    return labeller_row(side, f"`{labeller.name}`", clocks, [(one.luts, one.fmax_mhz) for one in found])
 
 
 def labeller_row(side: int, name: str, clocks: int, luts_and_mhz: Sequence[tuple[int, float]]) -> str:

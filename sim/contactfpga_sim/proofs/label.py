@@ -5,8 +5,8 @@ from functools import partial
 from amaranth.hdl import Array, Const, Mux, Signal, Value
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.label import RunLabeller
 from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk

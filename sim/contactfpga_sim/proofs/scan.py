@@ -1,6 +1,7 @@
 """The scanner: which row is driven when, and that each sample is offered once."""
 
 from functools import partial
+from typing import Literal
 
 from amaranth.hdl import Cat, Mux, Signal
 
@@ -12,11 +13,11 @@ from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof
 
 
-def skin_of(diodes: str) -> Skin:
+def skin_of(diodes: Literal["col2row", "row2col"]) -> Skin:
     return Skin(rows=4, columns=2, diodes=diodes, settle_us=1, mask=((1, 0),), zone_capacity=1)
 
 
-def one_row_at_a_time(proof: Proof, diodes: str) -> None:
+def one_row_at_a_time(proof: Proof, diodes: Literal["col2row", "row2col"]) -> None:
     """Claimed: in each clock the row whose slot it is, alone, is driven, or in the release none."""
     skin = skin_of(diodes)
     dut = Scanner(skin)
@@ -30,7 +31,7 @@ def one_row_at_a_time(proof: Proof, diodes: str) -> None:
     _slot_lemmas(proof, inside, dut, slot, row)
 
 
-def each_sample_once(proof: Proof, diodes: str) -> None:
+def each_sample_once(proof: Proof, diodes: Literal["col2row", "row2col"]) -> None:
     """Free: the columns. Assumed: a row is taken before the next one comes, as the Skin's limits see to.
 
     Claimed: a row is offered from the clock after its strobe until it is taken, unchanged, as the pins were two clocks

@@ -5,6 +5,7 @@ from functools import partial
 from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.fifo import SyncFIFOBuffered
 
+from contactfpga.choices.debounces import DebounceName
 from contactfpga.skin import Skin
 from contactfpga_hdl.debounce.even import Debounce
 from contactfpga_hdl.report.audit import Audit, Bitmap
@@ -34,7 +35,7 @@ def offers_stay(proof: Proof, port) -> None:
         proof.claim(port.valid & (payload == proof.before(payload)))
 
 
-def debounce(proof: Proof, method: str) -> None:
+def debounce(proof: Proof, method: DebounceName) -> None:
     """Free: rows at any time, and when they are taken. Without a debounce time the stage changes nothing.
 
     Claimed: each row is offered once, ``columns + 3`` clocks after it was taken, as it was, until it is taken.

@@ -49,11 +49,11 @@ class Scene:
         return truth_of(parts, Box() if skin is None else sheet(skin))
 
     def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
-        """(rows, columns) bool: the switches that are closed at that time. ``cover``: in the place of the Skin's; where
-        there is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
+        """(rows, columns) bool: the switches that are closed at that time. ``cover``: where there
+        is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
         x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
         y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
-        return (cover or skin.cover or Cover()).closed(self.loads(seconds), x, y[:, None])
+        return (cover or Cover()).closed(self.loads(seconds), x, y[:, None])
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
         """:meth:`pressed` on this sheet as a function of time."""
@@ -133,17 +133,18 @@ Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
 """What :func:`scene` takes."""
 
 
-def scene(skin: Skin, source: Source = None) -> CellsAt:
+def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> CellsAt:
     """The cells that a scene presses on a sheet, as a function of time.
 
     ``source``: one of :data:`NAMES` (none given: fingertip); a Scene; a Recording, or a .npy or .npz file of one, or
     an array (rows, columns) or (frames, rows, columns), played in a loop
-    (:mod:`contactfpga_sim.scenes.recordings`); or a function of time. Raises ValueError for anything else.
+    (:mod:`contactfpga_sim.scenes.recordings`); or a function of time. ``cover``: through which contacts
+    press; recordings and functions give cells. Raises ValueError for anything else.
     """
     if source is None:
         source = "fingertip"
     if isinstance(source, Scene):
-        return source.on(skin)
+        return source.on(skin, cover)
     if isinstance(source, Recording):
         return source.on(skin)
     if isinstance(source, np.ndarray):
@@ -152,7 +153,7 @@ def scene(skin: Skin, source: Source = None) -> CellsAt:
         return _checked(skin, source)
     name = str(source)
     if name in CONTACTS:
-        return CONTACTS[name](skin).on(skin)
+        return CONTACTS[name](skin).on(skin, cover)
     if name in SHAPES:
         shape = SHAPES[name](skin.rows, skin.columns)
         return lambda seconds: shape

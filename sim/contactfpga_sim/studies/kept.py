@@ -13,14 +13,26 @@ from typing import Any
 import contactfpga
 import contactfpga_hdl
 import contactfpga_sim
+from contactfpga.choices.choice import own_files
+from contactfpga.skin import Skin
 from contactfpga_sim.board.cache import FILE_MODE, cache_folder, ready, scratch, trusted
 
 _PACKAGES = (contactfpga, contactfpga_hdl, contactfpga_sim)
 
 
+def sources(skin: Skin | None = None) -> str:
+    """Digest of all our own code, gateware included; with a Skin also of the Skin, and of what it chooses from
+    elsewhere."""
+    digest = hashlib.sha256(_own().encode())
+    if skin is not None:
+        digest.update(skin.to_toml().encode())
+        for path in sorted(own_files(skin)):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
 @functools.cache
-def sources() -> str:
-    """Digest of all our own code, gateware included."""
+def _own() -> str:
     digest = hashlib.sha256()
     for package in _PACKAGES:
         root = Path(str(package.__file__)).parent

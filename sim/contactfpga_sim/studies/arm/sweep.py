@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.cover.latency import AROUND_S, latency_s
 from contactfpga.cover.point import force_n
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.latency import AROUND_S, latency_s
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.arm.case import Case
 from contactfpga_sim.studies.arm.report import UNLIMITED

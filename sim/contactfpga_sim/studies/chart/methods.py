@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 
 EXTENT_MM = 160.0
@@ -16,11 +17,16 @@ def sheet(pitch_mm: float, **settings) -> Skin:
     return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **settings)
 
 
+def by(labeller: Labeller) -> dict[str, Skin]:
+    """A labeller at every pitch."""
+    return {f"{labeller.title}, {pitch:g} mm": sheet(pitch, labeller=labeller) for pitch in PITCHES_MM}
+
+
 def _methods() -> dict[str, Skin]:
     methods = {}
     for pitch in PITCHES_MM:
-        for labeller in ("run", "serial", "projection", "single"):
-            methods[f"{labeller}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
+        for labeller in LABELLERS.values():
+            methods[f"{labeller.title}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
         methods[f"cells, {pitch:g} mm"] = sheet(pitch, report="cells")
     for pitch, bits in ((5.0, 4), (10.0, 4), (10.0, 1)):
         name = f"barycenter, {pitch:g} mm" + (f", {bits} bit" if bits == 1 else "")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from contactfpga.skin import Skin
 from contactfpga_sim.studies.chart.errors import METRICS, Interval
 from contactfpga_sim.studies.chart.methods import METHODS
 from contactfpga_sim.studies.chart.speed import Speed
@@ -46,15 +47,15 @@ def write(points: Iterable[Point], path: Path) -> None:
             table.writerow([task.family, task.method, task.count, task.seed, *times, *size, *found, command(point)])
 
 
-def read(path: Path) -> list[Point]:
-    """What :func:`write` wrote, rounded as it was written."""
+def read(path: Path, methods: Mapping[str, Skin] = METHODS) -> list[Point]:
+    """What :func:`write` wrote, rounded as it was written; ``methods``: the Skin of each method by its name."""
     with open(path, newline="", encoding="utf-8") as file:
-        return [_point(line) for line in csv.DictReader(file)]
+        return [_point(line, methods) for line in csv.DictReader(file)]
 
 
-def _point(line: dict[str, str]) -> Point:
+def _point(line: dict[str, str], methods: Mapping[str, Skin]) -> Point:
     method = line["method"]
-    task = Task(method, METHODS[method], line["family"], int(line["placements"]), int(line["seed"]))
+    task = Task(method, methods[method], line["family"], int(line["placements"]), int(line["seed"]))
     errors = {kind: {name: _interval(line, f"{kind}_{name}") for name in METRICS} for kind in KINDS}
     luts, fmax = (float(line[name]) if line[name] else None for name in ("luts", "fmax_mhz"))
     speed = Speed(*(float(line[name]) for name in TIMES))

@@ -99,7 +99,7 @@ def _colour(point: Point) -> str:
     skin = point.task.skin
     if skin.report != "moments":
         return COLOURS[skin.report]
-    kind = "adaptive" if skin.scan == "adaptive" else skin.labeller
+    kind = "adaptive" if skin.scan == "adaptive" else str(skin.labeller)
     return COLOURS[kind]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from contactfpga.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
@@ -135,9 +135,9 @@ def accuracy(task: Task, first: int) -> Found:
     return kept.kept("accuracy", _key(task, "accuracy", first), new)
 
 
-def look(scene: Scene, seconds: float, skin: Skin) -> Look:
+def look(scene: Scene, seconds: float, skin: Skin, cover: Cover | None = None) -> Look:
     """A scene at an instant."""
-    return scene.pressed(seconds, skin), errors.contacts(scene.truth(seconds, skin))
+    return scene.pressed(seconds, skin, cover), errors.contacts(scene.truth(seconds, skin))
 
 
 def compared(looks: Iterable[Look], skin: Skin) -> Found:
@@ -175,8 +175,7 @@ def _size(skin: Skin) -> sizes.Size:
 
 
 def _key(task: Task, kind: str, number: int) -> str:
-    skin = json.dumps(dataclasses.asdict(task.skin), sort_keys=True)
-    return f"{kept.sources()} {kind} {number} {task.count} {task.seed} {task.checked} {task.family} {skin}"
+    return f"{kept.sources(task.skin)} {kind} {number} {task.count} {task.seed} {task.checked} {task.family}"
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:

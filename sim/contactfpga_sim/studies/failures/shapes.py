@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.scene import FINGER_MM, Scene
@@ -14,7 +15,7 @@ from contactfpga_sim.studies.failures.rig import REFERENCE, faults, moments, pla
 
 CAPACITY = 8
 
-LABELLERS = {name: REFERENCE.replace(labeller=name) for name in ("run", "serial", "projection", "single")}
+SKINS = {name: REFERENCE.replace(labeller=name) for name in LABELLERS}
 
 
 def arm(size: int, quarters: int) -> np.ndarray:
@@ -52,7 +53,7 @@ WINDING = Study(
     knob="quarters of a turn",
     amount="zones",
     values=tuple(range(12)),
-    runs={f"`{name}`": functools.partial(_winding, skin) for name, skin in LABELLERS.items()},
+    runs={f"`{name}`": functools.partial(_winding, skin) for name, skin in SKINS.items()},
     helps="an exact labeller: `run` or `serial`",
 )
 
@@ -79,7 +80,7 @@ CROSSING = Study(
     knob="distance of their middles, mm",
     amount="zones",
     values=tuple(range(70, 24, -1)),
-    runs={f"`{name}`": functools.partial(_crossing, LABELLERS[name]) for name in ("run", "projection", "single")},
+    runs={f"`{name}`": functools.partial(_crossing, SKINS[name]) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
 )
 

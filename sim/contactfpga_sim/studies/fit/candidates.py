@@ -8,20 +8,21 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from contactfpga.choices.labellers import LABELLERS, Labeller
+from contactfpga.choices.scans import SCANS
 from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.studies.fit.sources import Recorded, Size, Source
 
-LABELLERS: tuple[dict[str, Any], ...] = (
-    {"labeller": "single"},
-    {"labeller": "projection"},
-    *({"labeller": labeller, "connectivity": c} for labeller in ("serial", "run") for c in (8, 4)),
-)
-"""Connectivity makes no difference to the others."""
 
-METHODS = (*(labeller | {"report": "moments"} for labeller in LABELLERS), {"report": "cells"})
+def by(labeller: Labeller) -> list[dict[str, Any]]:
+    """The methods of a labeller: connectivity makes a difference to exact ones."""
+    settings = {"labeller": labeller.name, "report": "moments"}
+    return [settings | {"connectivity": c} for c in (8, 4)] if labeller.exact else [settings]
+
+
+METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
 """Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds a zone."""
 
-SCANS = ("raster", "adaptive")
 PITCHES_MM = (5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
 
 
@@ -45,7 +46,7 @@ def candidates(
     pitches_mm: Sequence[tuple[float, float]],
     size_mm: Size,
     methods: Sequence[dict[str, Any]] = METHODS,
-    scans: Sequence[str] = SCANS,
+    scans: Sequence[str] = tuple(SCANS),
     bauds: Sequence[int] | None = None,
 ) -> list[Candidate]:
     """``base`` with each pitch (x, y) near the given ones that divides the sheet, each method, scan and baud rate."""

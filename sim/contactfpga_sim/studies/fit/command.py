@@ -9,14 +9,17 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from contactfpga.choices import labellers
+from contactfpga.choices.scans import SCANS
 from contactfpga.commands.cover import UNSOLVED
 from contactfpga.console import outputs, terminal
 from contactfpga.console.interrupt import Interrupted
 from contactfpga.console.tables import tables
+from contactfpga.cover import load_cover
 from contactfpga.skin import Skin
 from contactfpga_sim.studies import pool
 from contactfpga_sim.studies.fit import show
-from contactfpga_sim.studies.fit.candidates import METHODS, SCANS, Candidate, candidates, pitches_for, size_for
+from contactfpga_sim.studies.fit.candidates import METHODS, Candidate, by, candidates, pitches_for, size_for
 from contactfpga_sim.studies.fit.goals import Goals
 from contactfpga_sim.studies.fit.search import fit
 from contactfpga_sim.studies.fit.sources import default_count, source
@@ -59,8 +62,9 @@ def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
 
 def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
-    sources = tuple(source(name, args.seed, args.threshold) for name in args.scenes)
     base = Skin.load(args.skin) if args.skin else None
+    cover = load_cover(args.skin) if args.skin else None
+    sources = tuple(source(name, args.seed, args.threshold, cover) for name in args.scenes)
     goals = Goals(
         miscounted=_share(args.miscounted),
         missed=_share(args.missed),
@@ -76,22 +80,25 @@ def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
         pitches_for(base, sources, args.pitch_mm),
         size_for(base, sources),
         _methods(args.labeller),
-        _known("--scan", args.scan, SCANS),
+        _known("--scan", args.scan, tuple(SCANS)),
         args.baud,
     )
-    return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick), tried
+    return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover), tried
 
 
 def _share(percent: float | None) -> float | None:
     return None if percent is None else percent / 100
 
 
-def _methods(labellers: Sequence[str] | None) -> list[dict[str, Any]]:
-    def by(method: dict[str, Any]) -> str:
-        return "cells" if method["report"] == "cells" else method["labeller"]
-
-    chosen = _known("--labeller", labellers, list(dict.fromkeys(map(by, METHODS))))
-    return [method for method in METHODS if by(method) in chosen]
+def _methods(names: Sequence[str] | None) -> list[dict[str, Any]]:
+    """``cells``, or a labeller: a built-in one, or ``module:attribute`` of your own."""
+    if not names:
+        return list(METHODS)
+    return [
+        method
+        for name in dict.fromkeys(names)
+        for method in ([{"report": "cells"}] if name == "cells" else by(labellers.find(name)))
+    ]
 
 
 def _known(option: str, names: Sequence[str] | None, known: Sequence[str]) -> Sequence[str]:

@@ -47,6 +47,4 @@ def speed_of(task: Task, source: Source, skin: Skin, others: bool, checked: int)
 
 
 def _key(task: Task, source: Source, skins: Sequence[Skin], *more: Any) -> str:
-    return "\n".join(
-        (kept.sources(), repr(source), *(skin.to_toml() for skin in skins), task.base.to_toml(), repr(more))
-    )
+    return "\n".join((*map(kept.sources, (*skins, task.base)), repr(source), repr(more)))

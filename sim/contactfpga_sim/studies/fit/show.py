@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from contactfpga.cover import table
 from contactfpga_sim.studies.chart.errors import METRICS, Interval
 from contactfpga_sim.studies.fit.cost import DEVICE
 from contactfpga_sim.studies.fit.goals import Measured
@@ -127,7 +128,8 @@ def toml(fit: Fit, command: str) -> str:
     for source, one in zip(fit.task.names, fit.reported[0], strict=True):
         errors = (f"{head} {_error(metric, one.errors[metric])}" for head, metric in zip(METRIC_HEADS, METRICS))
         lines.append(f"{source}, scenes not used to choose: {', '.join(errors)}, {one.speed.worst_us:.0f} us at worst")
-    return "".join(f"# {line}\n" for line in lines) + fit.answer.skin.to_toml()
+    cover = table.write(fit.task.cover) if fit.task.cover else ""
+    return "".join(f"# {line}\n" for line in lines) + fit.answer.skin.to_toml() + cover
 
 
 def plain(fit: Fit) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga.cover import Cover
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes.contacts import Contact, Value
@@ -59,19 +60,23 @@ class Source(abc.ABC):
         """(R, C) bool of the same, without what there is to be found."""
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Placed(Source):
     """Contacts at places drawn at random."""
+
+    cover: Cover | None = None
+    """Through which they press."""
 
     @abc.abstractmethod
     def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
         """A scene, and the instant in s at which it is looked at."""
 
     def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
-        return [look(*self.at(skin, base, number), skin) for number in numbers]
+        return [look(*self.at(skin, base, number), skin, self.cover) for number in numbers]
 
     def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
         drawn = (self.at(skin, base, number) for number in numbers)
-        return [scene.pressed(seconds, skin) for scene, seconds in drawn]
+        return [scene.pressed(seconds, skin, self.cover) for scene, seconds in drawn]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,16 +174,17 @@ def _recording(path: str, digest: str, threshold: float | None) -> Recording:
     return Recording.load(path, threshold)
 
 
-def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
+def source(name: str, seed: int | None = None, threshold: float | None = None, cover: Cover | None = None) -> Source:
     """By the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a recording.
 
-    ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed. A
-    family hides the built-in scene of its name. Raises ValueError for anything else.
+    ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed.
+    ``cover``: through which contacts press. A family hides the built-in scene of its name.
+    Raises ValueError for anything else.
     """
     if name in FAMILIES:
-        return Family(name, seed or 0)
+        return Family(name, seed or 0, cover=cover)
     if name in CONTACTS:
-        return BuiltIn(name, seed or 0)
+        return BuiltIn(name, seed or 0, cover=cover)
     if name.endswith((".npz", ".npy")):
         with open_regular(name) as file:
             found = Recorded(name, hashlib.sha256(file.read()).hexdigest(), threshold)
@@ -187,7 +193,7 @@ def source(name: str, seed: int | None = None, threshold: float | None = None) -
         return found
     if name.endswith(".toml"):
         says = SceneFile.load(name)
-        return File(says if seed is None else dataclasses.replace(says, seed=seed))
+        return File(says if seed is None else dataclasses.replace(says, seed=seed), cover=cover)
     known = ", ".join((*FAMILIES, *(name for name in CONTACTS if name not in FAMILIES)))
     raise ValueError(f"scene {name!r} is not known; take a .toml, .npz or .npy file, or one of {known}")
 

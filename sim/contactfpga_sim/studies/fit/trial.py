@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future, as_completed
 from typing import Any
 
+from contactfpga.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.fit.candidates import Candidate
 from contactfpga_sim.studies.fit.goals import Goals, Measured
@@ -39,6 +40,8 @@ class Task:
     quick: bool = False
     """Only those that meet the goals are synthesised; which of the refused ones are cheaper is not said."""
     timed: int = TIMED
+    cover: Cover | None = None
+    """Through which contacts press; for the answer's file."""
 
 
 @dataclasses.dataclass(frozen=True)

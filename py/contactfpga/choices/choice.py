@@ -1,0 +1,82 @@
+"""What every choice has, and how one is found: by a built-in name, or as ``module:attribute`` of your own."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import importlib.util
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from contactfpga.errors import SkinError
+from contactfpga.inputs.values import shown
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Choice:
+    """One way to do a stage. Two choices with one name are the same choice."""
+
+    name: str
+    """What a Skin calls it: a built-in name, or ``module:attribute``, where this object is found."""
+    title: str
+    """Its label in charts and tables."""
+    gateware: str
+    """Where the gateware's class is, ``module:attribute``; it is called with the Skin. Empty: there is none."""
+    golden: str
+    """Where the golden model's rule is, ``module:attribute``; it shares no code with the gateware."""
+
+    def load_gateware(self) -> Any:
+        """The gateware's class. Imports Amaranth."""
+        return load(self.gateware)
+
+    def load_golden(self) -> Any:
+        """The golden model's rule."""
+        return load(self.golden)
+
+
+AnyChoice = TypeVar("AnyChoice", bound=Choice)
+
+
+def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object) -> AnyChoice:
+    """The choice of this kind that ``value`` names or is. Raises SkinError that lists what there is."""
+    field = kind.__name__.lower()
+    if isinstance(value, kind):
+        if find(kind, built_in, value.name) != value:
+            raise SkinError(f"{field} is an object called {value.name!r}, but another object is found there")
+        return value
+    if isinstance(value, str) and value in built_in:
+        return built_in[value]
+    if not isinstance(value, str) or ":" not in value:
+        raise SkinError(
+            f"{field} is {shown(value)}; it must be one of {', '.join(map(repr, built_in))}, "
+            "or 'module:attribute' of your own"
+        )
+    try:
+        found = load(value)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SkinError(f"{field} is {shown(value)}, which cannot be loaded: {error}") from error
+    if not isinstance(found, kind):
+        raise SkinError(f"{field} is {shown(value)}, which is a {type(found).__name__}; it must be a {kind.__name__}")
+    if found.name != value:
+        raise SkinError(f"{field} is {shown(value)}, but the object calls itself {found.name!r}; give both one name")
+    return found
+
+
+def load(place: str) -> Any:
+    """What is at ``module:attribute``."""
+    module, _, attribute = place.partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def own_files(skin: Skin) -> set[Path]:
+    """Files of the modules that the Skin's choices of your own name, for keys of what is kept."""
+    own = [
+        load(value) for value in (skin.labeller, skin.scan, skin.debounce) if isinstance(value, str) and ":" in value
+    ]
+    places = {place for one in own for place in (one.name, one.gateware, one.golden) if place}
+    specs = [importlib.util.find_spec(place.partition(":")[0]) for place in places]
+    return {Path(spec.origin) for spec in specs if spec and spec.origin}

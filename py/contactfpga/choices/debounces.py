@@ -1,0 +1,67 @@
+"""Debounces: when a switch that reads otherwise counts otherwise. Methods and names as in QMK."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Literal
+
+from contactfpga.choices.choice import Choice, load
+from contactfpga.choices.choice import find as find_choice
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Debounce(Choice):
+    """Rows in, rows out.
+
+    ``gateware`` counts scan periods, for scans that sample evenly; ``timed_gateware`` counts row times, for the others.
+    ``golden`` is a :class:`contactfpga_sim.golden.debounce.DebounceRule`.
+    """
+
+    timed_gateware: str
+    delays_press: bool
+    """A press counts only after ``debounce_press_us``."""
+
+    def load_timed_gateware(self) -> Any:
+        """The gateware's class for scans that sample unevenly. Imports Amaranth."""
+        return load(self.timed_gateware)
+
+
+_EVEN, _TIMED = "contactfpga_hdl.debounce.even:Debounce", "contactfpga_hdl.debounce.timed:TimedDebounce"
+
+DebounceName = Literal["none", "sym_defer_pk", "asym_eager_defer_pk"]
+
+DEBOUNCES: dict[str, Debounce] = {
+    debounce.name: debounce
+    for debounce in (
+        Debounce(
+            name="none",
+            title="not debounced",
+            gateware="",
+            timed_gateware="",
+            golden="contactfpga_sim.golden.debounce:NONE",
+            delays_press=False,
+        ),
+        Debounce(
+            name="sym_defer_pk",
+            title="debounced, deferred",
+            gateware=_EVEN,
+            timed_gateware=_TIMED,
+            golden="contactfpga_sim.golden.debounce:SYM_DEFER",
+            delays_press=True,
+        ),
+        Debounce(
+            name="asym_eager_defer_pk",
+            title="debounced, eager",
+            gateware=_EVEN,
+            timed_gateware=_TIMED,
+            golden="contactfpga_sim.golden.debounce:ASYM_EAGER_DEFER",
+            delays_press=False,
+        ),
+    )
+}
+"""The built-in ones, by name."""
+
+
+def find(value: object) -> Debounce:
+    """The debounce that a Skin's ``debounce`` names or is. Raises SkinError."""
+    return find_choice(Debounce, DEBOUNCES, value)

@@ -1,0 +1,86 @@
+"""Labellers: how pressed cells become zones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+from contactfpga.choices.choice import Choice
+from contactfpga.choices.choice import find as find_choice
+
+if TYPE_CHECKING:
+    from contactfpga.skin.derived import Derived
+
+Clocks = Callable[["Derived"], int]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Labeller(Choice):
+    """Rows in, zone records out.
+
+    ``gateware`` is a component with a stream of rows in, ``rows``, and a stream of zone records out, ``records``
+    (``contactfpga_hdl.payloads``). ``golden`` is a :class:`contactfpga_sim.golden.work.LabellerRule`.
+    """
+
+    exact: bool
+    """Zones are the connected components of the cells, with the Skin's connectivity. Connectivity makes no difference
+    to a labeller that is not exact."""
+    end_clocks: Clocks
+    """The most clocks from a frame's last row to its end mark; the last record leaves earlier."""
+    row_clocks: Clocks
+    """The most clocks from a row to the next one it can take."""
+    empty_row_clocks: Clocks = lambda derived: 1
+    """The same for an empty row below an empty row."""
+
+
+LabellerName = Literal["run", "serial", "projection", "single"]
+
+LABELLERS: dict[str, Labeller] = {
+    labeller.name: labeller
+    for labeller in (
+        Labeller(
+            name="run",
+            title="run",
+            gateware="contactfpga_hdl.label.run:RunLabeller",
+            golden="contactfpga_sim.golden.label:RUN",
+            exact=True,
+            end_clocks=lambda derived: derived.open_zones + 3,
+            row_clocks=lambda derived: derived.open_zones + 1,
+        ),
+        Labeller(
+            name="serial",
+            title="serial",
+            gateware="contactfpga_hdl.label.serial:SerialLabeller",
+            golden="contactfpga_sim.golden.label:SERIAL",
+            exact=True,
+            end_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2,
+            row_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2,
+            empty_row_clocks=lambda derived: derived.skin.columns + 2,
+        ),
+        Labeller(
+            name="projection",
+            title="projection",
+            gateware="contactfpga_hdl.label.projection:ProjectionLabeller",
+            golden="contactfpga_sim.golden.label_shadows:PROJECTION",
+            exact=False,
+            end_clocks=lambda derived: derived.skin.columns + 3,
+            row_clocks=lambda derived: derived.skin.columns + 1,
+        ),
+        Labeller(
+            name="single",
+            title="single",
+            gateware="contactfpga_hdl.label.single:SingleLabeller",
+            golden="contactfpga_sim.golden.label_shadows:SINGLE",
+            exact=False,
+            end_clocks=lambda derived: derived.skin.columns + 4,
+            row_clocks=lambda derived: derived.skin.columns + 2,
+        ),
+    )
+}
+"""The built-in ones, by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+
+
+def find(value: object) -> Labeller:
+    """The labeller that a Skin's ``labeller`` names or is. Raises SkinError."""
+    return find_choice(Labeller, LABELLERS, value)

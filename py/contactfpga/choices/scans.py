@@ -1,0 +1,114 @@
+"""Scans: which rows are driven when."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+from contactfpga.choices.choice import Choice
+from contactfpga.choices.choice import find as find_choice
+from contactfpga.errors import SkinError
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+    from contactfpga.skin.derived import Derived
+
+Count = Callable[["Derived"], int]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Scan(Choice):
+    """Drives rows, samples columns.
+
+    ``gateware`` is a component with the ports of :class:`contactfpga_hdl.scan.raster.Scanner`. ``golden`` is a
+    :class:`contactfpga_sim.golden.scan.ScanRule`.
+    """
+
+    even: bool
+    """Every row is sampled once per frame and frames take the same time. Otherwise times are counted in row times, and
+    each frame tells how many it took."""
+    check: Callable[[Skin], None]
+    """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
+    choice_clocks: Count
+    """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
+    max_frame_slots: Count
+    """The most row times that a frame can take."""
+    min_row_clocks: Count
+    """The least clocks of a row time in which the later stages keep up, end mark and all; the scanner's tag is kept
+    until the frame before it is packed, and no longer."""
+
+
+def _check_adaptive(skin: Skin) -> None:
+    if skin.rows < 2:
+        raise SkinError(f"rows is {skin.rows}; scan = 'adaptive' needs at least 2")
+    if skin.column_read != "direct":
+        raise SkinError(
+            f"column_read is {skin.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
+            "the columns of an untouched sheet in each clock"
+        )
+
+
+def _raster_min_row_clocks(derived: Derived) -> int:
+    packed = derived.packed_clocks + derived.items_clocks(derived.max_items)
+    rows, columns = derived.skin.rows, derived.skin.columns
+    return max(columns + 6, 10, derived.label_clocks + 1, math.ceil(packed / rows))
+
+
+def _adaptive_min_row_clocks(derived: Derived) -> int:
+    """All that a slot tells is handed on before the next strobe: a row that was driven alone, then all others as empty,
+    up to the end mark. And a frame with any number of pressed rows is packed before the next frame ends."""
+    rows = derived.skin.rows
+    handed = derived.debounce_clocks + 2 * derived.label_row_clocks + rows * derived.label_empty_row_clocks + 8
+    return max(handed, *(_adaptive_packing_clocks(derived, pressed) for pressed in range(rows + 1)))
+
+
+def _adaptive_packing_clocks(derived: Derived, pressed: int) -> int:
+    """The next frame drives the same rows again one by one, and all others together."""
+    skin = derived.skin
+    if not derived.report.zones:
+        items = skin.rows
+    elif skin.connectivity == 8:
+        items = min(pressed, math.ceil(skin.rows / 2)) * math.ceil(skin.columns / 2)
+    else:
+        items = math.ceil(pressed * skin.columns / 2)
+    clocks = derived.packed_clocks + skin.rows + derived.items_clocks(min(items, derived.max_items))
+    return math.ceil(clocks / min(pressed + 1, skin.rows))
+
+
+ScanName = Literal["raster", "adaptive"]
+
+SCANS: dict[str, Scan] = {
+    scan.name: scan
+    for scan in (
+        Scan(
+            name="raster",
+            title="raster",
+            gateware="contactfpga_hdl.scan.raster:Scanner",
+            golden="contactfpga_sim.golden.scan:RASTER",
+            even=True,
+            check=lambda skin: None,
+            choice_clocks=lambda derived: 0,
+            max_frame_slots=lambda derived: derived.skin.rows,
+            min_row_clocks=_raster_min_row_clocks,
+        ),
+        Scan(
+            name="adaptive",
+            title="adaptive",
+            gateware="contactfpga_hdl.scan.adaptive:AdaptiveScanner",
+            golden="contactfpga_sim.golden.adaptive:ADAPTIVE",
+            even=False,
+            check=_check_adaptive,
+            choice_clocks=lambda derived: max(derived.row_levels, 2) + 4,
+            max_frame_slots=lambda derived: derived.skin.rows + 2 * derived.row_levels + 2,
+            min_row_clocks=_adaptive_min_row_clocks,
+        ),
+    )
+}
+"""The built-in ones, by name."""
+
+
+def find(value: object) -> Scan:
+    """The scan that a Skin's ``scan`` names or is. Raises SkinError."""
+    return find_choice(Scan, SCANS, value)

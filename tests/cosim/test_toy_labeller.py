@@ -1,0 +1,89 @@
+"""A labeller of your own, in one file: Skin, lockstep, virtual board, chart and fit know it with no other edit."""
+
+import json
+import re
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import toy_labeller
+from toy_labeller import TOY
+
+import contactfpga
+from contactfpga import Skin, SkinError, cli
+from contactfpga.choices.choice import own_files
+from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.cosim import bench_amaranth, bench_native
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.studies import kept
+from contactfpga_sim.studies.chart import methods, numbers, picture
+from contactfpga_sim.studies.chart.study import Task, study
+
+SKIN = Skin(rows=4, columns=6, labeller=TOY, settle_us=3.0)
+CYCLES = 6000
+
+
+def test_a_skin_takes_the_object_or_its_name(tmp_path):
+    assert Skin(rows=4, columns=6, labeller="toy_labeller:TOY", settle_us=3.0) == SKIN
+    path = tmp_path / "skin.toml"
+    path.write_text(SKIN.to_toml())
+    assert Skin.load(path) == SKIN
+    assert SKIN.fingerprint != SKIN.replace(labeller="run").fingerprint
+
+
+@pytest.mark.parametrize(
+    ("labeller", "message"),
+    [
+        ("toy", "labeller is 'toy'; it must be one of 'run', 'serial', 'projection', 'single', or 'module:attribute'"),
+        ("no_such:TOY", "labeller is 'no_such:TOY', which cannot be loaded: No module named 'no_such'"),
+        ("toy_labeller:NONE", "labeller is 'toy_labeller:NONE', which cannot be loaded: module 'toy_labeller' has no"),
+        ("toy_labeller:RULE", "labeller is 'toy_labeller:RULE', which is a LabellerRule; it must be a Labeller"),
+        (":", "labeller is ':', which cannot be loaded"),
+        (TOY.__class__(**{**vars(TOY), "name": "run"}), "labeller is an object called 'run', but another object is"),
+        (3, "labeller is 3; it must be one of"),
+    ],
+)
+def test_what_is_no_labeller_is_refused(labeller, message):
+    with pytest.raises(SkinError, match=re.escape(message)):
+        Skin(labeller=labeller)
+
+
+@pytest.mark.parametrize("run", [bench_amaranth.run, bench_native.run])
+@pytest.mark.parametrize("scan", ["raster", "adaptive"])
+def test_it_runs_in_lockstep_with_its_golden_rule(run, scan):
+    skin = SKIN.replace(scan=scan, settle_us=6.0)
+    frames = np.random.default_rng(5).random((8, 4, 6)) < 0.3
+    timeline = Timeline.frames(skin, frames)
+    assert compare(predict(skin, timeline, CYCLES), run(skin, timeline, CYCLES)) > 100
+
+
+def test_the_virtual_board_and_the_driver_use_it():
+    cells = np.zeros((4, 6), bool)
+    cells[1, 2:5] = cells[2, 3] = True
+    zones = contactfpga.read_zones(VirtualBoard(SKIN, lambda seconds: cells))
+    assert [(zone.area_cells, zone.sum_x, zone.sum_y) for zone in zones] == [(3, 9, 3), (1, 3, 2)]
+
+
+def test_what_is_kept_of_it_depends_on_its_file():
+    assert own_files(SKIN) == {Path(toy_labeller.__file__)}
+    assert own_files(Skin()) == set()
+    assert kept.sources(SKIN) != kept.sources(SKIN.replace(labeller="run"))
+
+
+def test_the_chart_draws_it(tmp_path):
+    skins = {name: skin for name, skin in methods.by(TOY).items() if name == "toy, 20 mm"}
+    tasks = [Task(name, skin, "fingers", 4, 0) for name, skin in skins.items()]
+    with ThreadPoolExecutor(1) as pool:
+        points = study(tasks, pool, with_size=False)
+    numbers.write(points, tmp_path / "chart.csv")
+    picture.save(numbers.read(tmp_path / "chart.csv", skins), tmp_path)
+    assert "toy" in (tmp_path / "chart.svg").read_text()
+
+
+def test_fit_tries_it(capsys):
+    asked = ["fit", "bumper", "--labeller", "toy_labeller:TOY", "--labeller", "single", "--pitch-mm", "20"]
+    cli.main([*asked, "--scan", "raster", "--placements", "8", "--jobs", "1", "--miscounted", "none", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert "toy_labeller:TOY" in json.dumps(found)
