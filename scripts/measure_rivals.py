@@ -22,6 +22,9 @@ from rivals.rival import Rival, RivalError
 RIVALS = {rival.name.lower(): rival for rival in (LINK_RUN_CCA,)}
 """Those that can be measured. docs/rivals.md says what a further one needs."""
 
+SIZES = (16, 32, 64)
+"""Sheets that the pages show."""
+
 CLONES = Path("build/rivals")
 
 
@@ -30,8 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     began = time.monotonic()
     try:
-        for page in options.page:
-            check_page(page)
+        check_pages(options)
         rival = RIVALS[options.rival]
         devices = [device for device in DEVICES if device.title.lower() in options.devices]
         clone = _clone(rival, options.clone)
@@ -49,13 +51,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def check_page(page: Path) -> None:
-    """Raise :class:`~rivals.rival.RivalError` unless the page has a place for one of the tables."""
-    if not page.is_file():
-        raise RivalError(f"--page is {page}; there is no such page")
-    if not any(f"<!-- figures: {name} -->" in page.read_text(encoding="utf-8") for name in TABLES):
-        marks = ", ".join(f"<!-- figures: {name} -->" for name in TABLES)
-        raise RivalError(f"--page is {page}; it has none of the marks {marks}")
+def check_pages(options: argparse.Namespace) -> None:
+    """Raise :class:`~rivals.rival.RivalError` unless every page has a place for a table, and the tables will be whole."""
+    for page in options.page:
+        if not page.is_file():
+            raise RivalError(f"--page is {page}; there is no such page")
+        if not any(f"<!-- figures: {name} -->" in page.read_text(encoding="utf-8") for name in TABLES):
+            marks = ", ".join(f"<!-- figures: {name} -->" for name in TABLES)
+            raise RivalError(f"--page is {page}; it has none of the marks {marks}")
+    if options.page and (set(SIZES) - set(options.sizes) or len(options.devices) < len(DEVICES)):
+        needed = ", ".join(f"{size}x{size}" for size in SIZES)
+        raise RivalError(f"the tables in --page need {needed} on every device; leave out --sizes and --devices")
 
 
 def _clone(rival: Rival, folder: Path | None) -> Path:
@@ -70,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--rival", choices=sorted(RIVALS), default="linkruncca")
     parser.add_argument("--clone", type=Path, help="folder of its clone (default: one is made in build/rivals)")
-    parser.add_argument("--sizes", type=int, nargs="+", choices=sorted(FRAMES), default=[16, 32, 64], metavar="N")
+    parser.add_argument("--sizes", type=int, nargs="+", choices=sorted(FRAMES), default=SIZES, metavar="N")
     names = [device.title.lower() for device in DEVICES]
     parser.add_argument("--devices", nargs="*", choices=names, default=names, help="none: only exactness and latency")
     parser.add_argument("--seeds", type=int, choices=range(1, 10), default=SEEDS, metavar="1..9")

@@ -90,7 +90,7 @@ def test_a_clone_is_made_at_the_commit(clone, tmp_path):
 
 def test_what_git_says_is_passed_on(clone, tmp_path):
     _, rival = clone
-    with pytest.raises(RivalError, match="git clone .*nowhere.* failed: .*--clone FOLDER"):
+    with pytest.raises(RivalError, match=r"git clone .*nowhere.* failed: .*--clone FOLDER"):
         dataclasses.replace(rival, url=str(tmp_path / "nowhere")).fetch(tmp_path / "new")
 
 
@@ -121,6 +121,13 @@ def test_a_page_without_a_place_is_refused_before_anything_runs(capfd, tmp_path,
     assert says in refused(capfd, "--page", str(page))
 
 
+@pytest.mark.parametrize("arguments", [["--sizes", "16"], ["--devices"]])
+def test_a_page_never_gets_a_part_of_the_tables(capfd, tmp_path, arguments):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- figures: rivals -->\n<!-- end -->\n")
+    assert "need 16x16, 32x32, 64x64 on every device" in refused(capfd, "--page", str(page), *arguments)
+
+
 @pytest.mark.parametrize("arguments", [["--sizes", "5"], ["--seeds", "0"], ["--rival", "nobody"]])
 def test_what_cannot_be_measured_is_refused(capfd, arguments):
     with pytest.raises(SystemExit):
@@ -143,7 +150,7 @@ def test_a_choice_without_a_default_gets_one():
 def test_latches_are_refused():
     latch = SILENT.replace("assign zone = 0;", "reg q; always @* if (x[0]) q = y[0]; assign zone = q;")
     with pytest.raises(native.BuildFailed, match=r"(?i)latch"):
-        exactness.check_rival(latch, Sheet(4, 2), frames(1))
+        exactness.check_rival(latch, Sheet(4, 2, 1), frames(1))
 
 
 # ---- exactness
@@ -156,7 +163,7 @@ def frames(count):
 def test_a_labeller_that_finds_nothing_is_wrong_in_every_frame_that_has_a_zone(monkeypatch):
     some = frames(50)
     some[7] = False
-    assert exactness.check_rival(SILENT, Sheet(4, 2), some).wrong == 49
+    assert exactness.check_rival(SILENT, Sheet(4, 2, 1), some).wrong == 49
     rival = dataclasses.replace(RIVAL, convert=lambda *_: SILENT)
     monkeypatch.setitem(campaign.FRAMES, 4, 0)
     with pytest.raises(RivalError, match="LinkRunCCA is wrong in 65,535 of 65,536 frames of 4x4"):
@@ -204,7 +211,7 @@ def test_plain_tells_nothing_and_told_only_what_is_true():
 
 
 def test_a_rival_is_placed_between_the_same_registers_as_ours():
-    netlists = placement.rival(SILENT, Sheet(4, 2))
+    netlists = placement.rival(SILENT, Sheet(4, 2, 1))
     assert netlists.bare.count("module \\top\n") == netlists.registered.count("module \\top\n") == 1
     assert "module \\labeller\n" in netlists.registered
     assert re.search(r"cell \\labeller ", netlists.registered)

@@ -16,8 +16,10 @@ public:
         // A reset has to last until what delays rows is blank: that need not know of a reset.
         for (size_t i = 0; i < 2 * WIDTH + 16; i++)
             clock({}, true);
-        for (size_t row = 0; row < frames * WIDTH + 2; row++) {
-            const size_t frame = row / WIDTH, y = row % WIDTH;
+        const size_t height = PERIOD / WIDTH;
+        // Further rows let the last records out.
+        for (size_t row = 0; row < frames * height + 2; row++) {
+            const size_t frame = row / height, y = row % height;
             const uint64_t word = frame < frames && y < SIZE ? rows[frame * SIZE + y] : 0;
             for (size_t x = 0; x < WIDTH; x++) {
                 clock({x < SIZE && (word >> x & 1), x, y}, false);

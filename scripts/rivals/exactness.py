@@ -52,8 +52,8 @@ def check_rival(verilog: str, sheet: Sheet, frames: np.ndarray) -> Checked:
     """All frames back to back through a converted rival."""
     cycle, moments = _run(verilog, sheet, frames)
     # A zone is known to end one row later at the earliest; by then all records of the frame before have left.
-    frame = (cycle - sheet.width) // sheet.width**2
-    last_cell = frame * sheet.width**2 + (sheet.size - 1) * (sheet.width + 1)
+    frame = (cycle - sheet.width) // sheet.period
+    last_cell = frame * sheet.period + (sheet.size - 1) * (sheet.width + 1)
     late = int((cycle - last_cell).max(initial=0))
     return Checked(len(frames), wrong_frames(frame, moments, frames), late, late + sheet.size - 1)
 
@@ -86,7 +86,7 @@ def _sorted(frame: np.ndarray, moments: np.ndarray) -> np.ndarray:
 def _run(verilog: str, sheet: Sheet, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Cycle and (area, sum x, sum y) of every record."""
     netlist = native.Netlist({"top.v": verilog}, READ_VERILOG)
-    defines = {"SIZE": sheet.size, "WIDTH": sheet.width}
+    defines = {"SIZE": sheet.size, "WIDTH": sheet.width, "PERIOD": sheet.period}
     title = f"a rival for {sheet.size}x{sheet.size}"
     library = native.load(native.Model(title, str(_BENCH), netlist.key, lambda: netlist, defines))
     library.bench_new.restype = library.bench_records.restype = ctypes.c_void_p

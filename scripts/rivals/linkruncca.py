@@ -64,7 +64,7 @@ def _constants(sheet: Sheet) -> str:
     area, sum_x, sum_y = sheet.moment_bits
     numbers = {
         "width": sheet.width,
-        "height": sheet.width,
+        "height": sheet.width,  # which it makes no use of
         "x_bits": sheet.place_bits,
         "y_bits": sheet.place_bits,
         # Address bits of its tables, by the rule of its own packages.
@@ -82,6 +82,7 @@ LINK_RUN_CCA = Rival(
     url="https://github.com/Topi-ab/linkruncca",
     commit="a84d236c6e67b3ca511d4dfaa3a11ff605f057de",
     sources=(*_TABLES, *_REST),
-    border=2,
+    blank_columns=2,
+    blank_rows=1,
     convert=convert,
 )

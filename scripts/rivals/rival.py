@@ -20,12 +20,17 @@ class Sheet:
     """A square sheet as a rival is given it, and the widths of a record; the port's names for them."""
 
     size: int
-    border: int
-    """Blank cells after each row, and blank rows after each frame."""
+    blank_columns: int
+    blank_rows: int
 
     @property
     def width(self) -> int:
-        return self.size + self.border
+        return self.size + self.blank_columns
+
+    @property
+    def period(self) -> int:
+        """Clocks from frame to frame."""
+        return self.width * (self.size + self.blank_rows)
 
     @property
     def place_bits(self) -> int:
@@ -48,13 +53,15 @@ class Rival:
     commit: str
     sources: tuple[str, ...]
     """Files of the clone that are converted."""
-    border: int
+    blank_columns: int
+    """Cells after each row, and rows after each frame, that it needs blank."""
+    blank_rows: int
     convert: Callable[[Path, Sheet, bool], str]
     """From a clone: Verilog with the module ``top`` that has the port. If the flag is set its memories give wrong words
     where one is read while it is written, to show whether it uses such words."""
 
     def sheet(self, size: int) -> Sheet:
-        return Sheet(size, self.border)
+        return Sheet(size, self.blank_columns, self.blank_rows)
 
     def digest(self, clone: Path) -> str:
         """SHA-256 of the sources, one after the other."""
