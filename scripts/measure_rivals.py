@@ -52,7 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def check_pages(options: argparse.Namespace) -> None:
-    """Raise :class:`~rivals.rival.RivalError` unless every page has a place for a table, and the tables will be whole."""
+    """Raise :class:`~rivals.rival.RivalError` unless each page has a place for a table, and the tables are whole."""
     for page in options.page:
         if not page.is_file():
             raise RivalError(f"--page is {page}; there is no such page")
