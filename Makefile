@@ -59,25 +59,25 @@ bitstream: $(VENV)/.stamp-boards ## build a bitstream: make bitstream BOARD=iceb
 	$(VENV)/bin/contactfpga build $(call quoted,BOARD) $(if $(value SKIN),--skin $(call quoted,SKIN)) $(ARGS)
 
 bitstreams: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## build one for every board and check size and timing
-	$(PY) -m pytest -m campaign $(ARGS) tests/test_bitstream.py
+	$(PY) -m pytest -m campaign $(ARGS) tests/boards/test_bitstream.py
 
 # A .npz file, or a folder of them.
 ifeq ($(origin RECORDINGS),undefined)
 RECORDINGS := $(wildcard ../shared/data)
 endif
 bitstream-replay: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## simulate what the bitstreams hold: [BOARD=..., SKIN=...] ARGS="--frames 100000"
-	$(PY) -m contactfpga_sim.bitstream_replay $(if $(value BOARD),$(call quoted,BOARD)) \
+	$(PY) -m contactfpga_sim.netlist.replay $(if $(value BOARD),$(call quoted,BOARD)) \
 	    $(if $(value SKIN),--skin $(call quoted,SKIN)) \
 	    $(if $(value RECORDINGS),--recordings $(call quoted,RECORDINGS)) $(ARGS)
 
 constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
-	$(PY) -m contactfpga_hdl.constraints
+	$(PY) -m contactfpga_hdl.board.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
-	$(PY) -m contactfpga_sim.figures README.md docs/use.md
+	$(PY) -m contactfpga_sim.pages.figures README.md docs/use.md
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
-	$(PY) -m contactfpga_sim.size_tables README.md docs/boards.md
+	$(PY) -m contactfpga_sim.pages.size_page README.md docs/boards.md
 
 rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
 	$(PY) scripts/measure_rivals.py --page README.md docs/rivals.md $(ARGS)
@@ -87,16 +87,16 @@ chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, in
 
 chart-page: $(VENV)/.stamp-chart | compiler ## the same for docs/chart.md, with its tables (half an hour)
 	$(VENV)/bin/contactfpga chart --output docs/chart $(ARGS)
-	$(PY) -m contactfpga_sim.chart.tables docs/chart.md
+	$(PY) -m contactfpga_sim.pages.chart_page docs/chart.md
 
 fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
-	$(PY) -m contactfpga_sim.fit.page docs/fit.md
+	$(PY) -m contactfpga_sim.pages.fit_page docs/fit.md
 
 failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
 	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
 
 arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
-	$(PY) -m contactfpga_sim.arm.study docs/arm.md docs/images
+	$(PY) -m contactfpga_sim.pages.arm_page docs/arm.md docs/images
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
@@ -105,7 +105,7 @@ campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long t
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
 
 soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
-	$(PY) -m contactfpga_sim.soak $(ARGS)
+	$(PY) -m contactfpga_sim.board.soak $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (half an hour and more)
@@ -150,26 +150,26 @@ $(VENV)/.stamp-venv:
 # those from the second variable since 25.3, and from the first one before.
 define install
 @echo ">>> Installing contactfpga[$(1)] into $(VENV): $(2)"
-PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt \
+PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
     $(PY) -m pip install --disable-pip-version-check --editable '.[$(1)]'
 @touch $@
 endef
 
-$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+$(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
 	$(call install,sim,downloads about 85 MB unless pip has it cached)
 
-$(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+$(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,boards,downloads about 145 MB unless installed or cached)
 
-$(VENV)/.stamp-chart: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+$(VENV)/.stamp-chart: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
 	$(call install,chart,downloads about 190 MB unless installed or cached)
 
-$(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml constraints.txt | compiler
+$(VENV)/.stamp-test: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
 	$(call install,sim$(,)test,downloads about 180 MB unless installed or cached)
 	@touch $(VENV)/.stamp-sim
 
-$(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+$(VENV)/.stamp-lint: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,cli$(,)lint,downloads about 45 MB unless installed or cached)
 
-$(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml constraints.txt
+$(VENV)/.stamp-docs: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,cli$(,)docs,downloads about 40 MB unless installed or cached)

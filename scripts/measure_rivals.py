@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rivals.campaign import FRAMES, measure
-from rivals.house import DEVICES, SEEDS, ContactFPGAError, PlacementFailed, guarded, update
+from rivals.house import DEVICES, SEEDS, BitstreamFailed, ContactFPGAError, guarded, update
 from rivals.linkruncca import LINK_RUN_CCA
 from rivals.report import TABLES
 from rivals.rival import Rival, RivalError
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for page in options.page:
             page.write_text(update(page.read_text(encoding="utf-8"), ready), encoding="utf-8")
             print(f"measured {page}")
-    except (ContactFPGAError, PlacementFailed, OSError) as error:
+    except (ContactFPGAError, BitstreamFailed, OSError) as error:
         print(f"measure_rivals: {error}", file=sys.stderr)
         return 1
     print(f"{time.monotonic() - began:.0f} s", file=sys.stderr)

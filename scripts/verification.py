@@ -45,7 +45,7 @@ def read_results(path: Path) -> dict[str, Outcome]:
     for case in ElementTree.parse(path).iter("testcase"):
         if "icarus" in case.get("name", ""):
             continue  # a second simulator where it is installed; the page must not depend on that
-        file = case.get("classname", "").split(".")[1]
+        file = case.get("classname", "").split(".")[-1]
         outcome = results.setdefault(f"{file}::{case.get('name', '').split('[')[0]}", Outcome())
         kinds = {child.tag for child in case}
         if kinds & {"failure", "error"}:

@@ -2,7 +2,7 @@
 
 from amaranth.lib import data
 
-from contactfpga.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
+from contactfpga.skin.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
 
 
 def row_layout(derived: Derived) -> data.StructLayout:

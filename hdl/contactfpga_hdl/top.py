@@ -4,20 +4,20 @@ from amaranth.hdl import Module, Mux
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_hdl.adaptive import AdaptiveScanner
-from contactfpga_hdl.audit import Audit, Bitmap
-from contactfpga_hdl.debounce import Debounce
-from contactfpga_hdl.divide import Divide
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.debounce.even import Debounce
+from contactfpga_hdl.debounce.timed import TimedDebounce
 from contactfpga_hdl.label import LABELLERS
-from contactfpga_hdl.link import Link
+from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.request import RequestReader
+from contactfpga_hdl.link.uart import Receiver, Transmitter
 from contactfpga_hdl.payloads import moments_layout
-from contactfpga_hdl.pins import column_pins, connect_pins, row_pins
-from contactfpga_hdl.request import RequestReader
-from contactfpga_hdl.scan import Scanner
-from contactfpga_hdl.serial import Receiver, Transmitter
-from contactfpga_hdl.timed_debounce import TimedDebounce
+from contactfpga_hdl.report.audit import Audit, Bitmap
+from contactfpga_hdl.report.divide import Divide
+from contactfpga_hdl.scan.adaptive import AdaptiveScanner
+from contactfpga_hdl.scan.pins import column_pins, connect_pins, row_pins
+from contactfpga_hdl.scan.raster import Scanner
 
 
 class Top(wiring.Component):

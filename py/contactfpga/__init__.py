@@ -1,8 +1,9 @@
 """Contact zones of a switch-matrix skin, from an FPGA to Python."""
 
-from contactfpga.batch import Batch
-from contactfpga.board import Board
-from contactfpga.driver import open, read_zones
+from contactfpga.driver.board import Board
+from contactfpga.driver.driver import open, read_zones
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.subscription import Subscription
 from contactfpga.errors import (
     BoardClosed,
     BoardSilent,
@@ -17,12 +18,16 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
-from contactfpga.hello import Hello
-from contactfpga.sheet import Sheet
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
-from contactfpga.stats import Stats
-from contactfpga.subscription import Subscription
-from contactfpga.zone import Zone, Zones
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.hello import Hello
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zone, Zones
+
+# The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
+# source tree that was never installed, and out of date in an editable install made before the last release.
+__version__ = "0.2.0"
 
 __all__ = [
     "Batch",
@@ -47,6 +52,8 @@ __all__ = [
     "VersionMismatch",
     "Zone",
     "Zones",
+    "__version__",
+    "examples",
     "open",
     "read_zones",
 ]

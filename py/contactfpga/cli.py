@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import os
 import sys
 from collections.abc import Sequence
 
-from contactfpga import interrupt, limits, terminal
-from contactfpga.commands import cover_flags, fit_flags, numbers
+from contactfpga import __version__
+from contactfpga.commands import cover_flags, fit_flags
+from contactfpga.console import interrupt, numbers, terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.regular import told
-from contactfpga.values import visible_lines
+from contactfpga.inputs.files import told
+from contactfpga.inputs.values import visible_lines
+from contactfpga.skin import limits
 
 _COMMANDS = {
     "zones": "contactfpga.commands.zones",
@@ -21,13 +22,13 @@ _COMMANDS = {
     "doctor": "contactfpga.commands.doctor",
     "build": "contactfpga.commands.build",
     "flash": "contactfpga.commands.flash",
-    "board": "contactfpga_sim.board",
-    "replay": "contactfpga_sim.replay",
+    "board": "contactfpga_sim.board.virtual",
+    "replay": "contactfpga_sim.board.replay",
     "cover": "contactfpga.commands.cover",
-    "chart": "contactfpga_sim.chart.command",
-    "fit": "contactfpga_sim.fit.command",
-    "failures": "contactfpga_sim.failures.command",
-    "arm": "contactfpga_sim.arm.command",
+    "chart": "contactfpga_sim.studies.chart.command",
+    "fit": "contactfpga_sim.studies.fit.command",
+    "failures": "contactfpga_sim.studies.failures.command",
+    "arm": "contactfpga_sim.studies.arm.command",
 }
 """Module of each command; its ``main(args)`` returns the exit status."""
 
@@ -89,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Contact zones of a switch-matrix skin.",
         epilog="Without a board: contactfpga zones sim://",
     )
-    parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     _zones(commands.add_parser("zones", help="show the contact zones, live"))
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))

@@ -1,17 +1,19 @@
 """All that is taken of contactfpga, in one place."""
 
-from contactfpga.derived import Derived
+from contactfpga.console.interrupt import guarded
 from contactfpga.errors import ContactFPGAError
-from contactfpga.interrupt import guarded
 from contactfpga.skin import Skin
-from contactfpga_hdl.build import BuildFailed as PlacementFailed
-from contactfpga_hdl.sizes import DESIGNS, DEVICES, SEEDS, Device, Netlists, Registered, Size, square
-from contactfpga_hdl.synthesis import FAMILIES, NO_COLLISIONS
-from contactfpga_sim import native, shapes, size
-from contactfpga_sim.cells import to_words
-from contactfpga_sim.figures import update
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.board.build import BitstreamFailed
+from contactfpga_hdl.board.sizes import DESIGNS, DEVICES, SEEDS, Device, Netlists, Registered, Size, square
+from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
+from contactfpga_sim.board import native
+from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import all_departures
-from contactfpga_sim.label_bench import LabelBench
+from contactfpga_sim.pages.figures import update
+from contactfpga_sim.scenes import shapes
+from contactfpga_sim.scenes.cells import to_words
+from contactfpga_sim.studies import size
 
 __all__ = [
     "DESIGNS",
@@ -19,12 +21,12 @@ __all__ = [
     "FAMILIES",
     "NO_COLLISIONS",
     "SEEDS",
+    "BitstreamFailed",
     "ContactFPGAError",
     "Derived",
     "Device",
     "LabelBench",
     "Netlists",
-    "PlacementFailed",
     "Registered",
     "Size",
     "Skin",

@@ -10,14 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga import interrupt, outputs, protocol, terminal
-from contactfpga.commands.tables import tables
-from contactfpga.derived import Derived
-from contactfpga.protocol import Frame
+from contactfpga.console import interrupt, outputs, terminal
+from contactfpga.console.tables import tables
 from contactfpga.skin import Skin
-from contactfpga_sim import bench_amaranth, bench_cocotb, bench_native, draw, pool, scenes
-from contactfpga_sim.compare import Mismatch, compare
+from contactfpga.skin.derived import Derived
+from contactfpga.wire import protocol
+from contactfpga.wire.protocol import Frame
+from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
+from contactfpga_sim.cosim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, Trace, predict
+from contactfpga_sim.scenes import drawing
+from contactfpga_sim.scenes import scene as scenes
+from contactfpga_sim.studies import pool
 
 SCANS = 4
 """An untouched scan, then the scene; the first touched frame is complete after the second."""
@@ -153,7 +157,7 @@ def main() -> int:
     outcomes = _run_all(Skin())
     scenes_run = [out for out in outcomes if out.engine == "compiled"]
     console = terminal.console()
-    console.print(draw.in_terminal(scenes_run, terminal.of().unicode))
+    console.print(drawing.in_terminal(scenes_run, terminal.of().unicode))
     wrong = [out for out in outcomes if out.difference or out.frame is None]
     styles = {number: "red" for number, out in enumerate(outcomes) if out in wrong}
     for table in tables(rows_of(outcomes), console.width, keys=3, title=TITLE, texts=(VERDICT,), styles=styles):
@@ -167,7 +171,7 @@ def main() -> int:
         terminal.say(f"{len(wrong)} of {len(outcomes)} runs differ from the golden model")
     else:
         terminal.say(f"All {len(outcomes)} runs agree with the golden model in every clock.")
-    draw.to_file(scenes_run, Skin(), picture)
+    drawing.to_file(scenes_run, Skin(), picture)
     terminal.say(f"Scenes and their zones: {picture}")
     if not wrong:
         terminal.say("Next:\n.venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")

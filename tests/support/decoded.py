@@ -1,8 +1,8 @@
 """What the product reads in bytes that a board sent."""
 
-from contactfpga import framing, protocol
-from contactfpga.hello import KIND_HELLO
-from contactfpga.widths import Widths
+from contactfpga.skin.widths import Widths
+from contactfpga.wire import framing, protocol
+from contactfpga.wire.hello import KIND_HELLO
 
 
 def decoded(data, skin):

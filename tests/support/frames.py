@@ -2,8 +2,8 @@
 
 from wire import Wire
 
-from contactfpga import protocol
-from contactfpga.widths import Widths
+from contactfpga.skin.widths import Widths
+from contactfpga.wire import protocol
 
 
 def moments(rng, skin, zones):

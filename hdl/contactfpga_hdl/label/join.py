@@ -6,9 +6,9 @@ from amaranth.hdl import Array, Module, Mux, Signal
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import Derived
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
-from contactfpga_hdl.stack import Stack
+from contactfpga_hdl.util.stack import Stack
 
 
 class Join(wiring.Component):

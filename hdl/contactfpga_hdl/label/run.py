@@ -15,8 +15,8 @@ from amaranth.hdl import Module
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import Derived
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk

@@ -4,8 +4,8 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import Derived
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
 
 

@@ -4,7 +4,7 @@ import math
 
 from amaranth.lib import data
 
-from contactfpga.derived import Derived
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
 
 

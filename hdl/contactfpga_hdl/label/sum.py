@@ -4,10 +4,10 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.derived import Derived
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
 from contactfpga_hdl.payloads import moments_layout, record_layout
-from contactfpga_hdl.stack import Stack
+from contactfpga_hdl.util.stack import Stack
 
 
 class Sum(wiring.Component):

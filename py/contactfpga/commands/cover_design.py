@@ -6,8 +6,8 @@ import argparse
 import dataclasses
 from typing import Any
 
-from contactfpga import outputs
 from contactfpga.commands.cover import KPA, MM, UNSOLVED, notes, say, table
+from contactfpga.console import outputs
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.design import Candidate, Design, Thin, design, margin
 from contactfpga.cover.sense import Sense

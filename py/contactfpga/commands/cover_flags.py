@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from contactfpga.commands import numbers
+from contactfpga.console import numbers
 
 SWITCH_FORCE_N = 1.0
 SWITCH_AREA_M2 = 12.6e-6

@@ -8,10 +8,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga import driver, ports, terminal
-from contactfpga.driver import Board
+from contactfpga.console import terminal
+from contactfpga.driver import driver, ports
+from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError, ReplayEnded
-from contactfpga.mismatch import report_of
+from contactfpga.skin.mismatch import report_of
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from contactfpga.commands import numbers
+from contactfpga.console import numbers
 
 PERCENT = numbers.number(0, 100, "%", above=True)
 

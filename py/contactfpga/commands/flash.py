@@ -13,7 +13,7 @@ from contactfpga.errors import ContactFPGAError, MissingTool
 
 def main(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_hdl import boards  # the pin tables; nothing that needs more than the host
+    from contactfpga_hdl.board import boards  # the pin tables; nothing that needs more than the host
 
     board = boards.find(args.board)
     file = Path(args.file) if args.file else boards.bitstream_path(board, default_folder(args.board))

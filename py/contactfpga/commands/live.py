@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterator
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from contactfpga import driver, terminal
-from contactfpga.driver import Board
+from contactfpga.console import terminal
+from contactfpga.driver import driver
+from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
-from contactfpga.zone import Zones
+from contactfpga.zones.zone import Zones
 
 REFRESH_US = 66_667
 

@@ -7,13 +7,13 @@ import argparse
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from contactfpga import terminal
-from contactfpga.commands import live, sheet
+from contactfpga.commands import live
 from contactfpga.commands.live import Room
 from contactfpga.commands.zones import LEGEND_LINES, mask, status, styled
-from contactfpga.driver import Board
+from contactfpga.console import drawn_sheet, terminal
+from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.zone import Zones
+from contactfpga.zones.zone import Zones
 
 NAMED = 12
 """Pressed cells whose places are written out."""
@@ -37,5 +37,5 @@ def _render(board: Board, zones: Zones, room: Room) -> RenderableType:
     pressed = terminal.listed("pressed (row, column): ", named or ["none"], room.width)
     below = f"{pressed}\n{status(board, zones, room.width)}"
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
-    drawing = sheet.draw(zones, sheet.scales(zones, left.width, left.height)[0], room.unicode, mask(board))
+    drawing = drawn_sheet.draw(zones, drawn_sheet.scales(zones, left.width, left.height)[0], room.unicode, mask(board))
     return Group(styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))

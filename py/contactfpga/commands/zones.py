@@ -6,10 +6,10 @@ import argparse
 import json
 from typing import TYPE_CHECKING
 
-from contactfpga import driver, terminal
-from contactfpga.commands import sheet
+from contactfpga.console import drawn_sheet, terminal
+from contactfpga.driver import driver
 from contactfpga.errors import ContactFPGAError
-from contactfpga.zone import Zones
+from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -52,14 +52,14 @@ def render(board: driver.Board, zones: Zones, room: Room) -> RenderableType:
     listed = table(zones, left.height)
     across = listed.__rich_measure__(room.console, room.console.options).maximum
     scale, beside = _layout(zones, left, across)
-    drawing = sheet.draw(zones, scale, room.unicode, mask(board))
+    drawing = drawn_sheet.draw(zones, scale, room.unicode, mask(board))
     shown: list[RenderableType]
     if beside:
         both = Table.grid(padding=(0, BESIDE))
         both.add_row(styled(drawing), listed)
         shown = [both]
     else:
-        high = sheet.size(zones, scale)[1]
+        high = drawn_sheet.size(zones, scale)[1]
         shown = [styled(drawing), table(zones, left.without(high).height)]
     return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
@@ -70,10 +70,10 @@ LEGEND_LINES = 2
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
     """The scale of the drawing, and whether the table stands beside it. Beside it is better than large: it is read
     with the sheet, and stays in sight."""
-    for scale in sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
-        if sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
+    for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
+        if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
             return scale, True
-    return sheet.scales(zones, room.width, room.height)[0], False
+    return drawn_sheet.scales(zones, room.width, room.height)[0], False
 
 
 def table(zones: Zones, lines: int | None = None) -> Table:
@@ -97,7 +97,7 @@ TABLE_LINES = 6
 """Of a table: title, head, rules and caption."""
 
 
-def mask(board: driver.Board) -> sheet.Mask:
+def mask(board: driver.Board) -> drawn_sheet.Mask:
     """The switches that the board's Skin leaves out; none where only its hello is known."""
     try:
         return board.skin.mask
@@ -105,7 +105,7 @@ def mask(board: driver.Board) -> sheet.Mask:
         return ()
 
 
-def styled(drawing: sheet.Drawing) -> Text:
+def styled(drawing: drawn_sheet.Drawing) -> Text:
     """The drawing in its styles."""
     from rich.text import Text
 
@@ -114,7 +114,7 @@ def styled(drawing: sheet.Drawing) -> Text:
         if number:
             text.append("\n")
         for character, kind in zip(characters, kinds):
-            text.append(character, sheet.STYLES[kind])
+            text.append(character, drawn_sheet.STYLES[kind])
     return text
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown
 
 MAX_LENGTH_M = 1.0
 """No thickness, pitch, offset or radius of a cover on a robot is longer: who writes 5 means mm."""

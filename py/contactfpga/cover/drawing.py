@@ -149,7 +149,7 @@ def study(path: Path) -> Path:
 
 
 def _rules(place: Any) -> None:
-    from contactfpga.cover import study as measured
+    from contactfpga.cover import formula_study as measured
 
     found = []
     for rules, colour in ((measured.RULES, COLOURS["halfspace"]), (measured.FAILING, COLOURS["bonded"])):
@@ -177,7 +177,7 @@ def _rules(place: Any) -> None:
 
 
 def _models(place: Any) -> None:
-    from contactfpga.cover import study as measured
+    from contactfpga.cover import formula_study as measured
 
     for number, model in enumerate(measured.LADDER):
         for ball, mark in zip(measured.BALLS.values(), ("o", "x")):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.cover.answer import CoverError, positive
-from contactfpga.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from contactfpga.derived import CHECK_BYTES, Derived
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import CHECK_BYTES, Derived
 
 AROUND_S = 3e-6
 """Sample, labeller, packer and stop bit, in s."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from contactfpga.cover.answer import CoverError
 from contactfpga.cover.solve import Floats
-from contactfpga.regular import open_regular
-from contactfpga.values import shown
+from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.values import shown
 
 
 class Line(NamedTuple):

@@ -12,7 +12,7 @@ from contactfpga.cover import hertz, medium, point
 from contactfpga.cover.answer import CoverError, not_negative, positive
 from contactfpga.cover.patch import Ellipse, Part
 from contactfpga.cover.switch import Switch
-from contactfpga.values import is_finite, shown
+from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
 """``patch``: a switch closes when it lies under the contact's shape, whatever the force.

@@ -6,7 +6,6 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from contactfpga import tomlfile
 from contactfpga.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
 from contactfpga.cover.elastic import THICKNESS_RULES
 from contactfpga.cover.foams import FOAMS, Foam, find
@@ -14,8 +13,9 @@ from contactfpga.cover.impact import Arm
 from contactfpga.cover.medium import MEDIA
 from contactfpga.cover.sense import CONTACTS, TOLERANCE, Model
 from contactfpga.cover.switch import Switch
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin import Skin
-from contactfpga.values import is_finite, shown
 
 _NEEDED = object()
 

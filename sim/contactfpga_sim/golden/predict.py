@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import adaptive, debounce, divide, label, request, scan, serial
+from contactfpga_sim.golden import adaptive, debounce, divide, label, request, scan, uart
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
@@ -33,7 +33,7 @@ def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
         packer.take(handed.take(one, cells))
     link.advance(cycles)
     trace.bytes = link.bytes
-    trace.line = serial.line(link.bytes, known.bit_clocks)
+    trace.line = uart.line(link.bytes, known.bit_clocks)
     trace.contact = contact
     return trace.until(cycles)
 

@@ -6,7 +6,7 @@ import bisect
 import dataclasses
 from collections.abc import Iterable
 
-from contactfpga_sim.golden import serial
+from contactfpga_sim.golden import uart
 from contactfpga_sim.golden.packet import Packet, check
 
 KIND = 5
@@ -61,7 +61,7 @@ def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int) -> Heard:
     """Requests among (cycle, bytes), each of which begin at the pin back to back in that cycle."""
     found = Heard([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
-    for byte in serial.received(received, bit_clocks):
+    for byte in uart.received(received, bit_clocks):
         if packet is not None and 1 <= len(packet) <= 3 and found.numbers and found.numbers[-1][1]:
             found.numbers.append((byte.first_bit + 1, 0))
         if byte.value == 0:

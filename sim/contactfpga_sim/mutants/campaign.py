@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from contactfpga import interrupt
+from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_sim.mutants import netlist, proof, trial
 from contactfpga_sim.mutants.netlist import STAGES, Mutant

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contactfpga.skin import Skin
-from contactfpga_sim import board, native
+from contactfpga_sim.board import compiled, native
 
 STAGES = {
     "scan": "scan",
@@ -56,7 +56,7 @@ def candidates(skin: Skin) -> list[Mutant]:
     """Every mutant of the stages of a Skin's board."""
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as name:
         folder = Path(name)
-        (folder / "model.il").write_text(_with_places(native.rtlil(board.model_of(skin).elaborate(), sources=True)))
+        (folder / "model.il").write_text(_with_places(native.rtlil(compiled.model_of(skin).elaborate(), sources=True)))
         commands = ("read_rtlil model.il", native.FLATTEN, PREPARE, f"mutate -list {_ALL} -o list.txt")
         native.yosys("; ".join(commands), folder)
         lines = (folder / "list.txt").read_text().splitlines()
@@ -69,8 +69,8 @@ def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
 
 
 def model(skin: Skin, mutants: Sequence[Mutant]) -> native.Model:
-    """The board in which ``Board.restart(n)`` picks ``mutants[n - 1]``."""
-    plain = board.model_of(skin)
+    """The board in which ``CompiledBoard.restart(n)`` picks ``mutants[n - 1]``."""
+    plain = compiled.model_of(skin)
     return dataclasses.replace(
         plain,
         title=f"{len(mutants)} mutants of {plain.title}",

@@ -21,7 +21,7 @@ from types import TracebackType
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga_sim import board, native
+from contactfpga_sim.board import compiled, native
 from contactfpga_sim.mutants import aig
 from contactfpga_sim.mutants.netlist import PREPARE, Mutant, switches
 from contactfpga_sim.mutants.solve import reached
@@ -56,7 +56,7 @@ class Prover:
         self._mutants = list(mutants)
         self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
         folder = Path(self._folder.name)
-        (folder / "model.il").write_text(native.rtlil(board.model_of(skin).elaborate()))
+        (folder / "model.il").write_text(native.rtlil(compiled.model_of(skin).elaborate()))
         native.yosys("\n".join(("read_rtlil model.il", native.FLATTEN, PREPARE, *switches(mutants), _GATES)), folder)
         self._circuit = aig.read(folder / "design.aig", folder / "names.txt")
         self._graph = aig.Graph(len(self._circuit.inputs) + len(self._circuit.latches))

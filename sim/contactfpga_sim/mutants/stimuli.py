@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim import covering, shapes
+from contactfpga_sim.cosim import covering
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.hello import hello
 from contactfpga_sim.golden.request import requests
 from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.scenes import shapes
 
 # Slow clocks bring what comes once in half a second within reach.
 SKINS = {

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim import bench_native, golden, native
-from contactfpga_sim.board import Board
-from contactfpga_sim.compare import compare
+from contactfpga_sim import golden
+from contactfpga_sim.board import native
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.cosim import bench_native
+from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.mutants.stimuli import Stimulus
 
 OBSERVED = (*golden.BOUNDARIES, "driven")
@@ -24,17 +26,17 @@ Events = Mapping[str, np.ndarray]
 def survivors(skin: Skin, model: native.Model, numbers: Iterable[int], stimuli: Iterable[Stimulus]) -> list[int]:
     """The mutants that no stimulus tells from the gateware as it should be."""
     left = list(numbers)
-    with Board(skin, OBSERVED, model) as board:
+    with CompiledBoard(skin, OBSERVED, model) as board:
         for stimulus in stimuli:
             events = expected(board, stimulus)
             left = [number for number in left if killed_at(board, number, stimulus, events) is None]
     return left
 
 
-def expected(board: Board, stimulus: Stimulus) -> Events:
+def expected(board: CompiledBoard, stimulus: Stimulus) -> Events:
     """What the board without a mutant does, after it was compared with the golden model in every clock.
 
-    Raises :class:`contactfpga_sim.compare.Mismatch` where they differ.
+    Raises :class:`contactfpga_sim.cosim.compare.Mismatch` where they differ.
     """
     board.restart()
     _play(board, stimulus, stimulus.cycles)
@@ -47,7 +49,7 @@ def expected(board: Board, stimulus: Stimulus) -> Events:
     return events
 
 
-def killed_at(board: Board, number: int, stimulus: Stimulus, events: Events) -> str | None:
+def killed_at(board: CompiledBoard, number: int, stimulus: Stimulus, events: Events) -> str | None:
     """The first boundary at which mutant ``number`` does something else than ``events``; None where it never does."""
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
@@ -60,7 +62,7 @@ def killed_at(board: Board, number: int, stimulus: Stimulus, events: Events) -> 
     return None
 
 
-def _play(board: Board, stimulus: Stimulus, until: int) -> None:
+def _play(board: CompiledBoard, stimulus: Stimulus, until: int) -> None:
     for start, cycles in stimulus.noise:
         if board.cycle <= start < until:
             bench_native.play(board, stimulus.timeline, start)

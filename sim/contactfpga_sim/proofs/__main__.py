@@ -4,7 +4,7 @@ import argparse
 import sys
 import time
 
-from contactfpga import interrupt
+from contactfpga.console import interrupt
 from contactfpga_sim.proofs import (
     adaptive,
     divide,
@@ -16,8 +16,8 @@ from contactfpga_sim.proofs import (
     records,
     scan,
     seek,
-    serial,
     streams,
+    uart,
 )
 from contactfpga_sim.proofs.case import Case
 
@@ -33,7 +33,7 @@ CASES: tuple[Case, ...] = (
     *pack.CASES,
     *link.CASES,
     *odometer.CASES,
-    *serial.CASES,
+    *uart.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

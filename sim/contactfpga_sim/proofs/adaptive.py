@@ -3,8 +3,8 @@
 from amaranth.hdl import Mux, Signal
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.adaptive import AdaptiveScanner
-from contactfpga_hdl.popcount import popcount
+from contactfpga_hdl.scan.adaptive import AdaptiveScanner
+from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

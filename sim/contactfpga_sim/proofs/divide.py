@@ -5,8 +5,8 @@ from functools import partial
 from amaranth.hdl import Mux, Signal, Value
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.divide import Divider
 from contactfpga_hdl.payloads import barycenter_layout, moments_layout
+from contactfpga_hdl.report.divide import Divider
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

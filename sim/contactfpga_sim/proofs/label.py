@@ -10,7 +10,7 @@ from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk
-from contactfpga_hdl.stack import Stack
+from contactfpga_hdl.util.stack import Stack
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Proof

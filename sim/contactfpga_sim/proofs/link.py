@@ -5,11 +5,11 @@ from unittest import mock
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
 
-from contactfpga import protocol
-from contactfpga.derived import CHECK_BYTES
 from contactfpga.skin import Skin
-from contactfpga_hdl.link import Link
-from contactfpga_hdl.odometer import LIVE_DIGITS
+from contactfpga.skin.derived import CHECK_BYTES
+from contactfpga.wire import protocol
+from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.odometer import LIVE_DIGITS
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

@@ -4,8 +4,8 @@ from functools import partial
 
 from amaranth.hdl import Cat, Const, Signal
 
-from contactfpga.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
-from contactfpga_hdl.odometer import LIVE_DIGITS, Odometer
+from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
+from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Proof

@@ -4,9 +4,9 @@ from functools import partial
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
 
-from contactfpga.derived import Derived
 from contactfpga.skin import Skin
-from contactfpga_hdl.pack import Packer
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.link.pack import Packer
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

@@ -4,7 +4,7 @@ from functools import partial
 
 from amaranth.hdl import Cat, Const, Mux, Signal
 
-from contactfpga.derived import Derived
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label import RunLabeller
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.steps import place_of

@@ -5,8 +5,8 @@ from functools import partial
 from amaranth.hdl import Cat, Mux, Signal
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.pins import DirectColumns, DirectRows
-from contactfpga_hdl.scan import Scanner
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows
+from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

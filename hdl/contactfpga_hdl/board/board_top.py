@@ -1,0 +1,83 @@
+"""A Skin's gateware on the pins of a board."""
+
+import importlib
+
+from amaranth.build import Attrs, Pins, Resource
+from amaranth.hdl import ClockDomain, Elaboratable, Module
+from amaranth.lib import io
+from amaranth.lib.wiring import Out
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.board.boards import BoardSpec
+from contactfpga_hdl.board.clock import PllClock
+from contactfpga_hdl.scan.pins import column_pins, row_pins
+from contactfpga_hdl.top import Top
+
+
+def platform_for(board: BoardSpec):
+    """A fresh platform of the board, as amaranth-boards has it."""
+    module, _, name = board.platform.partition(":")
+    return getattr(importlib.import_module(module), name)()
+
+
+class BoardTop(Elaboratable):
+    """Requests the pins and wires the Skin's :class:`Top` to them.
+
+    The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs: the diode at each switch keeps two of
+    them apart. Without diodes a row is low or floats, since two of them may meet.
+    """
+
+    def __init__(self, board: BoardSpec, skin: Skin):
+        self.board = board
+        self.skin = skin
+        self._sheet = row_pins(skin) | column_pins(skin)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.core = core = Top(self.skin)
+        if self.skin.clock_hz != self.board.clock_hz:
+            m.domains.sync = ClockDomain()
+            m.submodules.clock = PllClock(self.board, self.skin.clock_hz)
+        platform.add_resources(self._resources())
+        uart = platform.request("uart", 0, dir="-")
+        m.submodules.rx = rx = io.Buffer("i", uart.rx)
+        m.submodules.tx = tx = io.Buffer("o", uart.tx)
+        m.submodules.contact = contact = io.Buffer("o", platform.request("contact", 0, dir="-"))
+        self._connect_sheet(m, platform, core)
+        m.d.comb += [
+            contact.o.eq(core.contact),
+            tx.o.eq(core.tx),
+            core.rx.eq(rx.i),
+        ]
+        if self.board.held_high:
+            port = platform.request("held_high", 0, dir="-")
+            m.submodules.held_high = held_high = io.Buffer("o", port)
+            m.d.comb += held_high.o.eq(~0)
+        return m
+
+    def _connect_sheet(self, m, platform, core):
+        for name, member in self._sheet.items():
+            if name == "rows" and self.skin.ghosts:
+                self._connect_floating(m, platform.request(name, 0, dir="-"), core.rows)
+                continue
+            direction = "o" if member.flow == Out else "i"
+            m.submodules[name] = buffer = io.Buffer(direction, platform.request(name, 0, dir="-"))
+            m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
+
+    def _connect_floating(self, m, port, rows):
+        for row in range(self.skin.rows):
+            m.submodules[f"row_{row}"] = buffer = io.Buffer("o", port[row])
+            m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
+
+    def _resources(self):
+        board, skin = self.board, self.skin
+        attrs = Attrs(**board.standard)
+        resources = [Resource("contact", 0, Pins(board.contact, dir="o"), attrs)]
+        for name, pins in board.pins(skin).items():
+            direction = "o" if self._sheet[name].flow == Out else "i"
+            # Only what hangs on switches needs a level of its own; a shift register drives its data pin.
+            pulls = board.pulls["col2row" if skin.selects_low else "row2col"] if name == "columns" else {}
+            resources.append(Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **pulls)))
+        if board.held_high:
+            resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))
+        return resources

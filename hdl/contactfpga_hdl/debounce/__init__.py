@@ -1,0 +1,1 @@
+"""Contact bounce, kept from the later stages."""

@@ -1,0 +1,1 @@
+"""Frames to bytes to the wire, and requests from it."""

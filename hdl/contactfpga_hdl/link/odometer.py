@@ -1,0 +1,67 @@
+"""Counters that go on for years, in the digits in which a hello tells them."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import memory, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS, STATE_DIGITS
+
+LIVE_DIGITS = 2
+"""Low digits of the count of sent frames, which the link keeps itself: more than a frame's sequence number has."""
+
+_EPOCH = SENT_DIGITS
+_LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
+
+
+class Odometer(wiring.Component):
+    """The high digits of the frames sent, and all of the epoch, at their places in a hello's state.
+
+    ``sent`` and ``epoch`` are high for a clock for one more; each carry takes two clocks per digit that changes. None
+    begins while ``hold`` is high; one of each kind may wait. ``digit`` is that of the ``place`` a clock before, when no
+    carry is under way, and 0 at places of other counters.
+    """
+
+    def __init__(self):
+        super().__init__(
+            {
+                "sent": In(1),
+                "epoch": In(1),
+                "hold": In(1),
+                "place": In(range(STATE_DIGITS)),
+                "digit": Out(DIGIT_BITS),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.digits = digits = memory.Memory(shape=DIGIT_BITS, depth=STATE_DIGITS, init=[])
+        read, write = digits.read_port(), digits.write_port()
+        sent_waits = Signal()
+        epoch_waits = Signal()
+        at = Signal.like(self.place)
+        m.d.comb += [
+            self.digit.eq(read.data),
+            read.addr.eq(self.place),
+            write.addr.eq(at),
+            write.data.eq(read.data + 1),
+        ]
+        with m.FSM(name="carry"):
+            with m.State("REST"):
+                with m.If((sent_waits | epoch_waits) & ~self.hold):
+                    m.d.sync += at.eq(Mux(sent_waits, LIVE_DIGITS, _EPOCH))
+                    m.d.sync += [sent_waits.eq(0), epoch_waits.eq(epoch_waits & sent_waits)]
+                    m.next = "READ"
+            with m.State("READ"):
+                m.d.comb += read.addr.eq(at)
+                m.next = "WRITE"
+            with m.State("WRITE"):
+                m.d.comb += write.en.eq(1)
+                m.d.sync += at.eq(at + 1)
+                m.next = "REST"
+                with m.If(read.data.all() & (at != _LAST[0]) & (at != _LAST[1])):
+                    m.next = "READ"
+        with m.If(self.sent):
+            m.d.sync += sent_waits.eq(1)
+        with m.If(self.epoch):
+            m.d.sync += epoch_waits.eq(1)
+        return m

@@ -1,0 +1,109 @@
+"""What a row holds and whether it changed, seen before the labeller and apart from it."""
+
+import math
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import memory, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import moments_layout, row_layout
+from contactfpga_hdl.util.popcount import popcount
+
+GROUPS = 4
+"""The most groups of a row. Each of a row's steps may hold up the counting, and the next row comes six clocks later."""
+
+
+class Tally(wiring.Component):
+    """Moments of each row, a group of columns a clock.
+
+    The groups' shares come from two clocks behind ``taken`` on, one in each clock without ``hold``; before and after,
+    they are zero. A row has at most :data:`GROUPS`, an empty one none. Only empty ones may be taken until ``busy``
+    falls, behind the last group.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.derived = Derived(skin)
+        self._columns = 4  # of a group; a power of two
+        while skin.columns > GROUPS * self._columns:
+            self._columns *= 2
+        self._groups = math.ceil(skin.columns / self._columns)
+        super().__init__(
+            {
+                "taken": In(1),
+                "row": In(row_layout(self.derived)),
+                "moments": Out(moments_layout(self.derived)),
+                "hold": In(1),
+                "busy": Out(1),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        cells = Signal(self._groups * self._columns)
+        left = Signal(range(self._groups + 2))  # groups to come, and the one that is being added
+        y = Signal(range(max(2, self.skin.rows)))
+        y_next = Signal.like(y)
+        first = Signal(range(max(2, self._groups * self._columns)))  # column of the group
+        group = cells[: self._columns]
+        area = Signal(range(self._columns + 1))
+        offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
+        first_counted = Signal.like(first)
+        with m.If(self.taken):
+            m.d.sync += y_next.eq(Mux(self.row.last, 0, y_next + 1))
+        with m.If(self.taken & self.row.cells.any()):
+            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(y_next)]
+        with m.Elif(self.busy & ~self.hold):
+            m.d.sync += [
+                cells.eq(cells >> self._columns),
+                first.eq(first + self._columns),
+                left.eq(left - 1),
+                area.eq(popcount(group)),
+                offsets.eq(_count_offsets(group)),
+                first_counted.eq(first),
+            ]
+        m.d.comb += [
+            self.busy.eq(left != 0),
+            self.moments.area.eq(area),
+            self.moments.sum_x.eq(area * first_counted + offsets),
+            self.moments.sum_y.eq(area * y),
+        ]
+        return m
+
+
+class Change(wiring.Component):
+    """Whether any row since ``clear`` differs from the same row a frame before; one clock after ``taken``."""
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        super().__init__({"taken": In(1), "row": In(row_layout(Derived(skin))), "clear": In(1), "changed": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.before = before = memory.Memory(shape=self.skin.columns, depth=self.skin.rows, init=[])
+        read, write = before.read_port(), before.write_port()
+        y = Signal(range(self.skin.rows))
+        following = Mux(self.row.last, 0, y + 1)[: len(y)]
+        m.d.comb += [
+            read.addr.eq(Mux(self.taken, following, y)),  # rows may follow each other without a pause
+            write.addr.eq(y),
+            write.data.eq(self.row.cells),
+            write.en.eq(self.taken),
+        ]
+        with m.If(self.clear):
+            m.d.sync += self.changed.eq(0)
+        with m.If(self.taken):
+            m.d.sync += y.eq(following)
+            with m.If(read.data != self.row.cells):
+                m.d.sync += self.changed.eq(1)
+        return m
+
+
+def _count_offsets(bits):
+    """The numbers of the bits that are set, summed: for each bit of the numbers, how many have it."""
+    return sum(
+        popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
+        for place in range((len(bits) - 1).bit_length())
+    )

@@ -1,0 +1,99 @@
+"""Chains of shift registers between the board's pins and a sheet with more wires than those.
+
+All pins come from registers. A bit takes ``Derived.shift_clocks``; the shift clock is high in one half of it. In
+docs/boards.md stand the wiring, and the chips' times against these halves.
+"""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
+
+
+class RowChain(wiring.Component):
+    """Rows on chains of 74HC595.
+
+    A pattern goes in whole, highest line of each chain first, while the one before it is driven. What the chips hold at
+    power-up, or after a disturbance, is therefore gone with the next pattern. The latch rises once it is in; by then no
+    row may be driven, or the same ones, and the enable pin makes a row begin and end.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        super().__init__(row_driver(skin))
+
+    def elaborate(self, platform):
+        m = Module()
+        derived = Derived(self.skin)
+        lines, clocks = derived.row_chain_lines, derived.shift_clocks
+        levels = ~self.pattern if self.skin.selects_low else self.pattern
+        busy = Signal()
+        left = Signal(range(lines + 1), init=lines)  # bits to shift; then the latch takes as long as one
+        clock = Signal(range(clocks))
+        latching = left == 0
+        with m.If(self.shift | busy):
+            m.d.sync += [busy.eq(1), clock.eq(clock + 1), self.pins.row_latch.eq(latching)]
+            m.d.sync += self.pins.row_clock.eq(~latching & (clock >= clocks - clocks // 2))
+            with m.If(clock == clocks - 1):
+                m.d.sync += [clock.eq(0), left.eq(Mux(latching, lines, left - 1)), busy.eq(~latching)]
+            for chain in range(self.skin.row_chains):
+                part = levels[chain * lines : (chain + 1) * lines]
+                m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
+        with m.Else():
+            m.d.sync += self.pins.row_latch.eq(0)
+        if self.skin.scan == "adaptive":  # a pattern that was shifted anew, for idle rows, may not be in when they hit
+            with m.If(self.release):
+                m.d.sync += [busy.eq(0), left.eq(lines), clock.eq(0)]
+        with m.If(self.drive):
+            m.d.sync += self.pins.row_enable_n.eq(0)
+        with m.Elif(self.release):
+            m.d.sync += self.pins.row_enable_n.eq(1)
+        return m
+
+
+class ColumnChain(wiring.Component):
+    """Columns on chains of 74HC165.
+
+    The load pulse takes them all at once, its last clock is the sample. The first line of each chain is there without
+    a shift, each following one after a rising edge; a bit is read in the last clock before the next edge.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        super().__init__(column_reader(skin))
+
+    def elaborate(self, platform):
+        m = Module()
+        derived = Derived(self.skin)
+        lines, clocks = derived.column_chain_lines, derived.shift_clocks
+        busy = Signal()
+        bit = Signal(range(lines + 1))  # 0 is the load pulse
+        clock = Signal(range(clocks))
+        ends = Signal()
+        last = bit == lines
+        # The pins lag this count by their register, what comes back by that and the synchroniser's two stages.
+        taken, done = Signal(3), Signal(3)
+        m.d.sync += [taken.eq(Cat(ends & (bit != 0), taken)), done.eq(Cat(ends & last, done))]
+        m.d.comb += self.done.eq(done[-1])
+        with m.If(self.begin | busy):
+            m.d.comb += ends.eq(clock == clocks - 1)
+            m.d.sync += [busy.eq(~(ends & last)), clock.eq(Mux(ends, 0, clock + 1))]
+            m.d.sync += self.pins.column_load_n.eq(bit != 0)
+            m.d.sync += self.pins.column_clock.eq((bit > 1) & (clock < clocks // 2))
+            with m.If(ends):
+                m.d.sync += bit.eq(Mux(last, 0, bit + 1))
+        synced = Signal(self.skin.column_chains)
+        released = released_levels(self.skin, self.skin.column_chains)
+        m.submodules.sync = FFSynchronizer(self.pins.column_data, synced, init=released)
+        chains = []
+        for line in synced:
+            before = Signal(lines - 1)
+            word = Cat(before, line)
+            with m.If(taken[-1]):
+                m.d.sync += before.eq(word[1:])
+            chains.append(word)
+        m.d.comb += self.levels.eq(Cat(chains))
+        return m

@@ -1,0 +1,49 @@
+"""Columns that read pressed while no row is driven."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import STUCK_BITS, STUCK_MAX
+from contactfpga_hdl.util.popcount import popcount
+
+
+def present(skin: Skin, row: int) -> int:
+    """Columns, as bits, in which this row has a switch that is not masked."""
+    return sum(1 << column for column in range(skin.columns) if (row, column) not in skin.mask)
+
+
+def anywhere(skin: Skin) -> int:
+    """Columns, as bits, in which any row has a switch that is not masked."""
+    word = 0
+    for row in range(skin.rows):
+        word |= present(skin, row)
+    return word
+
+
+class Stuck(wiring.Component):
+    """How many columns read pressed in any ``released`` clock up to ``take``; ``count`` is there two clocks after that.
+
+    Columns that are masked in every row do not count.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        super().__init__(
+            {"columns": In(skin.columns), "released": In(1), "take": In(1), "count": Out(STUCK_BITS)},
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        seen = Signal(self.skin.columns)
+        with m.If(self.released):
+            m.d.sync += seen.eq(seen | self.columns & anywhere(self.skin))
+        # Counted in two clocks, as 64 columns are too many for one.
+        groups = [seen[first : first + 8] for first in range(0, self.skin.columns, 8)]
+        counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
+        with m.If(self.take):
+            m.d.sync += [seen.eq(0), *(count.eq(popcount(group)) for count, group in zip(counts, groups))]
+        total = popcount(counts)
+        m.d.sync += self.count.eq(Mux(total > STUCK_MAX, STUCK_MAX, total))
+        return m

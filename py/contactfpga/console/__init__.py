@@ -1,0 +1,1 @@
+"""What commands share: terminal, interrupts, numbers on the command line, tables, places for output."""

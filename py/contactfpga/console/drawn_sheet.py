@@ -1,0 +1,183 @@
+"""A sheet drawn with characters, row 0 on top: what the board tells of it, and no more.
+
+A board that sends cells has them drawn. One that sends zones says how large each is and where its barycenter lies; of
+its shape it says nothing, so a thin circle shows the size, and the line below says what it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from contactfpga.zones.zone import Zones
+
+Mask = Iterable[tuple[int, int]]
+
+SCALES = (4, 2, 1)
+"""Dots from a cell to the next, the largest drawing first. A character holds 2 x 4 dots, as those of braille do."""
+
+ACROSS, DOWN = 2, 4
+
+FREE, CELL, CIRCLE, CENTER, MASKED = range(5)
+"""What a character shows."""
+
+STYLES = {FREE: "dim", CELL: "", CIRCLE: "cyan", CENTER: "bold", MASKED: ""}
+
+_BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_HALVES = np.array([["·", "▄"], ["▀", "█"]])
+_SIGNS = {
+    True: {FREE: "·", CELL: "█", CIRCLE: "⠒", CENTER: "◎", MASKED: " "},
+    False: {FREE: ".", CELL: "#", CIRCLE: "o", CENTER: "X", MASKED: " "},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Drawing:
+    """Characters, what each of them shows, and a line that says how to read them."""
+
+    characters: np.ndarray
+    """(lines, columns) of one character each."""
+    kinds: np.ndarray
+    legend: str
+
+    @property
+    def text(self) -> str:
+        """The lines, with nothing at their ends."""
+        return "\n".join("".join(line).rstrip() for line in self.characters)
+
+
+def scales(zones: Zones, width: int, height: int | None) -> list[int]:
+    """Those of the :data:`SCALES` at which the sheet fits; the smallest one if none does."""
+    sizes = ((scale, *size(zones, scale)) for scale in SCALES)
+    fit = [scale for scale, wide, high in sizes if wide <= width and (height is None or high <= height)]
+    return fit or [SCALES[-1]]
+
+
+def size(zones: Zones, scale: int) -> tuple[int, int]:
+    """Columns and lines of text."""
+    return -(-zones.sheet.columns * scale // ACROSS), -(-zones.sheet.rows * scale // DOWN)
+
+
+def draw(zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = ()) -> Drawing:
+    """The sheet of one frame: its pressed cells if the board sends them, else its zones' barycenters and sizes.
+    ``mask``: the (row, column) of switches that are known to be absent."""
+    wide, high = size(zones, scale)
+    signs = _SIGNS[unicode]
+    characters = np.full((high, wide), signs[FREE])
+    kinds = np.full((high, wide), FREE)
+    if scale == SCALES[0]:
+        characters[:, 1::2] = " "  # one dot a cell
+    if zones.cells is not None:
+        dots = _spread(zones.cells, scale)
+        shown, kind = _cells(dots, scale, signs[CELL], unicode), CELL
+    else:
+        dots = _circles(zones, scale)
+        shown, kind = _braille(dots) if unicode else np.full((high, wide), signs[CIRCLE]), CIRCLE
+    some = _blocks(dots).any(axis=(2, 3))
+    characters[some], kinds[some] = shown[some], kind
+    masked = _masked(zones, mask)
+    if masked.any():
+        nothing = _blocks(_spread(masked, scale), filled=True).all(axis=(2, 3))
+        characters[nothing], kinds[nothing] = signs[MASKED], MASKED
+    if zones.cells is None:
+        for x, y in _centers(zones, scale):
+            characters[y, x], kinds[y, x] = signs[CENTER], CENTER
+    return Drawing(characters, kinds, _legend(zones.cells is None, bool(masked.any()), scale, unicode))
+
+
+def _masked(zones: Zones, mask: Mask) -> np.ndarray:
+    masked = np.zeros((zones.sheet.rows, zones.sheet.columns), bool)
+    for row, column in mask:
+        masked[row, column] = True
+    return masked
+
+
+def _legend(circles: bool, masked: bool, scale: int, unicode: bool) -> str:
+    signs = _SIGNS[unicode]
+    rows, columns = DOWN // scale, ACROSS // scale
+    if circles:
+        parts = [f"{signs[CENTER]} barycenter", f"{signs[CIRCLE]} circle of the zone's area, not its cells"]
+    elif scale == SCALES[-1] and unicode:
+        parts = ["a dot is a pressed cell", f"{signs[FREE]} none pressed"]
+    else:
+        some = "" if unicode or scale == SCALES[0] else ", one of them at least"
+        parts = [f"{signs[CELL]} pressed{some}", f"{signs[FREE]} not pressed"]
+    if masked:
+        parts.append("blank: no switch")
+    if scale < SCALES[0]:
+        parts.append(f"a character is {rows} rows x {columns} column{'s' if columns > 1 else ''}")
+    return "; ".join(parts)
+
+
+def _cells(dots: np.ndarray, scale: int, full: str, unicode: bool) -> np.ndarray:
+    if scale == 1 and unicode:
+        return _braille(dots)
+    if scale == 2 and unicode:
+        upper, lower = (_blocks(dots)[:, :, half, 0].astype(int) for half in (0, 2))
+        halves: np.ndarray = _HALVES[upper, lower]
+        return halves
+    blocks = _blocks(dots)
+    return np.full(blocks.shape[:2], full)
+
+
+def _spread(cells: np.ndarray, scale: int) -> np.ndarray:
+    """Each cell as scale x scale dots."""
+    spread: np.ndarray = cells.repeat(scale, axis=0).repeat(scale, axis=1)
+    return spread
+
+
+def _blocks(dots: np.ndarray, filled: bool = False) -> np.ndarray:
+    """(lines, columns, 4, 2): the dots of each character; what lies beyond the sheet is ``filled`` or not."""
+    high, wide = dots.shape
+    padded = np.pad(dots, ((0, -high % DOWN), (0, -wide % ACROSS)), constant_values=filled)
+    blocks: np.ndarray = padded.reshape(-(-high // DOWN), DOWN, -(-wide // ACROSS), ACROSS).swapaxes(1, 2)
+    return blocks
+
+
+def _braille(dots: np.ndarray) -> np.ndarray:
+    codes = 0x2800 + (_blocks(dots) * _BRAILLE).sum(axis=(2, 3))
+    return np.array([[chr(code) for code in line] for line in codes])
+
+
+def _circles(zones: Zones, scale: int) -> np.ndarray:
+    """(dots down, dots across) bool: for each zone a circle of its area about its barycenter."""
+    sheet = zones.sheet
+    dots = np.zeros((sheet.rows * scale, sheet.columns * scale), bool)
+    high, wide = dots.shape
+    for (_, _, area_mm2), (x, y) in zip(_placed(zones), _places(zones, scale)):
+        radius_mm = math.sqrt(area_mm2 / math.pi)
+        across, down = scale * radius_mm / sheet.pitch_x_mm, scale * radius_mm / sheet.pitch_y_mm
+        angles = np.linspace(0, 2 * math.pi, 8 * math.ceil(max(across, down)) + 8)
+        columns = np.floor(x + across * np.cos(angles)).astype(int)
+        rows = np.floor(y + down * np.sin(angles)).astype(int)
+        inside = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
+        dots[rows[inside], columns[inside]] = True
+    return dots
+
+
+def _centers(zones: Zones, scale: int) -> Iterable[tuple[int, int]]:
+    """Column and line of the character in which each barycenter lies."""
+    wide, high = size(zones, scale)
+    for x, y in _places(zones, scale):
+        column, line = math.floor(x / ACROSS), math.floor(y / DOWN)
+        if 0 <= column < wide and 0 <= line < high:
+            yield column, line
+
+
+def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
+    """The barycenters in dots from the upper left corner of cell (0, 0). In the largest drawing a cell's sign is on its
+    left, and so is what lies in its middle."""
+    sheet = zones.sheet
+    middle = (0.5 if scale < SCALES[0] else 0.25) * scale
+    return [
+        (scale * x_mm / sheet.pitch_x_mm + middle, scale * y_mm / sheet.pitch_y_mm + scale / 2)
+        for x_mm, y_mm, _ in _placed(zones)
+    ]
+
+
+def _placed(zones: Zones) -> list[tuple[float, float, float]]:
+    """x and y in mm and area in mm2 of the zones that have a place: a frame flagged `mismatch` may hold others."""
+    return [(zone.x_mm, zone.y_mm, zone.area_mm2) for zone in zones if zone.x_mm is not None and zone.y_mm is not None]

@@ -1,0 +1,73 @@
+"""Numbers on the command line: each type says its range and unit when a value lies outside."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TypeVar
+
+from contactfpga.cover.answer import MAX_LENGTH_M
+from contactfpga.skin import limits
+
+_Number = TypeVar("_Number", int, float)
+
+MIN_LENGTH_M = 1e-6
+IN_METERS = "lengths are in m, 5 mm is 0.005"
+
+
+def number(low: float, high: float, unit: str = "", *, above: bool = False, hint: str = "") -> Callable[[str], float]:
+    """A finite number from ``low`` (with ``above``: above it) to ``high``."""
+    return _between(float, "number", low, high, unit, above, hint)
+
+
+def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
+    """A whole number from ``low`` to ``high``."""
+    return _between(int, "whole number", low, high, unit, False, "")
+
+
+def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
+    """The same, or the word `none`."""
+
+    def read(text: str) -> float | None:
+        if text == "none":
+            return None
+        try:
+            return kind(text)
+        except argparse.ArgumentTypeError as error:
+            raise argparse.ArgumentTypeError(f"{error}, nor 'none'") from None
+
+    return read
+
+
+def length(high: float = MAX_LENGTH_M, low: float = MIN_LENGTH_M) -> Callable[[str], float]:
+    """A length in m; who means mm is far outside."""
+    return number(low, high, "m", hint=IN_METERS)
+
+
+def _between(
+    parse: Callable[[str], _Number], what: str, low: float, high: float, unit: str, above: bool, hint: str
+) -> Callable[[str], _Number]:
+    ends = f"above {low:.12g} and at most {high:.12g}" if above else f"from {low:.12g} to {high:.12g}"
+    wanted = f"a {what} {ends} {unit}".rstrip() + (f"; {hint}" if hint else "")
+
+    def read(text: str) -> _Number:
+        try:
+            value = parse(text)
+        except ValueError:
+            value = None
+        # Not a number is not between anything.
+        if value is None or not low <= value <= high or (above and value == low):
+            shown = text if len(text) <= 40 else f"{text[:40]}..."
+            raise argparse.ArgumentTypeError(f"{shown!r} is not {wanted}")
+        return value
+
+    return read
+
+
+SECONDS = number(0, 86_400, "s", above=True)
+BAUD = whole(limits.MIN_BAUD, limits.MAX_CLOCK_HZ // 2, "bits per second")
+PITCH_MM = number(limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
+CELL = number(-1e300, 1e300)
+"""A value that cells are compared with."""
+SEED = whole(0, 2**63 - 1)
+JOBS = whole(1, 1024, "processes")

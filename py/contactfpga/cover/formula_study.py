@@ -1,0 +1,343 @@
+"""Speed against accuracy of the cover's formulas, and the tables and pictures of docs/cover.md.
+
+    python -m contactfpga.cover.formula_study docs/cover.md docs/images
+
+Errors are the same everywhere; times are those of the machine on which it runs. The rules that fail are here and
+nowhere else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.console import interrupt
+from contactfpga.cover import elastic, impact, motion, paper
+from contactfpga.cover.answer import NoSolution
+from contactfpga.cover.design import thinning
+from contactfpga.cover.foams import FOAMS
+from contactfpga.cover.hertz import Ball
+from contactfpga.cover.impact import Arm
+from contactfpga.cover.sense import LADDER, Model, Sheet
+from contactfpga.cover.solve import Floats, gauss, legendre
+from contactfpga.cover.switch import Switch
+
+FLOOR = 1e-13
+"""Errors below this are those of the reference, and written as less than it."""
+
+STALLED = 200_000
+"""Steps after which Euler's method is given up."""
+
+
+class Blow(NamedTuple):
+    """An impact whose time is asked for."""
+
+    name: str
+    arm: Arm
+    speed_m_s: float
+    stiffness: float
+
+    @property
+    def depth_m(self) -> float:
+        return impact.compression_m(self.arm, self.speed_m_s, self.stiffness)
+
+    def square(self, depth: np.ndarray) -> Floats:
+        return impact.speed2(self.arm, self.speed_m_s, self.stiffness, depth)
+
+
+_SPRING = elastic.stiffness(Ball(0.019, elastic.effective_modulus_pa(3.65e5, 0.5)))
+
+BLOWS = (
+    Blow("paper", Arm.link(0.6, 0.038, 0.15, 0.2), 0.4, _SPRING),
+    Blow(
+        "u = 2 Nm, gravity", Arm.link(0.6, 0.038, 0.15, 0.2, torque_nm=2.0, gravity=True, angle_rad=0.3), 0.4, _SPRING
+    ),
+    Blow("u = 20 Nm, from rest", Arm.link(0.6, 0.038, 0.15, 0.2, torque_nm=20.0), 0.0, _SPRING),
+    Blow("u = 20 Nm, 1 mm/s", Arm.link(0.6, 0.038, 0.15, 0.2, torque_nm=20.0), 1e-3, _SPRING),
+)
+
+Rule = Callable[[Blow], float]
+
+
+def _trapezoid(points: int, with_end: bool) -> Rule:
+    def rule(blow: Blow) -> float:
+        depth = np.linspace(0, blow.depth_m, points + 1)
+        square = blow.square(depth)
+        square[-1] = 0.0
+        with np.errstate(divide="ignore"):
+            slow = 1 / np.sqrt(np.maximum(square, 0))
+        weights = np.full(points + 1, depth[1])
+        weights[[0, -1]] /= 2
+        last = None if with_end else -1
+        return float(weights[:last] @ slow[:last])
+
+    return rule
+
+
+def _midpoint(points: int) -> Rule:
+    def rule(blow: Blow) -> float:
+        step = blow.depth_m / points
+        return float((step / np.sqrt(blow.square(step * (np.arange(points) + 0.5)))).sum())
+
+    return rule
+
+
+def _raw_gauss(nodes: int) -> Rule:
+    def rule(blow: Blow) -> float:
+        return gauss(lambda depth: 1 / np.sqrt(blow.square(depth)), 0.0, blow.depth_m, nodes)
+
+    return rule
+
+
+def _off(share: float, nodes: int) -> Rule:
+    """delta = delta_c sin^2(phi) without the factor taken out, at a delta_c that is a little short."""
+
+    def rule(blow: Blow) -> float:
+        depth = blow.depth_m * (1 - share)
+        x, weights = legendre(nodes)
+        phi = math.pi / 4 * (1 + x)
+        slow = 2 * depth * np.sin(phi) * np.cos(phi) / np.sqrt(blow.square(depth * np.sin(phi) ** 2))
+        return math.pi / 4 * float(weights @ slow)
+
+    return rule
+
+
+def _off_factored(share: float) -> Rule:
+    def rule(blow: Blow) -> float:
+        return _sine(16)(blow, blow.depth_m * (1 - share))
+
+    return rule
+
+
+def _euler(step_share: float) -> Rule:
+    """Explicit steps in time on v = sqrt(v^2(delta)); from rest it never leaves, and its end is a matter of luck."""
+
+    def rule(blow: Blow) -> float:
+        depth, step, count, end = 0.0, step_share * blow.depth_m / max(blow.speed_m_s, 0.1), 0, blow.depth_m
+        while depth < end * (1 - 1e-12):
+            square = float(blow.square(np.asarray(depth)))
+            count += 1
+            if square <= 0 or count == STALLED:
+                return math.nan
+            depth += step * math.sqrt(square)
+        return count * step
+
+    return rule
+
+
+def _sine(nodes: int) -> Callable[..., float]:
+    def rule(blow: Blow, depth: float | None = None) -> float:
+        end = blow.depth_m if depth is None else depth
+        return gauss(
+            lambda phi: impact.slowness(blow.arm, blow.speed_m_s, blow.stiffness, end, phi), 0.0, math.pi / 2, nodes
+        )
+
+    return rule
+
+
+def _closed(blow: Blow) -> float:
+    if not blow.arm.free:
+        return math.nan
+    return impact.COMPRESSION_TIME * blow.depth_m / blow.speed_m_s
+
+
+def _adaptive(blow: Blow) -> float:
+    found = impact.time_s(blow.arm, blow.speed_m_s, blow.stiffness, blow.depth_m)
+    return math.nan if found is None else found
+
+
+def _ode(rtol: float) -> Rule:
+    return lambda blow: motion.compress(blow.arm, blow.speed_m_s, blow.stiffness, rtol)[1]
+
+
+RULES: dict[str, Rule] = {
+    "closed form": _closed,
+    "**adaptive, sin²**": _adaptive,
+    "8 nodes, sin²": _sine(8),
+    "16 nodes, sin²": _sine(16),
+    "ODE, 1e-6": _ode(1e-6),
+    "ODE, 1e-8": _ode(1e-8),
+    "**ODE, 1e-10**": _ode(1e-10),
+    "ODE, 1e-12": _ode(1e-12),
+}
+
+FAILING: dict[str, Rule] = {
+    "trapezoid, 100": _trapezoid(100, True),
+    "trapezoid without its end, 100": _trapezoid(100, False),
+    "trapezoid without its end, 10,000": _trapezoid(10_000, False),
+    "midpoint, 100": _midpoint(100),
+    "Gauss-Legendre, 8": _raw_gauss(8),
+    "Gauss-Legendre, 64": _raw_gauss(64),
+    "16 nodes, sin², δ_c short by 1e-8": _off(1e-8, 16),
+    "256 nodes, sin², δ_c short by 1e-8": _off(1e-8, 256),
+    "16 nodes, sin², that short, factored": _off_factored(1e-8),
+    "Euler on v = √v²(δ), 100 steps": _euler(0.01),
+}
+
+
+def relative_errors(rule: Rule) -> list[float]:
+    """By how much a rule is off for each of :data:`BLOWS`; NaN where it gives nothing."""
+    with np.errstate(all="ignore"):
+        return [rule(blow) / _adaptive(blow) - 1 for blow in BLOWS]
+
+
+def seconds(call: Callable[[], object], repeats: int = 5) -> float:
+    """The shortest of some runs, each long enough to be timed."""
+    call()
+    count, took = 1, 0.0
+    while took < 2e-3:
+        count *= 2
+        start = time.perf_counter()
+        for _ in range(count):
+            call()
+        took = time.perf_counter() - start
+    runs = [took]
+    for _ in range(repeats - 1):
+        start = time.perf_counter()
+        for _ in range(count):
+            call()
+        runs.append(time.perf_counter() - start)
+    return min(runs) / count
+
+
+def _cell(error: float) -> str:
+    if math.isnan(error):
+        return "none"
+    if math.isinf(error) or abs(error) > 1e6:
+        return "infinite"
+    if abs(error) < FLOOR:
+        return "< 1e-13"
+    if abs(error) >= 1e-3:
+        return f"{100 * error:+.1f} %"
+    return f"{abs(error):.0e}"
+
+
+def _rule_table(rules: dict[str, Rule]) -> str:
+    lines = [
+        "| rule | " + " | ".join(blow.name for blow in BLOWS) + " | time |",
+        "|---|" + "---|" * (len(BLOWS) + 1),
+    ]
+    for name, rule in rules.items():
+        errors = relative_errors(rule)
+        with np.errstate(all="ignore"):
+            takes = 1e6 * seconds(lambda rule=rule: rule(BLOWS[0]))  # type: ignore[misc]
+        told = f"{takes:.1f}" if takes < 10 else f"{takes:,.0f}"
+        lines.append(f"| {name} | " + " | ".join(map(_cell, errors)) + f" | {told} µs |")
+    return "\n".join(lines)
+
+
+# ---- sensitivity
+
+SWITCH = Switch()
+THICKNESS_M = 5e-3
+PLACES = (0.0, 0.5, 0.83, 1.0, 1.414)
+"""Offsets over the thickness."""
+
+BALLS = {"R* = 2 mm, E* = 1 MPa": Ball(2e-3, 1e6), "R* = 0.1 mm, E* = 10 MPa": Ball(1e-4, 1e7)}
+
+
+def sense_errors(model: Model, ball: Ball) -> list[float]:
+    """Closing force by a model over that by the reference, minus 1, at each of :data:`PLACES`."""
+    sheet = Sheet(SWITCH, THICKNESS_M, ball)
+    found = []
+    for ratio in PLACES:
+        one, reference = (sheet.force_n(which, ratio * THICKNESS_M) for which in (model, LADDER[-1]))
+        gone = isinstance(one, NoSolution) or isinstance(reference, NoSolution)
+        found.append(math.nan if gone else one / reference - 1)  # type: ignore[operator]
+    return found
+
+
+def sense_table() -> str:
+    """Models of sensitivity: error against the reference, and time."""
+    lines = [
+        "| model | ball | " + " | ".join(f"ρ/h = {place:g}" for place in PLACES) + " | time |",
+        "|---|---|" + "---|" * (len(PLACES) + 1),
+    ]
+    for model in LADDER:
+        for name, ball in BALLS.items():
+            sheet = Sheet(SWITCH, THICKNESS_M, ball)
+            takes = 1e6 * seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore[misc]
+            errors = ["0" if error == 0 else f"{100 * error:+.1f} %" for error in sense_errors(model, ball)]
+            lines.append(f"| {model} | {name} | " + " | ".join(errors) + f" | {takes:,.0f} µs |")
+    return "\n".join(lines)
+
+
+def paper_table() -> str:
+    """What is printed, what we get, and the verdict."""
+    lines = ["| paper says | we get | verdict |", "|---|---|---|"]
+    return "\n".join(lines + [f"| {row.printed} | {row.ours} | {row.verdict} |" for row in paper.rows()])
+
+
+def thinning_table() -> str:
+    """The first design as the reaction gets faster."""
+    lines = [
+        "| reaction after | foam that lasts 4/3 of it | pressed in | peak force | the paper's foam: by then | in all |",
+        "|---|---|---|---|---|---|",
+    ]
+    for one in thinning(paper.FIRST_DESIGN, paper.FIRST_DESIGN.foams[0]):
+        assert one.modulus_pa is not None
+        assert one.compression_m is not None
+        assert one.pressed_m is not None
+        assert one.stopped_m is not None
+        lines.append(
+            f"| {1e3 * one.latency_s:.3g} ms | {1e-6 * one.modulus_pa:,.4g} MPa | {1e3 * one.compression_m:.3g} mm | "
+            f"{one.force_n:.4g} N | {1e3 * one.pressed_m:.3g} mm | {1e3 * one.stopped_m:.3g} mm |"
+        )
+    return "\n".join(lines)
+
+
+def foam_table() -> str:
+    """Every foam with its source."""
+    lines = ["| foam | E | density | Y | pressed up to | source |", "|---|---|---|---|---|---|"]
+    for one in FOAMS:
+        density = "" if one.density_kg_m3 is None else f"{one.density_kg_m3:g} kg/m³"
+        strength = "" if one.yield_pa is None else f"{1e-3 * one.yield_pa:g} kPa"
+        known = f"{1e-3 * one.modulus_pa:g} kPa | {density} | {strength} | {100 * one.strain:g} %"
+        lines.append(f"| {one.name} | {known} | {one.source} |")
+    return "\n".join(lines)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "paper": paper_table,
+    "rules": lambda: _rule_table(RULES),
+    "failing": lambda: _rule_table(FAILING),
+    "sense": sense_table,
+    "thinning": thinning_table,
+    "foams": foam_table,
+}
+
+
+def update(text: str) -> str:
+    """The page with each `<!-- figures: NAME -->` section that is in :data:`TABLES` written anew."""
+
+    def written(match: re.Match[str]) -> str:
+        return f"{match[1]}\n{TABLES[match[2]]()}\n{match[3]}" if match[2] in TABLES else match[0]
+
+    return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", written, text, flags=re.DOTALL)
+
+
+def main() -> int:
+    """Write the tables into the page and the pictures into the folder named on the command line."""
+    parser = argparse.ArgumentParser(description="Chart the cover's formulas, their error against their time.")
+    parser.add_argument("page", type=Path)
+    parser.add_argument("folder", type=Path)
+    args = parser.parse_args()
+    from contactfpga.cover import drawing
+
+    args.page.write_text(update(args.page.read_text(encoding="utf-8")), encoding="utf-8")
+    print(f"wrote {args.page}")
+    for file in (*drawing.draw(args.folder, "svg"), drawing.study(args.folder / "cover-study.svg")):
+        print(f"drew {file}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

@@ -1,0 +1,187 @@
+"""An open port with a board at its other end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import AsyncIterator, Iterator
+from types import TracebackType
+
+from contactfpga.driver.link import Link
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.subscription import Subscription, checked, frame_of
+from contactfpga.driver.transport import Transport
+from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.skin import Skin
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.hello import Hello
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zones
+
+QUEUE = 16_384
+"""Frames that wait for :meth:`Board.next` at most."""
+
+
+class Board:
+    """An open port with a board at its other end: a context manager that iterates every frame.
+
+    Made by :func:`open`. Safe for several threads; :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
+    thread that wants every frame for itself takes a :meth:`subscribe`. Every method raises :class:`BoardClosed` after
+    :meth:`close`, also where it was waiting.
+    """
+
+    def __init__(self, transport: Transport, skin: Skin | None = None):
+        self._expected = skin
+        self._live = transport.live
+        self._threaded = transport.threaded
+        self._link = Link(transport, skin)
+        self._frames = Subscription(self._link, QUEUE)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_link"):
+            self._link.abandon()
+
+    # ---- what is known of the board
+
+    @property
+    def port(self) -> str:
+        """Name of the port."""
+        return self._link.transport.name
+
+    @property
+    def hello(self) -> Hello:
+        """What the board said of itself last; it does so twice a second."""
+        self._link.check_open()
+        if self._link.conversation.hello is None:
+            raise ContactFPGAError(f"{self.port}: no hello has come yet")
+        return self._link.conversation.hello
+
+    @property
+    def sheet(self) -> Sheet:
+        """Lines, lengths and report of the board's sheet, as its hello tells them."""
+        return self.hello.sheet
+
+    @property
+    def name(self) -> str:
+        """The name that the board's Skin gave it; "" where it has none."""
+        return self.hello.name
+
+    @property
+    def fingerprint(self) -> bytes:
+        """Fingerprint of the Skin the board was built from."""
+        return self.hello.fingerprint
+
+    @property
+    def clock_hz(self) -> int:
+        """Clock of the board's gateware in Hz."""
+        return self.hello.clock_hz
+
+    @property
+    def baud(self) -> int:
+        """The board's baud rate."""
+        return self.hello.baud
+
+    @property
+    def skin(self) -> Skin:
+        """The board's whole Skin: the one given to :func:`open`, or the reference Skin where the board has its
+        fingerprint.
+
+        Raises :class:`ContactFPGAError` for any other board: its hello tells the :attr:`sheet` and no more.
+        """
+        hello = self.hello
+        for skin in (self._expected, Skin()):
+            if skin is not None and skin.fingerprint == hello.fingerprint:
+                return skin
+        raise ContactFPGAError(
+            f"{self.port}: of this board's Skin only `board.sheet` is known (fingerprint {hello.fingerprint.hex()}); "
+            "give its file: open(port, skin='my.toml')"
+        )
+
+    @property
+    def stats(self) -> Stats:
+        """Counters since the port was opened."""
+        stats = self._link.conversation.stats
+        stats.dropped = self._frames.dropped
+        return stats
+
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts run on: ``time.monotonic``; of ``sim://`` the simulated one."""
+        return self._link.clock()
+
+    # ---- frames
+
+    def read(self, timeout: float = 1.0) -> Zones:
+        """Ask the board and return the first complete frame scanned after this call; :meth:`next` goes on after it.
+
+        ``timeout`` in seconds. Of a recording, the next frame. Raises :class:`ReadTimeout`, :class:`PortLost`,
+        :class:`SkinMismatch`, :class:`VersionMismatch`.
+        """
+        timeout = checked(timeout)
+        if not self._live:
+            return self.next(timeout)
+        zones = frame_of(self._link.read(timeout))
+        self._frames.skip_to(zones)
+        return zones
+
+    def next(self, timeout: float = 1.0) -> Zones:
+        """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`.
+
+        At most 16,384 frames wait to be taken; beyond, the oldest ones are dropped and counted in ``stats.dropped``.
+        """
+        return self._frames.next(timeout)
+
+    def latest(self, timeout: float = 1.0) -> Zones:
+        """The newest frame: the last of all that wait, or the next one when none does. Older ones are dropped.
+
+        Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
+        """
+        if self._live:
+            if not self._threaded:
+                self._link.take_what_came()
+            self._frames.keep_last()
+        return self._frames.next(timeout)
+
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
+        """All frames that wait after at most ``max_s`` seconds, as numpy arrays (:class:`Batch`).
+
+        The first one is waited for, for ``timeout`` seconds at most. Errors as for :meth:`next`.
+        """
+        return self._frames.batch(max_s, timeout)
+
+    def subscribe(self, maxsize: int = 1024) -> Subscription:
+        """A queue of its own for every frame from now on; see :class:`Subscription`."""
+        self._link.check_open()
+        return Subscription(self._link, maxsize, self)
+
+    def __iter__(self) -> Iterator[Zones]:
+        """Every frame, for ever; a recording ends."""
+        yield from self._frames
+
+    async def __aiter__(self) -> AsyncIterator[Zones]:
+        """The same in ``async for``."""
+        async for zones in self._frames:
+            yield zones
+
+    # ---- its end
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the port back; may be called twice. Calls that wait in other threads raise :class:`BoardClosed`."""
+        self._link.close()
+
+    def greet(self, timeout: float) -> None:
+        """Wait for the hello without which no frame can be read; keep the frame that answers for :meth:`next`."""
+        if self._live:
+            self._frames.put_back(self.read(timeout))
+            return
+        try:
+            self._link.wait_for(lambda: self._link.conversation.hello, math.inf, timeout)
+        except ReplayEnded:
+            raise ContactFPGAError(f"{self.port} holds no hello; its frames cannot be read") from None
+        self._frames.raise_first()

@@ -1,0 +1,183 @@
+"""What is said between host and board, without input or output: bytes and the clock in, events out.
+
+Freshness, losses, restarts, hellos and times are decided here and in the two parts
+:mod:`contactfpga.driver.requests` and :mod:`contactfpga.driver.timeline`, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import random
+
+from contactfpga.driver.requests import Requests
+from contactfpga.driver.stats import Stats
+from contactfpga.driver.timeline import MOST_S, Timeline
+from contactfpga.errors import SkinMismatch, VersionMismatch
+from contactfpga.skin import Skin
+from contactfpga.skin.mismatch import describe, difference
+from contactfpga.skin.sheet import Sheet
+from contactfpga.skin.widths import LONGEST_PACKET, Widths
+from contactfpga.wire import framing, protocol
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.protocol import Frame, OldPacket, PacketError
+from contactfpga.zones.zone import Zones
+
+_FRAME_KINDS = set(protocol.KINDS.values())
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Arrival:
+    """A frame that came."""
+
+    zones: Zones
+    answers: int
+    """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
+
+
+Event = Arrival | Hello | SkinMismatch | VersionMismatch
+
+
+class Conversation:
+    """One port's side of it.
+
+    ``port``: its name, for messages. ``expected``: the Skin the board must be built from; None: any. ``live``: a board
+    is at the other end; else the bytes are a recording, and their times are no arrival times.
+    """
+
+    def __init__(
+        self, port: str, expected: Skin | None = None, live: bool = True, rng: random.Random | None = None
+    ) -> None:
+        self.port = port
+        self.stats = Stats()
+        self.hello: Hello | None = None
+        """The last hello."""
+        self.sheet: Sheet | None = None
+        """What frames are read with; None until a hello has come, or where it is of another Skin than expected."""
+        self._expected = expected
+        self._live = live
+        self._requests = Requests(rng)
+        self._timeline = Timeline(self.stats, live)
+        self._reader = protocol.HelloReader()
+        self._widths: Widths | None = None
+        self._rest = b""
+        self._noticed = math.inf
+        self._doubted = -math.inf
+        self._begun = False  # the first piece is cut off by when we began to listen; it is no damage
+        self._damage = False
+
+    def ask(self, now: float, until: float) -> int:
+        """A ticket for a frame that is scanned after ``now``; :attr:`Arrival.answers` tells when it has come.
+
+        Until the time ``until`` the request is sent again where it seems lost. :meth:`data_to_send` has what to send.
+        """
+        self._notice(now)
+        return self._requests.ask(now, until, hello=not self._timeline.known)
+
+    def data_to_send(self) -> bytes:
+        """What has to be sent to the board now; look after each :meth:`ask` and each :meth:`receive`."""
+        return self._requests.data_to_send()
+
+    def receive(self, data: bytes, now: float) -> list[Event]:
+        """What ``data`` completes, in order. ``now`` is the time of its arrival in seconds; call it every now and then
+        also when nothing came, as then a request may have to be sent again."""
+        self.stats.bytes += len(data)
+        self._notice(now)
+        *packets, self._rest = (self._rest + data).split(b"\0")
+        events = []
+        for packet in packets:
+            if packet and (event := self._packet(packet, now)) is not None:
+                events.append(event)
+        if len(self._rest) > LONGEST_PACKET:
+            self._refuse("noise")
+            self._rest = b""
+        self._requests.poll(now, hello=not self._timeline.known)
+        return events
+
+    def _notice(self, now: float) -> None:
+        if self._live and now - self._noticed > MOST_S:
+            self._timeline.doubt(now)
+            self._doubted = now
+        self._noticed = now
+
+    def _packet(self, packet: bytes, now: float) -> Event | None:
+        try:
+            event = self._decode(packet, now)
+        except OldPacket as old:
+            return self._foreign(old)
+        except PacketError as error:
+            self._refuse(error.reason)
+            return None
+        self._begun = True
+        if self._damage:
+            self._damage = False
+            self.stats.resynchronised += 1
+        return event
+
+    def _refuse(self, reason: str) -> None:
+        if self._begun:
+            self.stats.damaged[reason] += 1
+            self._damage = True
+        self._begun = True
+
+    def _foreign(self, old: OldPacket) -> VersionMismatch | None:
+        self.stats.foreign_version += 1
+        if not old.hello:
+            return None
+        self.hello = self.sheet = self._widths = None
+        self._timeline = Timeline(self.stats, self._live)
+        return VersionMismatch(
+            f"{self.port} speaks protocol version 1, this host version {framing.VERSION}; "
+            "load a bitstream and install a contactfpga of the same release"
+        )
+
+    def _decode(self, packet: bytes, now: float) -> Event | None:
+        if self.hello is None and framing.unreadable(packet):
+            self.stats.before_hello += 1
+            return None
+        plain = framing.unseal(packet, protocol.check_prefix(self.hello) if self.hello else b"")
+        kind = framing.kind_of(plain)
+        if kind == framing.KIND_HELLO:
+            hello = self._reader.take(plain)
+            return None if hello is None else self._take_hello(hello, now)
+        if kind not in _FRAME_KINDS:
+            self.stats.unknown_kinds += 1
+            return None
+        if self._widths is None:
+            self.stats.foreign_skin += 1
+            return None
+        return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, now)
+
+    def _take_frame(self, frame: Frame, widths: Widths, now: float) -> Arrival | None:
+        before = self._timeline.before
+        time_us = self._timeline.take_frame(frame, widths, now)
+        if time_us is None:
+            return None
+        self._requests.take_frame(frame.heard, now)
+        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None)
+        return Arrival(zones, self._requests.answered)
+
+    def _take_hello(self, hello: Hello, now: float) -> Hello | SkinMismatch:
+        self.stats.hellos += 1
+        before, self.hello = self.hello, hello
+        changed = before is not None and (before.fingerprint, before.sheet) != (hello.fingerprint, hello.sheet)
+        if changed:
+            self.stats.skin_changes += 1
+            self._timeline = Timeline(self.stats, self._live)
+        expected = self._expected
+        if expected is not None and hello.fingerprint != expected.fingerprint:
+            self.sheet = self._widths = None
+            return SkinMismatch(f"{self.port} was built from {difference(hello, expected)}")
+        self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
+        self._requests.take_hello(hello.heard)
+        longest = Widths(hello.sheet).max_frame_bytes
+        self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud
+        if self.sheet != hello.sheet:
+            self.sheet = hello.sheet
+            self._widths = Widths(hello.sheet)
+        if not changed or before is None:
+            return hello
+        return SkinMismatch(
+            f"{self.port} now has {describe(hello)}, before it was {describe(before)}: another bitstream was "
+            "loaded; frames from here on are of the new Skin"
+        )

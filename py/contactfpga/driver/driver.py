@@ -1,0 +1,132 @@
+"""The driver: `read_zones` for one frame now, `open` for every frame."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import threading
+from pathlib import Path
+
+from contactfpga.driver import ports
+from contactfpga.driver.board import Board
+from contactfpga.driver.subscription import checked
+from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
+from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, PortNotFound
+from contactfpga.skin import Skin
+from contactfpga.zones.zone import Zones
+
+DEFAULT_BAUD = Skin().baud
+
+PROBE_S = 0.3
+"""How long a port may take to say hello while the board is searched."""
+
+
+def open(
+    port: str | SimulatedPort | None = None,
+    skin: Skin | str | Path | None = None,
+    *,
+    baud: int | None = None,
+    record: str | Path | None = None,
+    timeout: float = 1.0,
+) -> Board:
+    """Open a board and wait for its hello.
+
+    ``port``: a device path, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own
+    time, else as fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which
+    is closed with the board), or None for the one supported board that is plugged in. ``skin``: the Skin (or its
+    file) the board must be built from; None takes what the board says. ``baud``: bits a second; that of ``skin``,
+    else 3,000,000. ``record``: a
+    file that gets every byte received; ``replay://`` reads it. ``timeout`` in seconds, for the hello.
+
+    Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
+    :class:`SkinMismatch`, :class:`VersionMismatch`.
+    """
+    timeout = checked(timeout)
+    if skin is not None and not isinstance(skin, Skin):
+        skin = Skin.load(skin)
+    if baud is None:
+        baud = skin.baud if skin is not None else DEFAULT_BAUD
+    if port is None:
+        port = _find(baud)
+    transport = connect(port, baud)
+    try:
+        if record is not None:
+            transport = RecordingTransport(transport, record)
+        board = Board(transport, skin)
+    except BaseException:
+        transport.close()
+        raise
+    try:
+        board.greet(timeout)
+    except BaseException:
+        board.close()
+        raise
+    return board
+
+
+_boards: dict[str | None, Board] = {}
+_lock = threading.Lock()
+
+
+def read_zones(port: str | None = None, timeout: float = 1.0) -> Zones:
+    """Ask a board for its contact zones: the first complete frame scanned after this call.
+
+    ``port`` as for :func:`open`; it stays open in this process. ``timeout`` in seconds. Past it raises
+    :class:`ReadTimeout`, which is a :class:`TimeoutError`; see :func:`open` for the others.
+    """
+    timeout = checked(timeout)
+    with _lock:
+        board = _boards.get(port)
+    if board is not None:
+        try:
+            return board.read(timeout)
+        except (PortLost, BoardClosed):
+            _forget(port, board)  # perhaps it was plugged in again since the last call: try once more below
+    fresh = False
+    with _lock:
+        if (board := _boards.get(port)) is None:
+            board = _boards[port] = open(port, timeout=timeout)
+            fresh = True  # the answer to the hello was scanned after this call as well
+    try:
+        return board.next(timeout) if fresh else board.read(timeout)
+    except PortLost:
+        _forget(port, board)
+        raise
+
+
+def _forget(port: str | None, board: Board | None = None) -> None:
+    with _lock:
+        if board is None or _boards.get(port) is board:
+            board = _boards.pop(port, None)
+    if board is not None:
+        board.close()
+
+
+@atexit.register
+def _close_all() -> None:
+    for port in list(_boards):
+        with contextlib.suppress(Exception):
+            _forget(port)
+
+
+def _find(baud: int) -> str:
+    """The one port that a board answers on."""
+    found = ports.candidates()
+    if not found:
+        known = ", ".join(f"{usb.vid:04x}:{usb.pid:04x} ({usb.boards})" for usb in ports.SUPPORTED)
+        raise PortNotFound(
+            f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
+        )
+    answers: list[str] = []
+    report: list[str] = []
+    for candidate in found:
+        try:
+            open(candidate.device, baud=baud, timeout=PROBE_S).close()
+            answers.append(candidate.device)
+            report.append(f"{candidate}: says hello")
+        except ContactFPGAError as error:
+            report.append(f"{candidate}: {error}")
+    if len(answers) == 1:
+        return answers[0]
+    many = "several boards answer; name one of them" if answers else "no board answers"
+    raise PortNotFound(f"{many}. Candidates: " + "; ".join(report))

@@ -1,0 +1,207 @@
+"""One port and everyone who waits for it: who reads, who is told, how it ends."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import weakref
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from contactfpga.driver.conversation import Arrival, Conversation, Event
+from contactfpga.driver.transport import Transport
+from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, OnlyNoise, ReadTimeout
+from contactfpga.skin import Skin
+from contactfpga.wire.hello import Hello
+from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.driver.subscription import Subscription
+
+TURN_S = 0.05
+"""The reader looks this often whether the board was closed."""
+
+SIMULATED_TURN_S = 0.002
+"""The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
+
+Found = Zones | ContactFPGAError | Hello | bool
+"""What is waited for."""
+
+
+class _Waiter:
+    """A call of :meth:`Board.read` that waits for its frame."""
+
+    def __init__(self, ticket: int):
+        self.ticket = ticket
+        self.found: Zones | ContactFPGAError | None = None
+
+    def look(self) -> Zones | ContactFPGAError | None:
+        """What has been found by now."""
+        return self.found
+
+
+class Link:
+    """A transport, what is said over it, and the threads that wait for that.
+
+    A port's bytes are read by a thread of its own. Where time passes only while it is read (``sim://``), or all is
+    there already (``replay://``), one of the threads that wait reads for all.
+    """
+
+    def __init__(self, transport: Transport, skin: Skin | None):
+        self.transport = transport
+        self.conversation = Conversation(transport.name, skin, transport.live)
+        self.changed = threading.Condition()
+        """To be held while any state is looked at."""
+        self.subscriptions: weakref.WeakSet[Subscription] = weakref.WeakSet()
+        self._sending = threading.Lock()
+        self._waiters: list[_Waiter] = []
+        self._failure: BaseException | None = None
+        self._closing = False
+        self._turning: int | None = None  # the thread that reads
+        if transport.threaded:
+            threading.Thread(target=self._read_all, name=f"reader of {transport.name}", daemon=True).start()
+
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts run on."""
+        self.check_open()
+        return self.transport.clock()
+
+    def read(self, timeout: float) -> Found:
+        """Ask the board; the first frame scanned after now, or the error that came in its place."""
+        deadline = self.clock() + timeout
+        with self.changed:
+            self.check_open()
+            waiter = _Waiter(self.conversation.ask(self.transport.clock(), deadline))
+            self._waiters.append(waiter)
+        try:
+            self._send()
+            return self.wait_for(waiter.look, deadline, timeout)
+        finally:
+            with self.changed:
+                self._waiters.remove(waiter)
+
+    def abandon(self) -> None:
+        """Have the reader give the port back: nobody can wait for anything any more. Takes no lock."""
+        self._closing = True
+
+    def close(self) -> None:
+        """Give the port back; may be called twice."""
+        with self.changed:
+            self._closing = True
+            self.changed.notify_all()
+            if self._turning == threading.get_ident():  # a scene's callback closes: its turn does the rest
+                return
+            while self._turning is not None:
+                self.changed.wait(1.0)
+            with self._sending:
+                self.transport.close()
+
+    def check_open(self) -> None:
+        if self._closing:
+            raise BoardClosed(f"{self.transport.name} was closed; open it again")
+
+    def wait_for(self, found: Callable[[], Found | None], deadline: float, timeout: float) -> Found:
+        """What ``found`` returns as soon as it is not None; raises :class:`ReadTimeout` at the deadline."""
+        start = self.conversation.stats.bytes
+        with self.changed:
+            while True:
+                self.check_open()
+                if (result := found()) is not None:
+                    return result
+                if self._failure is not None:
+                    raise self._failure.with_traceback(None)
+                left = deadline - self.transport.clock()
+                if left <= 0:
+                    raise self._timed_out(timeout, start)
+                if self.transport.threaded or self._turning is not None:
+                    self.changed.wait(min(left, 1.0) if self.transport.threaded else TURN_S)
+                else:
+                    self._turn(min(left, SIMULATED_TURN_S))
+
+    def _turn(self, seconds: float) -> int:
+        """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
+        self._turning = threading.get_ident()
+        self.changed.release()
+        try:
+            data = self.transport.read(seconds)
+        finally:
+            self.changed.acquire()
+            self._turning = None
+            self.changed.notify_all()
+            if self._closing:
+                self.transport.close()
+        self.check_open()
+        self._take(data)
+        return len(data)
+
+    def _take(self, data: bytes) -> None:
+        for event in self.conversation.receive(data, self.transport.clock()):
+            self._pass_on(event)
+        self.changed.notify_all()
+        if not self.transport.threaded:
+            self._send()
+
+    def take_what_came(self) -> None:
+        with self.changed:
+            self.check_open()
+            while self._turning is None and self._turn(0.0):
+                pass
+
+    def _pass_on(self, event: Event) -> None:
+        if isinstance(event, Hello):
+            return
+        item = event.zones if isinstance(event, Arrival) else event
+        for subscription in self.subscriptions:
+            subscription.put(item)
+        for waiter in self._waiters:
+            if waiter.found is not None:
+                continue
+            if isinstance(event, Arrival):
+                waiter.found = event.zones if event.answers >= waiter.ticket else None
+            elif self.conversation.sheet is None:  # another Skin that can be read is no trouble for a new frame
+                waiter.found = event
+
+    def _send(self) -> None:
+        with self.changed:
+            data = self.conversation.data_to_send()
+        if data:
+            with self._sending:
+                self.check_open()
+                self.transport.write(data)
+
+    def _read_all(self) -> None:
+        """What the reader thread does, until the board is closed or the port is lost."""
+        while True:
+            with self.changed:
+                try:
+                    self.check_open()
+                    self._turn(TURN_S)
+                except BoardClosed:
+                    self.transport.close()
+                    return
+                except BaseException as error:  # whoever calls next gets it
+                    self._failure = error
+                    self.changed.notify_all()
+                    return
+            with contextlib.suppress(ContactFPGAError):  # the next read says so
+                self._send()
+
+    def _timed_out(self, timeout: float, start: int) -> ReadTimeout:
+        stats = self.conversation.stats
+        head = f"{self.transport.name}: no frame within {timeout:g} s"
+        if stats.bytes == start:
+            return BoardSilent(
+                f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
+                f"`contactfpga doctor {self.transport.name}` checks"
+            )
+        seen = f"{stats.bytes - start} bytes came"
+        if not stats.frames and not stats.hellos:
+            damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
+            return OnlyNoise(
+                f"{head}; {seen}, but no valid packet ({damaged}); is the baud rate the Skin's, "
+                "and is this a contactfpga board?"
+            )
+        return ReadTimeout(
+            f"{head}; {seen}, {stats.hellos} hellos and {stats.frames} frames since the port was opened; "
+            "give it a longer timeout, or send less to the board"
+        )

@@ -1,0 +1,64 @@
+"""Serial ports that may be a supported board, told by their USB ids."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable
+
+from contactfpga.inputs.values import visible
+
+FTDI = 0x0403
+
+
+@dataclasses.dataclass(frozen=True)
+class Usb:
+    """USB ids of a board's serial port."""
+
+    vid: int
+    pid: int
+    interface: int | None
+    """Interface that carries the serial port where the chip has several; None: any."""
+    boards: str
+
+
+SUPPORTED = (
+    Usb(FTDI, 0x6010, 1, "iCEBreaker, iCEStick"),  # FT2232H: interface 0 programs the flash
+    Usb(FTDI, 0x6015, None, "ULX3S"),  # FT231X
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A port that could be a board."""
+
+    device: str
+    boards: str
+    serial_number: str | None = None
+
+    def __str__(self) -> str:
+        # A USB device says what it likes of itself.
+        number = f", serial number {visible(self.serial_number)}" if self.serial_number else ""
+        return f"{visible(self.device)} ({self.boards}{number})"
+
+
+def candidates() -> list[Candidate]:
+    """Ports with the USB ids of supported boards, in the order of their names."""
+    from serialx import list_serial_ports
+
+    return choose(list_serial_ports())
+
+
+def choose(ports: Iterable[object]) -> list[Candidate]:
+    """The ports among ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board.
+
+    Where the system does not tell the interface number, every port of a chip is a candidate.
+    """
+    found = []
+    for port, usb in itertools.product(ports, SUPPORTED):
+        if (getattr(port, "vid", None), getattr(port, "pid", None)) != (usb.vid, usb.pid):
+            continue
+        interface = getattr(port, "interface_num", None)
+        if usb.interface is None or interface is None or interface == usb.interface:
+            found.append(Candidate(str(port.device), usb.boards, getattr(port, "serial_number", None)))  # type: ignore[attr-defined]
+    return sorted(found, key=lambda candidate: candidate.device)

@@ -1,0 +1,128 @@
+"""Which frame answers which request (docs/protocol.md, Conversation)."""
+
+from __future__ import annotations
+
+import collections
+import enum
+import random
+
+from contactfpga.skin.widths import HEARD_BITS
+from contactfpga.wire import protocol
+
+MOST_APART = 5
+"""Steps between the last number that a frame repeated and the last one sent with which another one may be sent: frames
+on their way carry at most six numbers then, and the next one is the seventh."""
+
+_LOWS = (1 << HEARD_BITS) - 1
+"""A number's lowest bits go round through 1 to this."""
+_NUMBERS = 1 << protocol.DIGIT_BITS * protocol.HEARD_DIGITS
+
+
+class _Stage(enum.Enum):
+    UNKNOWN = "nothing is known of what is on its way"
+    GREETING = "a hello shall repeat the number"
+    ECHOING = "a hello has repeated the number, a frame shall carry its lowest bits"
+    KNOWN = "frames on their way carry numbers from the last one seen to the last one sent"
+
+
+class Requests:
+    """Numbers requests, and tells which ones a frame answers.
+
+    Who asks gets a ticket; tickets are counted from 1. One request may stand for several tickets.
+    """
+
+    def __init__(self, rng: random.Random | None = None):
+        self.retry_s = 0.5
+        """A request that is unanswered for so long is sent again, as long as someone waits for it."""
+        self.answered = 0
+        """All tickets up to this one are answered."""
+        self._rng = rng or random.SystemRandom()
+        self._out = bytearray()
+        self._stage = _Stage.UNKNOWN
+        self._tickets = 0
+        self._until = 0.0
+        self._sent_at = 0.0
+        self._number = 0
+        self._step = self._seen = 0  # of the numbers last sent and last seen, counted
+        self._stands_for: dict[int, int] = {}  # step: ticket
+        self._recent: collections.deque[int] = collections.deque(maxlen=MOST_APART + 1)
+
+    def ask(self, now: float, until: float, hello: bool = False) -> int:
+        """A ticket for a frame that is scanned after now; someone waits for it until then. ``hello``: ask for a hello
+        as well."""
+        self._tickets += 1
+        self._until = max(self._until, until)
+        self._send(now, hello)
+        return self._tickets
+
+    def poll(self, now: float, hello: bool = False) -> None:
+        """Ask again if an answer is overdue."""
+        if self._tickets > self.answered and now < self._until and now >= self._sent_at + self.retry_s:
+            self._send(now, hello)
+
+    def data_to_send(self) -> bytes:
+        """What has to be sent to the board now."""
+        data = bytes(self._out)
+        self._out.clear()
+        return data
+
+    def sent_since(self, number: int, moment: float) -> bool:
+        """Whether this is the number sent last, and was sent since that moment."""
+        return number == self._number and self._sent_at >= moment
+
+    def take_hello(self, heard: int) -> None:
+        """A hello that repeats this number."""
+        if self._stage is _Stage.GREETING and heard == self._number:
+            self._stage = _Stage.ECHOING
+
+    def take_frame(self, heard: int, now: float) -> None:
+        """A frame that carries these lowest bits."""
+        if self._stage is _Stage.ECHOING and heard == _low(self._number):
+            self._stage = _Stage.KNOWN
+            self._step = self._seen = 0
+            self._stands_for.clear()
+            if self._tickets > self.answered:
+                self._send_next(now, hello=False)
+        elif self._stage is _Stage.KNOWN and heard:
+            step = self._step - (_low(self._number) - heard) % _LOWS
+            if step < self._seen:  # no request of ours: someone else speaks to the board
+                self._stage = _Stage.UNKNOWN
+                return
+            for known in range(self._seen, step + 1):
+                self.answered = max(self.answered, self._stands_for.pop(known, 0))
+            self._seen = step
+
+    def _send(self, now: float, hello: bool) -> None:
+        if self._stage is _Stage.KNOWN and self._step - self._seen <= MOST_APART:
+            self._send_next(now, hello)
+        elif self._stage in (_Stage.UNKNOWN, _Stage.KNOWN) or now >= self._sent_at + self.retry_s:
+            self._stage = _Stage.GREETING
+            self._put(self._random(), now, hello=True)
+
+    def _send_next(self, now: float, hello: bool) -> None:
+        number = self._number + 1
+        while not protocol.may_number(number % _NUMBERS):
+            number += 1
+        self._step += 1
+        self._stands_for[self._step] = self._tickets
+        self._put(number % _NUMBERS, now, hello)
+
+    def _put(self, number: int, now: float, hello: bool) -> None:
+        self._number, self._sent_at = number, now
+        self._recent.append(_low(number))
+        self._out += protocol.encode_request(number, hello)
+
+    def _random(self) -> int:
+        """A number whose lowest bits, and the next ones, have not been sent in this order of late: a frame and the one
+        after it that waited in the board while the hello went ahead cannot carry them."""
+        recent = list(self._recent)
+        while True:
+            number = self._rng.randrange(_NUMBERS)
+            low = _low(number)
+            after = recent[recent.index(low) + 1 :] if low in recent else []
+            if protocol.may_number(number) and low % _LOWS + 1 not in after:
+                return number
+
+
+def _low(number: int) -> int:
+    return number & (1 << HEARD_BITS) - 1

@@ -1,0 +1,286 @@
+"""Where bytes come from: a serial port, the simulated board, or a recording. All look alike to the driver."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+
+from contactfpga.driver import recording, sim_address
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
+from contactfpga.skin import Skin
+
+CHUNK = 65_536
+"""Most bytes one read returns."""
+
+
+class Transport(Protocol):
+    """Bytes to and from a board."""
+
+    name: str
+    """What the user called it."""
+    live: bool
+    """Whether a board is at the other end that can be asked."""
+    threaded: bool
+    """Whether bytes come by themselves, so that a thread of its own has to read them; else time passes, or the
+    recording goes on, only while it is read."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
+
+        Raises :class:`PortLost` when nothing can come any more, :class:`ReplayEnded` at the end of a recording.
+        """
+
+    def write(self, data: bytes) -> None:
+        """Send ``data``; raises :class:`PortLost`."""
+
+    def clock(self) -> float:
+        """Seconds on the clock that timeouts run on; simulated seconds for the simulated board."""
+
+    def close(self) -> None:
+        """Give the port back; may be called twice."""
+
+
+class SerialTransport:
+    """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
+
+    live = threaded = True
+
+    def __init__(self, name: str, baud: int):
+        from serialx import (
+            PinState,
+            Serial,
+            SerialException,
+        )  # 0.1 s that `contactfpga --help` need not wait for
+
+        self.name = name
+        self._errors: tuple[type[Exception], ...] = (OSError, SerialException)
+        alone = PinState.UNDEFINED
+        self._buffer = bytearray(CHUNK)
+        self._port = Serial(
+            path=name,
+            baudrate=baud,
+            exclusive=True,
+            **dict.fromkeys(("dtr_on_open", "rts_on_open", "dtr_on_close", "rts_on_close"), alone),
+        )
+        try:
+            self._port.open()
+        except self._errors as error:
+            raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        try:
+            count = self._port.readinto(self._buffer, timeout=max(0.0, timeout_s))
+        except self._errors as error:
+            raise self._lost(error) from None
+        return bytes(self._buffer[:count])
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data, timeout=1.0)
+        except self._errors as error:
+            raise self._lost(error) from None
+
+    def clock(self) -> float:
+        return time.monotonic()
+
+    def close(self) -> None:
+        with contextlib.suppress(*self._errors):  # gone already, which is what closing wants
+            self._port.close()
+
+    def _lost(self, error: Exception) -> PortLost:
+        return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
+
+
+class SimulatedPort(Protocol):
+    """A board in simulated time, such as :class:`contactfpga_sim.board.virtual.VirtualBoard`."""
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+
+    def close(self) -> None:
+        """Free the board."""
+
+
+class SimTransport:
+    """A virtual board, simulated while it is read."""
+
+    live, threaded = True, False
+
+    def __init__(self, name: str, board: SimulatedPort):
+        self.name = name
+        self._board = board
+
+    @classmethod
+    def named(cls, name: str) -> SimTransport:
+        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
+        asked = sim_address.parse(name)
+        skin = Skin.load(asked.skin) if asked.skin is not None else None
+        try:
+            from contactfpga_sim.board.virtual import VirtualBoard
+
+            return cls(name, VirtualBoard(skin=skin, scene=_scene(asked)))
+        except ModuleNotFoundError as error:
+            raise MissingExtra(f"sim:// ({error})", "sim") from None
+        except ValueError as error:  # a scene that is not known, or that does not fit the sheet
+            raise PortNotFound(f"{name}: {error}") from None
+
+    def read(self, timeout_s: float) -> bytes:
+        # Not less than a clock: time that rounds to none would not pass, and the deadline never come.
+        return bytes(self._board.read(max(timeout_s, 1e-6) if timeout_s > 0 else 0.0))
+
+    def write(self, data: bytes) -> None:
+        self._board.write(data)
+
+    def clock(self) -> float:
+        return float(self._board.clock())
+
+    def close(self) -> None:
+        self._board.close()
+
+
+class ReplayTransport:
+    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``, as fast as it is read, or
+    ``replay://FILE?pace=1`` in the time in which it was recorded."""
+
+    live = threaded = False
+
+    def __init__(self, name: str):
+        self.name = name
+        pace = name.partition(recording.PACE)[2]
+        self._pace = _pace(name, pace) if pace else None
+        self._file = recording.open_recorded(name)
+
+    def read(self, timeout_s: float) -> bytes:
+        if self._pace is not None:
+            return self._pace.read(self._file, timeout_s)
+        return _more(self._file, 4096, self.name)
+
+    def write(self, data: bytes) -> None:
+        raise ContactFPGAError(f"{self.name} is a recording; it cannot be asked for anything")
+
+    def clock(self) -> float:
+        # A recording has no times of its own, and nothing in it is waited for unless it is paced.
+        return 0.0 if self._pace is None else time.monotonic()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _Pace:
+    """Holds back the packets of a recording until their time has come."""
+
+    def __init__(self, name: str, factor: float):
+        self._name = name
+        self._factor = factor
+        self._conversation = Conversation(name, live=False)
+        self._held = b""
+        self._due_s = -math.inf
+        self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
+        self._last_us = 0
+
+    def read(self, file: BinaryIO, timeout_s: float) -> bytes:
+        if not self._held:
+            self._held = _more(file, 1, self._name)
+            while not self._held.endswith(b"\0") and (more := file.read(1)):
+                self._held += more
+            for event in self._conversation.receive(self._held, 0.0):
+                if isinstance(event, Arrival):
+                    self._schedule(event.zones.time_us)
+        wait_s = self._due_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(min(wait_s, max(0.0, timeout_s)))
+        if wait_s > timeout_s:
+            return b""
+        data, self._held = self._held, b""
+        return data
+
+    def _schedule(self, time_us: int) -> None:
+        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins anew
+            self._begun = time.monotonic(), time_us
+        moment_s, begun_us = self._begun
+        self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor
+        self._last_us = time_us
+
+
+def _pace(name: str, text: str) -> _Pace:
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = math.nan
+    if not 0 < factor < math.inf:
+        raise PortNotFound(f"{name}: pace is {text!r}; it must be a positive number, 1 for the time of the recording")
+    return _Pace(name, factor)
+
+
+def _more(file: BinaryIO, count: int, name: str) -> bytes:
+    data = file.read(count)
+    if not data:
+        raise ReplayEnded(f"{name} ends here")
+    return data
+
+
+class RecordingTransport:
+    """Passes everything on and writes each byte that is read to a file."""
+
+    def __init__(self, transport: Transport, path: str | Path):
+        self._transport = transport
+        self.name = transport.name
+        self.live, self.threaded = transport.live, transport.threaded
+        self.write = transport.write
+        self.clock = transport.clock
+        self._file = recording.create(path, transport.name)
+
+    def read(self, timeout_s: float) -> bytes:
+        data = self._transport.read(timeout_s)
+        self._file.write(data)
+        return data
+
+    def close(self) -> None:
+        self._file.close()
+        self._transport.close()
+
+
+def connect(name: str | SimulatedPort, baud: int) -> Transport:
+    """Open the transport that ``name`` asks for, or that a virtual board is."""
+    if not isinstance(name, str):
+        return SimTransport("the virtual board", name)
+    if name.startswith("sim:"):
+        return SimTransport.named(name)
+    if name.startswith("replay:"):
+        return ReplayTransport(name)
+    return SerialTransport(name, baud)
+
+
+def _scene(asked: sim_address.SimAddress) -> Any:
+    """What :class:`~contactfpga_sim.board.virtual.VirtualBoard` takes as its scene."""
+    if asked.threshold is None:
+        return asked.scene
+    from contactfpga_sim.scenes.recordings import Recording
+
+    if asked.scene is None or not asked.scene.endswith((".npy", ".npz")):
+        raise ValueError(f"threshold is {asked.threshold:g}; only numbers of a .npy or .npz file are compared with it")
+    return Recording.load(asked.scene, asked.threshold)
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+
+
+def _next_step(error: Exception, name: str) -> str:
+    if isinstance(error, PermissionError):
+        return "add yourself to the group that owns it (often `dialout`), or see `contactfpga doctor`"
+    if isinstance(error, FileNotFoundError):
+        return "is the board plugged in? `contactfpga doctor` lists the ports"
+    if "locked" in str(error):
+        return "another program reads this port; close it first"
+    return f"`contactfpga doctor {name}` may say why"

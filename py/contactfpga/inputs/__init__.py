@@ -1,0 +1,1 @@
+"""Values and files from outside, refused with a sentence where they cannot be read."""

@@ -1,0 +1,53 @@
+"""TOML files from anywhere: what a parser or a reader would stumble over is refused with a sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.values import shown
+
+MAX_BYTES = 1_000_000
+MAX_DEPTH = 16
+"""Tables and lists within each other."""
+
+
+def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
+    """What the file says. Raises ``refused`` for what is no TOML file, OSError for what cannot be read."""
+    try:
+        values = tomllib.loads(_text(path, refused))
+    except tomllib.TOMLDecodeError as error:
+        raise refused(f"{path}: not a TOML file: {error}") from None
+    except UnicodeDecodeError as error:
+        raise refused(f"{path}: not a TOML file: it is not UTF-8 ({error.reason} at byte {error.start})") from None
+    except RecursionError:
+        raise refused(f"{path}: tables and lists lie more than {MAX_DEPTH} deep in each other") from None
+    except ValueError as error:  # a number of thousands of digits
+        raise refused(f"{path}: not a TOML file: {error}") from None
+    _check(path, values, refused)
+    return values
+
+
+def _text(path: str | Path, refused: type[ValueError]) -> str:
+    with open_regular(path) as file:
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
+    return data.decode()
+
+
+def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
+    """Whole numbers have 64 bits, as TOML has it, and no table is deep. A loop, as deep tables end a recursion."""
+    todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
+    while todo:
+        name, value, depth = todo.pop()
+        if depth > MAX_DEPTH:
+            raise refused(f"{path}: tables and lists lie more than {MAX_DEPTH} deep in each other")
+        if isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise refused(f"{path}: {name} is {shown(value)}; whole numbers have 64 bits in TOML")
+        if isinstance(value, dict):
+            todo += [(key, one, depth + 1) for key, one in value.items()]
+        elif isinstance(value, list):
+            todo += [(name, one, depth + 1) for one in value]

@@ -1,0 +1,263 @@
+"""Everything that follows from a Skin: clocks, widths and depths, computed in this one place."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
+from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
+from contactfpga.skin.widths import TIME_BITS as TIME_BITS
+from contactfpga.skin.widths import Widths
+from contactfpga.wire.framing import CHECK_BYTES as CHECK_BYTES
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+HELLO_PERIOD_US = 500_000
+"""The board says hello this often, so that one can be late behind a frame and still come every second."""
+
+EPOCH_BITS = 22
+"""The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
+STUCK_BITS = 3
+STUCK_MAX = (1 << STUCK_BITS) - 1
+"""The stuck-line counter stops here."""
+
+
+class Derived(Widths):
+    """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
+
+    def __init__(self, skin: Skin):
+        super().__init__(skin.sheet)
+        self.skin = skin
+
+    # ---- times, in clocks unless named otherwise
+
+    @property
+    def clocks_per_us(self) -> int:
+        return self.skin.clock_hz // 1_000_000
+
+    def clocks(self, us: float) -> int:
+        """Clocks that last at least so many microseconds."""
+        return _whole(us * self.clocks_per_us)
+
+    @property
+    def settle_clocks(self) -> int:
+        """A row is driven so long: as asked, and until the columns of the slot before and the next row are shifted."""
+        row = self.row_shift_clocks - self.release_clocks
+        return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
+
+    @property
+    def release_clocks(self) -> int:
+        """No row is driven so long: as asked, and until the columns are shifted, the next row is latched, or chosen and
+        then shifted."""
+        column = self.column_load_clocks + self.column_shift_clocks
+        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
+        return max(self.clocks(self.skin.release_us), column, row)
+
+    @property
+    def row_clocks(self) -> int:
+        return self.settle_clocks + self.release_clocks
+
+    @property
+    def shift_clocks(self) -> int:
+        """A bit on a chain of shift registers; two at least, as its clock has to rise and fall."""
+        return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
+
+    @property
+    def row_latch_clocks(self) -> int:
+        """The pulse that puts a shifted row pattern on the outputs; 0 with direct rows."""
+        return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
+
+    @property
+    def row_shift_clocks(self) -> int:
+        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
+        return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
+
+    @property
+    def column_load_clocks(self) -> int:
+        """The pulse that takes all columns at once, in whose last clock they are sampled; 0 with direct columns."""
+        return self.shift_clocks if self.skin.column_read == "74hc165" else 0
+
+    @property
+    def column_shift_clocks(self) -> int:
+        """How much later than direct ones the columns of a sample are known; 0 with direct columns."""
+        return self.column_chain_lines * self.column_load_clocks
+
+    @property
+    def row_levels(self) -> int:
+        """ceil(log2 rows): how often the rows can be halved until one is left."""
+        return (self.skin.rows - 1).bit_length()
+
+    @property
+    def choice_clocks(self) -> int:
+        """From a strobe until an adaptive scan can drive its next rows; 0 in a raster scan, which knows them."""
+        return max(self.row_levels, 2) + 4 if self.skin.scan == "adaptive" else 0
+
+    @property
+    def max_frame_slots(self) -> int:
+        """The most row times that a frame can take."""
+        return self.skin.rows + (2 * self.row_levels + 2 if self.skin.scan == "adaptive" else 0)
+
+    @property
+    def frame_clocks(self) -> int:
+        """One scan period: every row once. Frames of an adaptive scan take fewer or more clocks."""
+        return self.row_clocks * self.skin.rows
+
+    @property
+    def bit_clocks(self) -> int:
+        return round(self.skin.clock_hz / self.skin.baud)
+
+    @property
+    def min_row_clocks(self) -> int:
+        """A row must last until debounce and labeller are done with the one before it, end mark and all, and a frame
+        until the one before it is packed: the scanner's tag is kept for no longer."""
+        if self.skin.scan == "adaptive":
+            return max(self._handing_clocks, *map(self._packing_clocks, range(self.skin.rows + 1)))
+        packed = self._packed_clocks + self._items_clocks(self.max_items)
+        return max(self.skin.columns + 6, 10, self.label_clocks + 1, math.ceil(packed / self.skin.rows))
+
+    @property
+    def _debounce_clocks(self) -> int:
+        return 0 if self.skin.debounce == "none" else self.skin.columns + 3
+
+    @property
+    def _packed_clocks(self) -> int:
+        """From the offer of a frame's last row to the end of its packing, but for the bytes packed in this time."""
+        return 1 + self._debounce_clocks + self.label_clocks + 2 + 4
+
+    @property
+    def _handing_clocks(self) -> int:
+        """An adaptive scan hands on all that a slot tells before the next one's strobe: a row that was driven alone,
+        then all others as empty, a row a clock, up to the end mark."""
+        serial = self.skin.labeller == "serial" and self.skin.report != "cells"
+        busy = self.label_clocks if serial else self.label_clocks - 2
+        empty = self.skin.columns + 2 if serial else 1
+        return self._debounce_clocks + 2 * busy + self.skin.rows * empty + 8
+
+    def _packing_clocks(self, rows: int) -> int:
+        """What a row time must last at least for a frame with this many pressed rows to be packed before the next
+        frame ends, in which all of these are driven again, and all others together."""
+        if self.skin.report == "cells":
+            items = self.skin.rows
+        elif self.skin.connectivity == 8:
+            items = min(rows, math.ceil(self.skin.rows / 2)) * math.ceil(self.skin.columns / 2)
+        else:
+            items = math.ceil(rows * self.skin.columns / 2)
+        clocks = self._packed_clocks + self.skin.rows + self._items_clocks(min(items, self.max_items))
+        return math.ceil(clocks / min(rows + 1, self.skin.rows))
+
+    def _items_clocks(self, items: int) -> int:
+        """For a frame's items and trailer, a byte a clock; where items are divided that takes longer than packing."""
+        plain = items * self.item_bytes + self.trailer_bytes
+        stuffing = math.ceil(plain / 254)
+        if self.skin.report != "barycenter":
+            return plain + stuffing
+        return items * self.item_clocks + self.item_bytes + self.trailer_bytes + stuffing
+
+    @property
+    def keep_alive_frames(self) -> int:
+        """A frame is sent at the latest after this many scans; in an adaptive scan, after so many row times."""
+        clocks = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
+        if self.skin.scan == "adaptive":
+            return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
+        return math.floor(clocks / self.frame_clocks + 1e-9)
+
+    @property
+    def hello_frames(self) -> int:
+        """A hello is due after this many scans; in an adaptive scan, after so many row times."""
+        scans = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
+        return scans * self.skin.rows if self.skin.scan == "adaptive" else scans
+
+    @property
+    def press_scans(self) -> int:
+        """Scan periods that last at least debounce_press_us."""
+        return _whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
+
+    @property
+    def release_scans(self) -> int:
+        """Scan periods that last at least debounce_release_us."""
+        return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
+
+    @property
+    def press_slots(self) -> int:
+        """The least row times that are more than one scan period short of ``press_scans``; see docs/timing.md."""
+        return max(0, (self.press_scans - 1) * self.skin.rows + 1)
+
+    @property
+    def release_slots(self) -> int:
+        """The same of ``release_scans``."""
+        return max(0, (self.release_scans - 1) * self.skin.rows + 1)
+
+    # ---- widths in bits and sizes in bytes
+
+    @functools.cached_property
+    def slot_bits(self) -> int:
+        """Of a count of row times in which a debounce time, and two frames more, can be told."""
+        return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
+
+    @property
+    def cell_bits(self) -> int:
+        """Of a whole number of cells that a barycenter can be away from the origin, along the longer side."""
+        return (max(self.skin.rows, self.skin.columns) - 1).bit_length()
+
+    @property
+    def quotient_bits(self) -> int:
+        """Of a barycenter before it is rounded: one fraction bit more than there will be. One comes each clock."""
+        return self.cell_bits + self.skin.barycenter_bits + 1
+
+    @property
+    def item_clocks(self) -> int:
+        """The most clocks from an item to the next while many wait."""
+        divided = self.quotient_bits + 1 if self.skin.report == "barycenter" else 0
+        return max(self.item_bytes, divided)
+
+    # ---- sizes of tables and chains
+
+    @property
+    def row_chain_lines(self) -> int:
+        return math.ceil(self.skin.rows / self.skin.row_chains)
+
+    @property
+    def column_chain_lines(self) -> int:
+        return math.ceil(self.skin.columns / self.skin.column_chains)
+
+    @functools.cached_property
+    def open_zones(self) -> int:
+        """The most zones two adjacent rows can hold between them: C/2 with 8-connectivity, C with 4."""
+        return math.ceil(self.skin.columns / 2) if self.skin.connectivity == 8 else self.skin.columns
+
+    @property
+    def label_clocks(self) -> int:
+        """The most clocks from a frame's last row to its end mark."""
+        if self.skin.report == "cells":
+            return 3
+        columns = self.skin.columns
+        return {
+            "run": self.open_zones + 3,
+            "serial": columns + self.open_zones + 2,
+            "projection": columns + 3,
+            "single": columns + 4,
+        }[self.skin.labeller]
+
+    @functools.cached_property
+    def backlog(self) -> int:
+        """Items that can wait for the packer.
+
+        Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
+        them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
+        are packed before the next one comes. An adaptive scan lets empty rows out, so that every row may close as many
+        zones, and bitmap rows of two frames may wait.
+        """
+        adaptive = self.skin.scan == "adaptive"
+        if self.skin.report == "cells":
+            return 2 * self.skin.rows + 2 if adaptive else 4
+        busy = self.open_zones * self.item_clocks
+        late = max(0.0, 1 - (1 if adaptive else 2) * self.row_clocks / busy)
+        return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
+
+
+def _whole(value: float) -> int:
+    """The next whole number upwards, not counting what a float's rounding added."""
+    return math.ceil(value - 1e-9)

@@ -1,0 +1,251 @@
+"""What a :class:`~contactfpga.Skin` can be; each error names the field, its value and the limit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from contactfpga.errors import SkinError
+from contactfpga.inputs.values import is_finite, shown, whole
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+Mask = tuple[tuple[int, int], ...]
+
+MAX_LINES = 64
+MAX_NAME_BYTES = 32
+MAX_BAUD_ERROR = 0.015
+MIN_PITCH_MM, MAX_PITCH_MM = 0.01, 1000.0
+MIN_BAUD, MAX_CLOCK_HZ = 1200, 400_000_000
+MAX_KEEP_ALIVE_MS = 100.0
+MAX_DEBOUNCE_SCANS = 4095
+SHIFT_HZ = 8_000_000
+BARYCENTER_BITS = 4
+MAX_BARYCENTER_BITS = 8
+MAX_DIVIDED_ZONES = 64
+MIN_SHIFT_HZ, MAX_SHIFT_HZ = 10_000, 50_000_000
+
+_CHOICES: dict[str, tuple[Any, ...]] = {
+    "surface": ("plane", "cylinder"),
+    "connectivity": (4, 8),
+    "diodes": ("col2row", "row2col", "none"),
+    "scan": ("raster", "adaptive"),
+    "row_drive": ("direct", "74hc595"),
+    "column_read": ("direct", "74hc165"),
+    "debounce": ("none", "sym_defer_pk", "asym_eager_defer_pk"),
+    "labeller": ("run", "serial", "projection", "single"),
+    "report": ("moments", "barycenter", "cells"),
+    "send": ("always", "on_change"),
+}
+
+_WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "clock_hz", "baud")
+
+
+def check_types(skin: Skin) -> dict[str, Any]:
+    """Every field is of its type; returns choices, whole numbers, lengths and times as the types that they are to be.
+
+    Equal Skins have one fingerprint, so 8.0 is no 8. A whole number of numpy's is one, and is kept as Python's.
+    """
+    _check_name(skin.name)
+    return (
+        {name: _choice(name, getattr(skin, name), choices) for name, choices in _CHOICES.items()}
+        | {name: _whole(name, getattr(skin, name)) for name in _WHOLE}
+        | ({} if skin.zone_capacity is None else {"zone_capacity": _whole("zone_capacity", skin.zone_capacity)})
+        | {name: _finite(name, value) for name, value in _floats(skin)}
+    )
+
+
+def _choice(name: str, value: Any, choices: tuple[Any, ...]) -> Any:
+    of_type = isinstance(value, str) if isinstance(choices[0], str) else whole(value) is not None
+    if not of_type or value not in choices:
+        raise SkinError(f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, choices))}")
+    return choices[choices.index(value)]
+
+
+def _whole(name: str, value: Any) -> int:
+    if (number := whole(value)) is None:
+        raise SkinError(f"{name} is {shown(value)}; it must be a whole number")
+    return number
+
+
+def _floats(skin: Skin) -> Iterator[tuple[str, Any]]:
+    for field in dataclasses.fields(skin):
+        value = getattr(skin, field.name)
+        if field.type == "float" or (field.type == "float | None" and value is not None):
+            yield field.name, value
+
+
+def _finite(name: str, value: Any) -> float:
+    if not is_finite(value):
+        raise SkinError(f"{name} is {shown(value)}; it must be a finite number")
+    return float(value)
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str):
+        raise SkinError(f"name is {name!r}; it must be a string")
+    if not name.isprintable() or name != name.strip():
+        raise SkinError(f"name is {name!r}; it must be printable, with no spaces around it")
+    if len(name.encode()) > MAX_NAME_BYTES:
+        raise SkinError(f"name is {name!r}, {len(name.encode())} bytes of UTF-8; at most {MAX_NAME_BYTES} are possible")
+
+
+def check_sheet(skin: Skin) -> Mask:
+    """Sheet, wiring and scan go together; returns the mask in order."""
+    for name in ("rows", "columns"):
+        _within(name, getattr(skin, name), 1, MAX_LINES)
+    for name in ("pitch_x_mm", "pitch_y_mm"):
+        _within(name, getattr(skin, name), MIN_PITCH_MM, MAX_PITCH_MM, "mm")
+    mask = _check_mask(skin)
+    _check_registers(skin)
+    _check_scan(skin)
+    _check_ghosts(skin, mask)
+    _check_surface(skin)
+    return mask
+
+
+def _check_surface(skin: Skin) -> None:
+    if skin.surface == "plane":
+        if skin.radius_mm is not None:
+            raise SkinError(f"radius_mm is {skin.radius_mm}; a plane has none, leave it out")
+        return
+    if skin.radius_mm is None:
+        raise SkinError("radius_mm is missing; surface = 'cylinder' needs it")
+    _within("radius_mm", skin.radius_mm, 0.1, 100_000.0, "mm")
+    around = 2 * math.pi * skin.radius_mm
+    if skin.columns * skin.pitch_x_mm >= around:
+        raise SkinError(
+            f"{skin.columns} columns of {skin.pitch_x_mm} mm take {skin.columns * skin.pitch_x_mm:g} mm of a "
+            f"circumference of {around:g} mm: the sheet's ends meet, which is not supported; "
+            f"use at most {math.ceil(around / skin.pitch_x_mm) - 1} columns"
+        )
+
+
+def _check_mask(skin: Skin) -> Mask:
+    if isinstance(skin.mask, str) or not isinstance(skin.mask, Iterable):
+        raise SkinError(f"mask is {shown(skin.mask)}; it must be a list of [row, column]")
+    cells = []
+    for cell in skin.mask:
+        pair = [whole(index) for index in cell] if isinstance(cell, list | tuple) else []
+        if len(pair) != 2 or pair[0] is None or pair[1] is None:
+            raise SkinError(f"mask holds {shown(cell)}; it must hold [row, column] pairs")
+        row, column = pair[0], pair[1]
+        if not (0 <= row < skin.rows and 0 <= column < skin.columns):
+            raise SkinError(f"mask holds {shown(pair)}; the sheet has {skin.rows} rows and {skin.columns} columns")
+        cells.append((row, column))
+    if len(set(cells)) == skin.rows * skin.columns:
+        raise SkinError(f"mask lists all {len(set(cells))} switches; at least one must be left")
+    return tuple(sorted(set(cells)))
+
+
+def _check_registers(skin: Skin) -> None:
+    for kind, wiring, registers in (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165")):
+        lines, chains = getattr(skin, f"{kind}s"), getattr(skin, f"{kind}_chains")
+        if getattr(skin, wiring) == "direct":
+            if chains != 1:
+                raise SkinError(f"{kind}_chains is {shown(chains)}; leave it out, or set {wiring} = '{registers}'")
+            continue
+        _within(f"{kind}_chains", chains, 1, lines)
+        length = math.ceil(lines / chains)
+        filled = math.ceil(lines / length)
+        if filled < chains:
+            raise SkinError(
+                f"{kind}_chains is {shown(chains)}; {lines} {kind}s in chains of {length} fill {filled}, set "
+                f"{kind}_chains = {filled}"
+            )
+    _within("shift_hz", skin.shift_hz, MIN_SHIFT_HZ, MAX_SHIFT_HZ, "Hz")
+    if skin.row_drive == skin.column_read == "direct" and skin.shift_hz != SHIFT_HZ:
+        raise SkinError(
+            f"shift_hz is {shown(skin.shift_hz)}; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'"
+        )
+
+
+def _check_scan(skin: Skin) -> None:
+    if skin.scan == "raster":
+        return
+    _within("rows", skin.rows, 2, MAX_LINES, "with scan = 'adaptive'")
+    if skin.column_read != "direct":
+        raise SkinError(
+            f"column_read is {skin.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
+            "the columns of an untouched sheet in each clock"
+        )
+
+
+def _check_ghosts(skin: Skin, mask: Mask) -> None:
+    """Without diodes only what can still be told apart from ghosts is taken."""
+    if not skin.ghosts:
+        return
+    wanted: dict[str, Any] = {"scan": "raster", "row_drive": "direct"}
+    if skin.report == "barycenter":
+        raise SkinError("report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'")
+    if skin.report == "moments":
+        wanted |= {"connectivity": 4, "labeller": "run" if skin.labeller != "serial" else "serial"}
+    for name, value in wanted.items():
+        if getattr(skin, name) != value:
+            why = " with report = 'moments'" if name in ("connectivity", "labeller") else ""
+            raise SkinError(f"{name} is {getattr(skin, name)!r}; diodes = 'none' needs {name} = {value!r}{why}")
+    if mask:
+        raise SkinError(
+            f"mask lists {len(mask)} switches; diodes = 'none' takes none, as what a masked switch feeds "
+            "could not be told"
+        )
+
+
+def check_link(skin: Skin) -> None:
+    """Clock, baud rate and report go together."""
+    _within("barycenter_bits", skin.barycenter_bits, 0, MAX_BARYCENTER_BITS)
+    if skin.report != "barycenter" and skin.barycenter_bits != BARYCENTER_BITS:
+        raise SkinError(f"barycenter_bits is {shown(skin.barycenter_bits)}; leave it out, or set report = 'barycenter'")
+    if skin.clock_hz % 1_000_000 or not 1_000_000 <= skin.clock_hz <= MAX_CLOCK_HZ:
+        raise SkinError(f"clock_hz is {shown(skin.clock_hz)}; it must be a whole number of MHz from 1 to 400 MHz")
+    _within("baud", skin.baud, MIN_BAUD, skin.clock_hz // 2, "for this clock")
+    divisor = round(skin.clock_hz / skin.baud)
+    error = skin.clock_hz / divisor / skin.baud - 1
+    if abs(error) > MAX_BAUD_ERROR:
+        nearest = sorted({skin.clock_hz // d for d in (divisor - 1, divisor, divisor + 1) if d >= 2})
+        raise SkinError(
+            f"baud is {skin.baud}: a clock of {skin.clock_hz} Hz misses it by {100 * error:+.2f} %, the limit is "
+            f"{100 * MAX_BAUD_ERROR} %; nearest good rates: {', '.join(map(str, nearest))}"
+        )
+    if skin.send == "on_change":
+        _within("keep_alive_ms", skin.keep_alive_ms, 0.0, MAX_KEEP_ALIVE_MS, "ms")
+
+
+def check_timing(skin: Skin) -> None:
+    """What follows a row is done before the next, with the zone capacity that the Skin has by now."""
+    from contactfpga.skin.derived import Derived  # it needs Skin for its annotations only
+
+    assert skin.zone_capacity is not None
+    _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
+    for name in ("settle_us", "release_us"):
+        _within(name, getattr(skin, name), 0.0, 10_000.0, "us")
+    derived = Derived(skin)
+    megahertz = skin.clock_hz // 1_000_000
+    for name in ("settle_us", "release_us"):
+        if derived.clocks(getattr(skin, name)) < 1:
+            raise SkinError(f"{name} is {getattr(skin, name)}; it must be at least one clock, {1 / megahertz:g} us")
+    if derived.row_clocks < derived.min_row_clocks:
+        rows = f"{skin.rows} rows, " if skin.scan == "adaptive" else ""
+        divided = " and report = 'barycenter'" if skin.report == "barycenter" else ""
+        raise SkinError(
+            f"settle_us + release_us is {derived.row_clocks} clocks; {rows}{skin.columns} columns and "
+            f"{skin.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
+            f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
+        )
+    if skin.send == "on_change" and derived.keep_alive_frames < 1:
+        raise SkinError(
+            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes "
+            f"{derived.max_frame_slots * derived.row_clocks / skin.clock_hz * 1e3:g} ms"
+        )
+    if skin.debounce == "none":
+        return
+    for name in ("debounce_press_us", "debounce_release_us"):
+        _within(name, getattr(skin, name), 0.0, MAX_DEBOUNCE_SCANS * derived.frame_clocks / megahertz, "us")
+
+
+def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    if not low <= value <= high:
+        raise SkinError(f"{name} is {shown(value)}; it must lie between {low} and {high} {unit}".rstrip())

@@ -1,0 +1,63 @@
+"""What of a Skin its board's frames cannot be read without: the hello tells all of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from contactfpga.skin.limits import MAX_BARYCENTER_BITS, MAX_LINES
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """Lines, lengths and report of a sheet. The fields mean what those of :class:`~contactfpga.Skin` mean."""
+
+    rows: int
+    columns: int
+    connectivity: int
+    report: str
+    barycenter_bits: int
+    """0 with another report than ``barycenter``."""
+    zone_capacity: int
+    pitch_x_mm: float
+    pitch_y_mm: float
+    radius_mm: float | None
+    """None on a plane."""
+    ghosts: bool
+    """The sheet has no diodes: pressed switches can make others read pressed."""
+
+    def max_zones(self) -> int:
+        """The most zones a frame of this sheet can hold."""
+        return max_zones(self.rows, self.columns, self.connectivity)
+
+    def check(self) -> None:
+        """Raises ValueError where frames of such a sheet could not be read."""
+        lengths = {"pitch_x_mm": self.pitch_x_mm, "pitch_y_mm": self.pitch_y_mm}
+        if self.radius_mm is not None:
+            lengths["radius_mm"] = self.radius_mm
+        for name, value in lengths.items():
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} is {value}")
+        ranges = {
+            "rows": (1, MAX_LINES),
+            "columns": (1, MAX_LINES),
+            "barycenter_bits": (0, MAX_BARYCENTER_BITS if self.report == "barycenter" else 0),
+        }
+        for name, (low, high) in ranges.items():
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} is {getattr(self, name)}")
+        if self.connectivity not in (4, 8):
+            raise ValueError(f"connectivity is {self.connectivity}")
+        if not 1 <= self.zone_capacity <= self.max_zones():
+            raise ValueError(f"zone_capacity is {self.zone_capacity}; the sheet holds at most {self.max_zones()} zones")
+
+
+def max_zones(rows: int, columns: int, connectivity: int) -> int:
+    """The most zones a sheet can hold.
+
+    With 8-connectivity every 2x2 block holds cells of one zone at most; with 4-connectivity the checkerboard is the
+    worst.
+    """
+    if connectivity == 8:
+        return math.ceil(rows / 2) * math.ceil(columns / 2)
+    return math.ceil(rows * columns / 2)

@@ -1,0 +1,206 @@
+"""The one description of a sheet from which gateware, golden model, virtual board and host are built."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contactfpga.cover import Cover, CoverError, table
+from contactfpga.errors import SkinError
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+from contactfpga.skin import limits
+from contactfpga.skin.sheet import Sheet, max_zones
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Skin:
+    """A sheet of switches, how it is scanned, and how its contact zones are reported.
+
+    Every field has a default; together the defaults are the reference Skin. x runs along the columns, y along
+    the rows, and cell (row 0, column 0) lies at 0 mm. A Skin that cannot work raises :class:`SkinError`.
+    """
+
+    name: str = ""
+    """What the board calls itself: at most 32 bytes of UTF-8. It tells boards of one Skin apart and is in the
+    bitstream, but not in the fingerprint."""
+
+    rows: int = 16
+    """Driven lines, 1 to 64."""
+    columns: int = 16
+    """Read lines, 1 to 64."""
+    pitch_x_mm: float = 10.0
+    """Distance between columns in mm."""
+    pitch_y_mm: float = 10.0
+    """Distance between rows in mm."""
+    surface: str = "plane"
+    """``plane``, or ``cylinder``: columns run around the link's z axis, rows along it."""
+    radius_mm: float | None = None
+    """Radius of the sheet on a cylinder in mm; None on a plane."""
+    mask: tuple[tuple[int, int], ...] = ()
+    """(row, column) of switches that are absent or broken: never pressed, never stuck."""
+    connectivity: int = 8
+    """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
+
+    diodes: str = "col2row"
+    """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down; ``none``:
+    as ``col2row``, but with no diodes rows float while they are not selected, and three pressed corners of a rectangle
+    make the fourth read pressed: what that may have made is flagged ``ghost``."""
+    scan: str = "raster"
+    """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched."""
+    settle_us: float = 5.0
+    """Time a row is driven before its columns are sampled, in us."""
+    release_us: float = 1.0
+    """Time without a driven row before the next one, in us."""
+    row_drive: str = "direct"
+    """``direct``: a pin a row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
+    row_chains: int = 1
+    """Chains of 74HC595 that are shifted at once; chain j drives rows j n to j n + n - 1, n = ceil(rows / chains)."""
+    column_read: str = "direct"
+    """``direct``: a pin a column; ``74hc165``: columns on shift registers, which settle and release may have to wait
+    for."""
+    column_chains: int = 1
+    """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
+    shift_hz: int = limits.SHIFT_HZ
+    """The shift clock in Hz at most; it is clock_hz divided by a whole number, at least 2."""
+    debounce: str = "none"
+    """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
+    debounce_press_us: float = 5000.0
+    """sym_defer_pk: how long a press must last to count; asym_eager_defer_pk: how long it then holds; us."""
+    debounce_release_us: float = 5000.0
+    """How long a release must last to count, in us."""
+
+    labeller: str = "run"
+    """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
+    a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
+    cells are one zone."""
+    report: str = "moments"
+    """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
+    rounded; ``cells``: the pressed cells as a bitmap."""
+    barycenter_bits: int = limits.BARYCENTER_BITS
+    """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upwards."""
+    send: str = "always"
+    """``always``: every frame; ``on_change``: a frame whose cells differ from the last one, or a keep-alive."""
+    keep_alive_ms: float = 100.0
+    """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
+    zone_capacity: int | None = None
+    """Zones a frame can carry. None: the most that can occur up to 32x32, at most 256 above, and with
+    ``report = "barycenter"`` at most 64; then filled in."""
+
+    clock_hz: int = 12_000_000
+    """Clock of the gateware in Hz, a whole number of MHz."""
+    baud: int = 3_000_000
+    """Bits a second on the wire."""
+
+    if TYPE_CHECKING:
+        cover: Cover | None = None
+    else:
+        # No field: fields are what gateware and golden model are built from and the fingerprint tells apart.
+        cover: dataclasses.InitVar[Cover | None] = None
+    """The soft cover, through which scenes press the switches; None: a switch closes when it is touched. The gateware
+    does not know it: Skins that differ in nothing else are equal and have one fingerprint."""
+
+    def __post_init__(self, cover: Cover | None = None) -> None:  # noqa: RUF033  # to type checkers it is a field
+        if cover is not None and not isinstance(cover, Cover):
+            raise SkinError(f"cover is {shown(cover)}; it must be a contactfpga.cover.Cover")
+        self._keep(cover=cover)
+        self._keep(**limits.check_types(self))
+        self._keep(mask=limits.check_sheet(self))
+        limits.check_link(self)
+        if self.zone_capacity is None:
+            self._keep(zone_capacity=self._default_capacity())
+        limits.check_timing(self)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Skin:
+        """Read a Skin from a TOML file whose keys are the fields of this class."""
+        values = tomlfile.load(path, SkinError)
+        known = [*(field.name for field in dataclasses.fields(cls)), "cover"]
+        unknown = sorted(set(values) - set(known))
+        if unknown:
+            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}")
+        if "cover" in values:
+            try:
+                values["cover"] = table.read(values["cover"])
+            except CoverError as error:
+                raise SkinError(f"{path}: {error}") from None
+        return cls(**values)
+
+    def replace(self, **changes: Any) -> Skin:
+        """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
+        one that begins or ends to divide."""
+        divides = self.report == "barycenter"
+        if {"rows", "columns", "connectivity"} & set(changes) or divides != (
+            changes.get("report", self.report) == "barycenter"
+        ):
+            changes.setdefault("zone_capacity", None)
+        return dataclasses.replace(self, **changes)
+
+    def to_toml(self) -> str:
+        """The Skin as a TOML file that :meth:`load` reads back."""
+        lines = []
+        for name, value in dataclasses.asdict(self).items():
+            if value is not None:
+                lines.append(f"{name} = {json.dumps(value)}")
+        return "\n".join(lines) + "\n" + (table.write(self.cover) if self.cover else "")
+
+    @property
+    def fingerprint(self) -> bytes:
+        """Eight bytes that differ between any two Skins that differ in more than their names.
+
+        They are made of the fields that differ from their defaults, so that a new field with a default changes no
+        fingerprint (docs/protocol.md).
+        """
+        return hashlib.sha256(json.dumps(self.changed, sort_keys=True).encode()).digest()[:8]
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """The fields that differ from their defaults, but for the name."""
+        defaults = {field.name: field.default for field in dataclasses.fields(self)}
+        defaults["zone_capacity"] = self._default_capacity()
+        fields = dataclasses.asdict(self)
+        del fields["name"]
+        return {name: value for name, value in fields.items() if value != defaults[name]}
+
+    @property
+    def selects_low(self) -> bool:
+        """A selected row is low, as is a column that reads pressed; else both are high."""
+        return self.diodes != "row2col"
+
+    @property
+    def ghosts(self) -> bool:
+        """Pressed switches can make others read pressed."""
+        return self.diodes == "none"
+
+    @property
+    def sheet(self) -> Sheet:
+        """What frames of this Skin's board cannot be read without."""
+        assert self.zone_capacity is not None
+        return Sheet(
+            rows=self.rows,
+            columns=self.columns,
+            connectivity=self.connectivity,
+            report=self.report,
+            barycenter_bits=self.barycenter_bits if self.report == "barycenter" else 0,
+            zone_capacity=self.zone_capacity,
+            pitch_x_mm=self.pitch_x_mm,
+            pitch_y_mm=self.pitch_y_mm,
+            radius_mm=self.radius_mm,
+            ghosts=self.ghosts,
+        )
+
+    def max_zones(self) -> int:
+        """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""
+        return max_zones(self.rows, self.columns, self.connectivity)
+
+    def _keep(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def _default_capacity(self) -> int:
+        small = self.rows <= 32 and self.columns <= 32
+        most = self.max_zones() if small else min(self.max_zones(), 256)
+        return min(most, limits.MAX_DIVIDED_ZONES) if self.report == "barycenter" else most

@@ -1,0 +1,141 @@
+"""Packets as they travel: stuffing, check bytes, delimiter, and the last byte that says what a packet is
+(docs/protocol.md, docs/framing.md)."""
+
+from __future__ import annotations
+
+import binascii
+
+VERSION = 2
+DELIMITER = 0
+CHECK_BYTES = 3
+
+FLAG_BITS = 4
+KIND_BITS = 4
+
+KIND_HELLO = 4
+KINDS = {"moments": 5, "cells": 6, "barycenter": 7}
+"""Kind of a frame, by the Skin's ``report``."""
+
+OLD_KINDS = (2, 3)
+"""What a packet of protocol 1 has in the place of a kind."""
+_OLD_HELLO_BITS = 0xF8, 0x20
+_OLD_HELLO_BYTES = 26
+
+SHORTEST_PACKET = CHECK_BYTES + 2
+
+DIGIT_BITS = 7
+
+
+def digits(value: int, count: int) -> bytes:
+    """A number in ``count`` digits of seven bits, lowest first, none of them a zero byte."""
+    assert 0 <= value < 1 << DIGIT_BITS * count, f"{value} does not fit {count} digits"
+    return bytes(0x80 | value >> DIGIT_BITS * place & 0x7F for place in range(count))
+
+
+def number(data: bytes) -> int:
+    """Undo :func:`digits`."""
+    return sum((byte & 0x7F) << DIGIT_BITS * place for place, byte in enumerate(data))
+
+
+def last_byte(kind: int, flags: int = 0) -> int:
+    """Last plain byte of every packet: flags in the lower four bits, kind in the upper four."""
+    return kind << FLAG_BITS | flags
+
+
+class PacketError(ValueError):
+    """Bytes that are not a whole, valid packet. ``reason`` is a key of the driver's counters."""
+
+    def __init__(self, reason: str, message: str):
+        super().__init__(message)
+        self.reason = reason
+
+
+class OldPacket(PacketError):
+    """A valid packet of protocol 1; ``hello``: whether it is a hello."""
+
+    def __init__(self, hello: bool):
+        super().__init__("version", f"packet of protocol version 1; this host speaks {VERSION}")
+        self.hello = hello
+
+
+def kind_of(plain: bytes) -> int:
+    """Kind of an unsealed packet."""
+    return plain[-1] >> FLAG_BITS
+
+
+def cobs_encode(data: bytes) -> bytes:
+    """Consistent Overhead Byte Stuffing (Cheshire and Baker, 1999), without the delimiter."""
+    out = bytearray()
+    for index, block in enumerate(blocks := data.split(b"\0")):
+        while len(block) > 254 or (len(block) == 254 and index < len(blocks) - 1):
+            out += b"\xff" + block[:254]
+            block = block[254:]
+        out += bytes([len(block) + 1]) + block
+    return bytes(out)
+
+
+def cobs_decode(data: bytes) -> bytes:
+    """Undo :func:`cobs_encode`; raises :class:`PacketError` where the blocks do not fit the length."""
+    out = bytearray()
+    position = 0
+    while position < len(data):
+        code = data[position]
+        end = position + code
+        if code == 0 or end > len(data):
+            raise PacketError("framing", f"block of {code} bytes at {position} in a packet of {len(data)} bytes")
+        out += data[position + 1 : end]
+        position = end
+        if code < 255 and position < len(data):
+            out.append(0)
+    return bytes(out)
+
+
+_MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+
+
+def check_bytes(stuffed: bytes, before: bytes = b"") -> bytes:
+    """CRC-16/MCRF4XX of ``before`` and the stuffed bytes, lowest bits first, in three bytes that are never zero.
+
+    That CRC takes bits in the order of the line; the standard library has its mirror image.
+    """
+    mirrored = binascii.crc_hqx((before + stuffed).translate(_MIRRORED), 0xFFFF)
+    crc = _MIRRORED[mirrored >> 8] | _MIRRORED[mirrored & 0xFF] << 8
+    return bytes([0x80 | crc & 0x7F, 0x80 | crc >> 7 & 0x7F, 0x80 | crc >> 14])
+
+
+def seal(plain: bytes, before: bytes = b"") -> bytes:
+    """A packet's bytes on the wire: stuffed, check bytes, delimiter. ``before`` as for :func:`check_bytes`."""
+    stuffed = cobs_encode(plain)
+    return stuffed + check_bytes(stuffed, before) + bytes([DELIMITER])
+
+
+def unreadable(packet: bytes) -> bool:
+    """Whether a packet from the board may be whole and cannot be told to be without the board's fingerprint."""
+    marked = all(byte & 0x80 for byte in packet[-CHECK_BYTES:]) and packet[-1] < 0x84
+    return len(packet) >= SHORTEST_PACKET and marked and not _bare(packet[-CHECK_BYTES - 1])
+
+
+def _bare(last: int) -> bool:
+    """Whether the check of a packet with this last byte covers nothing but its stuffed bytes."""
+    return last >> FLAG_BITS in (KIND_HELLO, *OLD_KINDS)
+
+
+def unseal(packet: bytes, before: bytes) -> bytes:
+    """Undo :func:`seal` for a packet from the board, without its delimiter; raises :class:`PacketError`.
+
+    ``before``: what the checks of all packets but hellos cover besides
+    (:func:`contactfpga.wire.protocol.check_prefix`).
+    """
+    stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
+    if len(stuffed) < 2:
+        raise PacketError("framing", f"packet of {len(packet)} bytes; the shortest has {SHORTEST_PACKET}")
+    last = stuffed[-1]  # the last plain byte is never zero, so that it is the last stuffed one as well
+    if check != check_bytes(stuffed, b"" if _bare(last) else before):
+        raise PacketError("crc", f"CRC of a packet of {len(packet)} bytes does not match")
+    plain = cobs_decode(stuffed)
+    if not plain or plain[-1] != last:
+        raise PacketError("framing", f"packet of {len(packet)} bytes ends with a zero byte")
+    if last >> FLAG_BITS in OLD_KINDS:
+        mask, old = _OLD_HELLO_BITS
+        raise OldPacket(last & mask == old and len(plain) == _OLD_HELLO_BYTES)
+    return plain

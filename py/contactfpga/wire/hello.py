@@ -1,0 +1,195 @@
+"""What a board says of itself: fields by type and length, so that later boards can say more (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+import zlib
+from typing import TYPE_CHECKING
+
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
+
+_SHEET = struct.Struct("<BBBBBBHBx")
+_PITCH = struct.Struct("<dd")
+_RADIUS = struct.Struct("<d")
+_RATES = struct.Struct("<II")
+_CHECK = struct.Struct("<I")
+_REPORTS = ("moments", "cells", "barycenter")
+_SENDS = ("always", "on_change")
+_FINGERPRINT_BYTES = 8
+
+SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
+STATE_DIGITS = 16
+"""Of which the last is not used yet."""
+
+STATE_OFFSET = 16
+"""Of the first digit in a hello as :func:`encode_hello` writes it, from the leading delimiter on."""
+
+_SIZES = {
+    SHEET: _SHEET.size,
+    STATE: STATE_DIGITS,
+    PITCH: _PITCH.size,
+    RADIUS: _RADIUS.size,
+    FINGERPRINT: _FINGERPRINT_BYTES,
+    RATES: _RATES.size,
+    CHECK: _CHECK.size,
+}
+"""The least bytes of a field."""
+_MANDATORY = {SHEET, STATE, PITCH, FINGERPRINT, RATES}
+_MOST_BYTES = 8192
+"""A hello that is longer is none."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Hello:
+    """What the board says of itself."""
+
+    sheet: Sheet
+    fingerprint: bytes
+    name: str
+    """The Skin's."""
+    clock_hz: int
+    baud: int
+    send: str
+    commands: bytes
+    """Kinds of commands that the board takes."""
+    sent: int
+    """Frames sent since power-up."""
+    epoch: int
+    """Whole times 2^22 us since power-up."""
+    heard: int
+    """Number of the last request received; see :func:`contactfpga.wire.protocol.may_number`."""
+    stuck: int
+    """Columns that read pressed while no row was driven, in the frame packed last; 7 stands for 7 or more."""
+
+
+def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0) -> bytes:
+    """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end."""
+    sheet = _SHEET.pack(
+        skin.rows,
+        skin.columns,
+        skin.connectivity,
+        _REPORTS.index(skin.report),
+        skin.sheet.barycenter_bits,
+        _SENDS.index(skin.send),
+        skin.sheet.zone_capacity,
+        skin.ghosts,
+    )
+    facts = [(SHEET, sheet), (PITCH, _PITCH.pack(skin.pitch_x_mm, skin.pitch_y_mm))]
+    if skin.radius_mm is not None:
+        facts.append((RADIUS, _RADIUS.pack(skin.radius_mm)))
+    facts += [(FINGERPRINT, skin.fingerprint), (RATES, _RATES.pack(skin.clock_hz, skin.baud))]
+    if skin.name:
+        facts.append((NAME, skin.name.encode()))
+    fixed = [bytes([kind, len(value)]) + value for kind, value in facts]
+    counters = ((sent, SENT_DIGITS), (epoch, EPOCH_DIGITS), (heard, HEARD_DIGITS), (stuck, STUCK_DIGITS), (0, 1))
+    state = bytes([STATE, STATE_DIGITS]) + b"".join(digits(value, count) for value, count in counters)
+    check = bytes([CHECK, _CHECK.size]) + _CHECK.pack(zlib.crc32(b"".join(fixed)))
+    plain = fixed[0] + state + b"".join(fixed[1:]) + check + bytes([last_byte(KIND_HELLO)])
+    return bytes([DELIMITER]) + seal(plain)
+
+
+class HelloReader:
+    """Collects hellos, which may come in several packets."""
+
+    def __init__(self) -> None:
+        self._fields: dict[int, bytes] = {}
+        self._checked = bytearray()
+
+    def take(self, plain: bytes) -> Hello | None:
+        """An unsealed packet of kind hello; returns the hello that it completes. Raises :class:`PacketError`."""
+        try:
+            return self._take(plain[:-1])
+        except PacketError:
+            self._fields.clear()
+            raise
+
+    def _take(self, data: bytes) -> Hello | None:
+        while data:
+            kind, value = data[0], data[2 : 2 + data[1]] if len(data) > 1 else b""
+            if len(data) < 2 or len(value) != data[1]:
+                raise PacketError("length", f"field {kind} of a hello is cut off")
+            field, data = data[: 2 + len(value)], data[2 + len(value) :]
+            if kind == SHEET:
+                self._fields.clear()
+                self._checked.clear()
+            elif not self._fields:
+                raise PacketError("content", f"hello without its beginning: field {kind} comes first")
+            if len(value) < _SIZES.get(kind, 0):
+                raise PacketError("content", f"field {kind} of a hello has {len(value)} bytes")
+            if kind == CHECK:
+                if data:
+                    raise PacketError("length", f"hello with {len(data)} bytes after its end")
+                return self._finish(value)
+            if kind != STATE:
+                self._checked += field
+            if len(self._checked) > _MOST_BYTES:
+                raise PacketError("length", f"hello of over {_MOST_BYTES} bytes")
+            self._fields[kind] = value
+        return None
+
+    def _finish(self, check: bytes) -> Hello:
+        if _CHECK.unpack_from(check)[0] != zlib.crc32(self._checked):
+            raise PacketError("crc", "CRC-32 of a hello does not match")
+        fields, self._fields = self._fields, {}
+        if missing := _MANDATORY - set(fields):
+            raise PacketError("content", f"hello without field {min(missing)}")
+        try:
+            return _hello(fields)
+        except ValueError as error:
+            raise PacketError("content", f"hello of a sheet that cannot be: {error}") from None
+
+
+def _hello(fields: dict[int, bytes]) -> Hello:
+    rows, columns, connectivity, report, bits, send, capacity, ghosts = _SHEET.unpack_from(fields[SHEET])
+    pitch_x_mm, pitch_y_mm = _PITCH.unpack_from(fields[PITCH])
+    if report >= len(_REPORTS) or send >= len(_SENDS) or ghosts > 1:
+        raise ValueError(f"report is {report}, send is {send}, diodes is {ghosts}")
+    sheet = Sheet(
+        rows=rows,
+        columns=columns,
+        connectivity=connectivity,
+        report=_REPORTS[report],
+        barycenter_bits=bits,
+        zone_capacity=capacity,
+        pitch_x_mm=pitch_x_mm,
+        pitch_y_mm=pitch_y_mm,
+        radius_mm=_RADIUS.unpack_from(fields[RADIUS])[0] if RADIUS in fields else None,
+        ghosts=bool(ghosts),
+    )
+    sheet.check()
+    clock_hz, baud = _RATES.unpack_from(fields[RATES])
+    if not (clock_hz and baud):
+        raise ValueError(f"clock is {clock_hz} Hz, baud rate is {baud}")
+    state = fields[STATE]
+    if not all(digit & 0x80 for digit in state[:STATE_DIGITS]):
+        raise ValueError("its state is not written in digits")
+    return Hello(
+        sheet=sheet,
+        fingerprint=fields[FINGERPRINT][:_FINGERPRINT_BYTES],
+        name=fields.get(NAME, b"").decode(),
+        clock_hz=clock_hz,
+        baud=baud,
+        send=_SENDS[send],
+        commands=fields.get(COMMANDS, b""),
+        **_counters(state),
+    )
+
+
+def _counters(state: bytes) -> dict[str, int]:
+    counters, offset = {}, 0
+    for name, count in {
+        "sent": SENT_DIGITS,
+        "epoch": EPOCH_DIGITS,
+        "heard": HEARD_DIGITS,
+        "stuck": STUCK_DIGITS,
+    }.items():
+        counters[name] = number(state[offset : offset + count])
+        offset += count
+    return counters

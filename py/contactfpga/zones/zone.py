@@ -1,0 +1,264 @@
+"""What a frame says of the sheet: contact zones in cells, in mm, and on the link's surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from typing import overload
+
+import numpy as np
+
+from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones import ghosts, labels
+
+Vector = tuple[float, float, float]
+
+DTYPE = np.dtype(
+    [
+        ("area_cells", np.int64),
+        ("sum_x", np.int64),
+        ("sum_y", np.int64),
+        ("area_mm2", np.float64),
+        ("x_mm", np.float64),
+        ("y_mm", np.float64),
+        ("point_mm", np.float64, 3),
+        ("normal", np.float64, 3),
+        ("ghost", np.bool_),
+    ]
+)
+"""Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
+
+_UNSENT = ("sum_x", "sum_y")
+DIVIDED_DTYPE = np.dtype([(name, DTYPE[name]) for name in DTYPE.names or () if name not in _UNSENT])
+"""The same with ``report = "barycenter"``, whose boards send no sums."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Zone:
+    """One contact zone."""
+
+    area_cells: int
+    """Pressed cells."""
+    sum_x: int | None
+    """Sum of the cells' columns, exact; None with ``report = "barycenter"``, which does not send it."""
+    sum_y: int | None
+    """Sum of the cells' rows, exact; None likewise."""
+    area_mm2: float
+    """Area of the cells in mm2, measured on the sheet."""
+    x_mm: float | None
+    """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0. It is off by at most
+    :attr:`Zones.rounding_mm`. None for a zone without cells, which lies nowhere: only a frame that is flagged
+    ``mismatch`` can hold one."""
+    y_mm: float | None
+    """Barycenter along the rows in mm; row 0 lies at 0. It is off by at most :attr:`Zones.rounding_mm`. None as
+    ``x_mm``."""
+    point_mm: Vector | None
+    """Barycenter in the link's frame in mm; it lies on the surface. None as ``x_mm``."""
+    normal: Vector | None
+    """Outward unit normal at that point. None as ``x_mm``."""
+    ghost: bool = False
+    """On a sheet without diodes: other pressed switches may have made all of it, with nothing pressed here."""
+
+
+class Zones(Sequence[Zone]):
+    """The zones of one frame, sorted by y, x and area; not to be changed."""
+
+    def __init__(
+        self,
+        frame: Frame,
+        sheet: Sheet,
+        time_us: int | None = None,
+        before: Frame | None = None,
+        host_time_s: float | None = None,
+    ):
+        self.frame = frame
+        """The frame as it came over the wire."""
+        self.sheet = sheet
+        """The sheet, as the board's hello tells it."""
+        self.time_us = frame.time_us if time_us is None else time_us
+        """Device time of the sample of the frame's first row in us, since power-up."""
+        self.host_time_s = host_time_s
+        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
+        None in a recording."""
+        self.flags: frozenset[str] = frame.flags
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`; and `ghost` where a sheet without diodes may show pressed
+        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to."""
+        self._before = before
+        if sheet.ghosts and (self._ghost_cells.any() if frame.bitmap is not None else ghosts.spread(frame, before)):
+            self.flags |= {"ghost"}
+
+    @property
+    def sequence(self) -> int:
+        """Frames the board sent before this one, modulo 256."""
+        return self.frame.sequence
+
+    @property
+    def overwritten(self) -> int:
+        """Frames that the board replaced by newer ones before they were sent, modulo what the trailer has room for."""
+        return self.frame.overwritten
+
+    @property
+    def faults(self) -> frozenset[str]:
+        """Faults of the sheet that the board noticed: ``stuck``, a column read pressed while no row was driven. How
+        many columns did is in ``board.hello.stuck``."""
+        return frozenset({"stuck"} if "fault" in self.flags else ())
+
+    @property
+    def total_zones(self) -> int:
+        """Zones on the sheet, also those the frame had no room for."""
+        return self.frame.zones if self.frame.bitmap is None else len(self)
+
+    @property
+    def pressed(self) -> int:
+        """Pressed cells on the whole sheet."""
+        return self.frame.cells
+
+    @property
+    def cells(self) -> np.ndarray | None:
+        """(rows, columns) bool with ``report = "cells"``, else None: then the board sends zones only."""
+        return self.frame.bitmap
+
+    @property
+    def ghost_cells(self) -> np.ndarray | None:
+        """(rows, columns) bool with ``report = "cells"``, else None: cells that other pressed ones may have made, which
+        takes a sheet without diodes (:mod:`contactfpga.zones.ghosts`)."""
+        return None if self.frame.bitmap is None else self._ghost_cells
+
+    @functools.cached_property
+    def _ghost_cells(self) -> np.ndarray:
+        if not self.sheet.ghosts:
+            return np.zeros_like(self.frame.bitmap)
+        return ghosts.cells(self.frame, self._before)
+
+    @functools.cached_property
+    def suspects(self) -> list[bool]:
+        """:attr:`Zone.ghost` of each of :attr:`records`."""
+        if not self.sheet.ghosts:
+            return [False] * len(self)
+        if self._labels is None:
+            return ghosts.zones(self.frame, self._before)
+        return ghosts.labelled(self.frame, self._before, self._labels)
+
+    @functools.cached_property
+    def _labels(self) -> np.ndarray | None:
+        """(rows, columns) int with ``report = "cells"``, else None: the number of each cell's zone, from 1."""
+        return None if self.frame.bitmap is None else labels.label(self.frame.bitmap, self.sheet.connectivity)
+
+    @property
+    def rounding_mm(self) -> tuple[float, float]:
+        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``, else
+        0."""
+        if self.sheet.report != "barycenter":
+            return 0.0, 0.0
+        steps = 2 << self.sheet.barycenter_bits
+        return self.sheet.pitch_x_mm / steps, self.sheet.pitch_y_mm / steps
+
+    @functools.cached_property
+    def array(self) -> np.ndarray:
+        """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones. It has no ``sum_x`` and
+        ``sum_y`` with ``report = "barycenter"``. Where a zone has None it has NaN."""
+        dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
+        array = np.zeros(len(self), dtype)
+        for row, zone in zip(array, self._zones):
+            for name in dtype.names or ():
+                value = getattr(zone, name)
+                row[name] = math.nan if value is None else value
+        array.flags.writeable = False
+        return array
+
+    @functools.cached_property
+    def _zones(self) -> tuple[Zone, ...]:
+        # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
+        make = self._exact if self.frame.barycenters is None else self._divided
+        both = zip(self.records.tolist(), self.suspects)
+        zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
+        zones.sort(key=_order)
+        return tuple(zones)
+
+    def _exact(self, area: int, sum_x: int, sum_y: int, ghost: bool) -> Zone:
+        return self._placed(area, sum_x, sum_y, (sum_x / area, sum_y / area) if area else None, ghost)
+
+    def _divided(self, area: int, x: int, y: int, ghost: bool) -> Zone:
+        steps = 1 << self.sheet.barycenter_bits
+        return self._placed(area, None, None, (x / steps, y / steps) if area else None, ghost)
+
+    def _placed(
+        self, area: int, sum_x: int | None, sum_y: int | None, place: tuple[float, float] | None, ghost: bool
+    ) -> Zone:
+        area_mm2 = area * (self.sheet.pitch_x_mm * self.sheet.pitch_y_mm)
+        if place is None:
+            return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
+        x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
+        point_mm, normal = on_surface(x_mm, y_mm, self.sheet.radius_mm)
+        return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
+
+    @overload
+    def __getitem__(self, index: int) -> Zone: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Zone, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Zone | tuple[Zone, ...]:
+        return self._zones[index]
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    @functools.cached_property
+    def records(self) -> np.ndarray:
+        """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
+        if self._labels is not None:
+            return labels.moments(self._labels)
+        return self.frame.moments if self.frame.barycenters is None else self.frame.barycenters
+
+    def __iter__(self) -> Iterator[Zone]:
+        return iter(self._zones)
+
+    def __repr__(self) -> str:
+        what = f"{len(self)} zone" + ("" if len(self) == 1 else "s")
+        flags = "".join(f", {flag}" for flag in sorted(self.flags))
+        when = f"frame {self.sequence} at {self.time_us / 1e6:.6f} s"
+        head = f"<Zones: {what}, {self.pressed} cells pressed, {when}{flags}"
+        return "\n".join([head, *map(_line, self)]) + ">"
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        values: dict[str, object] = {
+            name: getattr(self, name)
+            for name in ("sequence", "time_us", "host_time_s", "overwritten", "total_zones", "pressed")
+        }
+        values["faults"] = sorted(self.faults)
+        values["flags"] = sorted(self.flags)
+        values["rounding_mm"] = list(self.rounding_mm)
+        values["zones"] = [dataclasses.asdict(zone) for zone in self]
+        if self.cells is not None:
+            values["cells"] = [[int(cell) for cell in row] for row in self.cells]
+            if self.sheet.ghosts:
+                values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
+        return values
+
+
+def _order(zone: Zone) -> tuple[bool, float, float, int]:
+    """Zones that lie nowhere come last."""
+    return zone.y_mm is None, zone.y_mm or 0.0, zone.x_mm or 0.0, zone.area_cells
+
+
+def _line(zone: Zone) -> str:
+    where = "nowhere" if zone.x_mm is None else f"at x {zone.x_mm:.2f} mm, y {zone.y_mm:.2f} mm"
+    return f"  {zone.area_cells} cells, {zone.area_mm2:g} mm2 {where}"
+
+
+def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
+    """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
+
+    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis towards the y axis, and y
+    along it; ``x_mm`` is the arc length.
+    """
+    if radius_mm is None:
+        return (x_mm, y_mm, 0.0), (0.0, 0.0, 1.0)
+    angle = x_mm / radius_mm
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return (radius_mm * cosine, radius_mm * sine, y_mm), (cosine, sine, 0.0)

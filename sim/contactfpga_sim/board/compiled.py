@@ -1,0 +1,167 @@
+"""A compiled board: the gateware of a Skin as native code, in a sheet of switches, stepped by the clock."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from contactfpga.errors import BoardClosed
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.board import native
+from contactfpga_sim.scenes.cells import to_words
+from contactfpga_sim.sheet.circuit import Line
+
+CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "received")
+"""What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
+the transmit and of the contact pin and of the rows that are driven, and bytes decoded from the line. The order is that
+of the driver."""
+
+EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
+"""An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
+wire, the byte, the level or the driven rows; and for a row whether it is the frame's last, for a record or an item
+whether it is the end mark."""
+
+
+class CompiledBoard:
+    """A compiled board, stepped by the clock. Cycle 0 is the first after power-up, as in docs/timing.md.
+
+    ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, by default what
+    :func:`model_of` says. The first board of a Skin takes some seconds to build
+    (:mod:`contactfpga_sim.board.native`, also for what can go wrong).
+    """
+
+    def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
+        self.skin = skin
+        self._library = _library(model or model_of(skin))
+        self._lock = threading.RLock()  # a call of another thread would free or run the model under this one's feet
+        self._board: ctypes.c_void_p | None = ctypes.c_void_p(self._library.board_new())
+        captured = sum(1 << CAPTURABLE.index(name) for name in set(capture))
+        self._call("capture", ctypes.c_uint(captured))
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        """The driver's function of this name; raises :class:`BoardClosed` where there is no model any more."""
+        with self._lock:
+            if self._board is None:
+                raise BoardClosed("the virtual board was closed; make another one")
+            return getattr(self._library, f"board_{name}")(self._board, *arguments)
+
+    @property
+    def cycle(self) -> int:
+        """The cycle that runs next."""
+        return self._call("cycle")
+
+    @property
+    def broken(self) -> int:
+        """Bytes on the line that came without a stop bit."""
+        return self._call("broken")
+
+    def press(self, cells: np.ndarray) -> None:
+        """From the next cycle on these (rows, columns) bool cells are pressed."""
+        self.hold(cells[None], 0)
+
+    def restart(self, mutant: int = 0) -> None:
+        """Power up anew, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
+        self._call("restart", ctypes.c_uint(mutant))
+
+    def stick(self, columns: np.ndarray | None) -> None:
+        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
+        word = 0 if columns is None else int(to_words(np.asarray(columns, bool)))
+        self._call("stick", ctypes.c_uint64(word))
+
+    def settle(self, line: Line) -> None:
+        """From the next cycle on columns take the time that such a line takes, and not none."""
+        shares = (line.share(seconds, 1 / self.skin.clock_hz) for seconds in (line.press_s, line.release_s))
+        values = (*shares, line.pulled, line.threshold)
+        self._call("settle", *map(ctypes.c_double, values))
+
+    def run(self, cycles: int) -> None:
+        """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
+        self._call("run", ctypes.c_uint64(cycles))
+
+    def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
+        """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
+        if frames.shape[1:] != (self.skin.rows, self.skin.columns):
+            raise ValueError(f"cells of {frames.shape[1:]}; the sheet is {self.skin.rows}x{self.skin.columns}")
+        words = np.ascontiguousarray(to_words(frames))
+        self._call(
+            "hold",
+            words.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_size_t(len(words)),
+            ctypes.c_uint64(Derived(self.skin).frame_clocks if cycles is None else cycles),
+        )
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
+        self._call("send", data, ctypes.c_size_t(len(data)))
+
+    def pull_low(self, cycles: int) -> None:
+        """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
+        self._call("pull_low", ctypes.c_uint64(cycles))
+
+    def take(self, boundary: str) -> np.ndarray:
+        """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
+        index = ctypes.c_uint(CAPTURABLE.index(boundary))
+        count = ctypes.c_size_t()
+        with self._lock:  # the address holds until the model runs on
+            address = self._call("events", index, ctypes.byref(count))
+            events = native.array_at(address, count.value, EVENT)
+            self._call("forget", index)
+        return events
+
+    def receive(self) -> bytes:
+        """The bytes decoded from the line since they were taken last."""
+        return self.take("received")["data"].astype(np.uint8).tobytes()
+
+    def close(self) -> None:
+        """Free the model; every later call raises :class:`BoardClosed`. May be called twice."""
+        with self._lock:
+            if self._board is not None:
+                self._call("free")
+                self._board = None
+
+    def __enter__(self) -> CompiledBoard:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
+    """What the board of a Skin is built from: its gateware, or a netlist with the gateware's pins and no probes,
+    which notes neither rows nor records nor bytes."""
+
+    def elaborate() -> Any:
+        from contactfpga_hdl.top import Top
+
+        return netlist or Top(skin, probes=True)
+
+    return native.Model(
+        title=f"the {skin.rows}x{skin.columns} board" + (" from its netlist" if netlist else ""),
+        driver="board.cpp",
+        key=netlist.key if netlist else native.skin_key(skin),
+        elaborate=elaborate,
+        defines={
+            "ROWS": skin.rows,
+            "COLUMNS": skin.columns,
+            "COL2ROW": int(skin.selects_low),
+            "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
+            "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
+            "BIT_CLOCKS": Derived(skin).bit_clocks,
+            "PROBES": int(netlist is None),
+            "DIVIDED": int(skin.report == "barycenter"),
+        },
+    )
+
+
+def _library(model: native.Model) -> ctypes.CDLL:
+    library = native.load(model)
+    library.board_new.restype = ctypes.c_void_p
+    library.board_cycle.restype = ctypes.c_uint64
+    library.board_broken.restype = ctypes.c_uint64
+    library.board_events.restype = ctypes.c_void_p
+    return library

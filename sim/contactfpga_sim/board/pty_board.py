@@ -1,0 +1,219 @@
+"""The virtual board behind a pseudo-terminal: a serial client sees what a board would send, never faster than in real
+time, and slower where this machine cannot keep up, which is told.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import termios
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin, SkinError
+from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.scenes.scene import Source
+
+CHUNK_S = 0.5e-3
+"""Simulated time between two looks at the port."""
+
+MAX_LAG_S = 0.02
+"""Simulated time may fall this far behind and catch up; beyond, it slips and stays behind."""
+
+SLIP_LIMIT = 0.05
+"""Share of real time that may slip in :data:`SLIP_WINDOW_S` before it is reported."""
+
+SLIP_WINDOW_S = 5.0
+
+HEADROOM = 0.9
+"""Share of what the machine was seen to do that a clock may take which is recommended."""
+
+
+class PtyBoard:
+    """A virtual board with a port that a serial client can open.
+
+    The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
+    ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
+    skin and scene: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a symbolic link to the
+    port. What no client reads is dropped, the oldest first, and counted.
+    """
+
+    def __init__(
+        self,
+        skin: Skin | None = None,
+        scene: Source = None,
+        link: str | Path | None = None,
+    ):
+        self._board = VirtualBoard(skin, scene)
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        # The board keeps its own end of the slave open: without it, a client that leaves would end the terminal.
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        """Path of the port to open."""
+        self.slip = 0.0
+        """Seconds by which simulated time has fallen behind real time for good."""
+        self.dropped = 0
+        """Times that the port was full and what it held was dropped."""
+        self.failure: BaseException | None = None
+        """What ended the thread, if it did not end by :meth:`stop`."""
+        self._link = Path(link) if link else None
+        if self._link:
+            self._make_link(self._link)
+
+    @property
+    def skin(self) -> Skin:
+        return self._board.skin
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+        return self._board.clock()
+
+    def start(self) -> None:
+        """Run the board in a thread until :meth:`stop`."""
+        self._thread = threading.Thread(target=self._run_guarded, name="virtual board", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the board and its port; a client that has it open sees a hangup. Harmless when it has ended."""
+        self._stopping.set()
+        if self._thread and self._thread is not threading.current_thread():
+            self._thread.join()
+        if self._master >= 0:
+            os.close(self._master)
+            os.close(self._slave)
+            self._master = self._slave = -1
+            self._board.close()
+            if self._link:
+                self._remove_link(self._link)
+
+    def __enter__(self) -> PtyBoard:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def serve(self) -> int:
+        """Run in the foreground until SIGINT or SIGTERM: the port on stdout, everything else on stderr."""
+        shown = self._link or self.port
+        print(shown, flush=True)
+        _say(f"virtual board of {self.skin.rows}x{self.skin.columns} cells; try: contactfpga zones {shown}")
+        _say("Ctrl-C ends it")
+        started = time.monotonic()
+        try:
+            with self._ended_by_signals():
+                self._run()
+            passed = time.monotonic() - started
+            share = min(1.0, self.clock() / passed)
+            told = f"{self.clock():.1f} s of board time in {passed:.1f} s ({share:.0%}), slip {self.slip:.2f} s"
+        finally:
+            self.stop()
+        _say(f"ended; {told}, {self.dropped} times what nobody read was dropped")
+        return 0
+
+    def _run_guarded(self) -> None:
+        try:
+            self._run()
+        except BaseException as error:  # a thread has nobody to raise it to
+            self.failure = error
+            _say(f"the virtual board ended: {error}")
+            self.stop()  # its client finds the port gone, and does not wait for a board that says nothing
+
+    def _run(self) -> None:
+        cycles = max(1, round(CHUNK_S * self.skin.clock_hz))
+        begin = time.monotonic() - self._board.clock()  # when simulated time was 0, slip taken out
+        window, window_slip = time.monotonic(), self.slip
+        while not self._stopping.is_set():
+            ahead = self._board.clock() - (time.monotonic() - begin)
+            if ahead < -MAX_LAG_S:
+                self.slip -= ahead
+                begin -= ahead
+            self._listen(max(0.0, ahead))
+            if ahead > 0 and self._board.clock() > time.monotonic() - begin:
+                continue  # woken by a client before it is time
+            self._board.advance(cycles)
+            self._speak(self._board.read(0))
+            if (passed := time.monotonic() - window) > SLIP_WINDOW_S:
+                self._report_slip((self.slip - window_slip) / passed)
+                window, window_slip = time.monotonic(), self.slip
+
+    def _report_slip(self, share: float) -> None:
+        if share > SLIP_LIMIT:
+            _say(slip_told(self.skin, share))
+
+    def _listen(self, seconds: float) -> None:
+        """Wait at most ``seconds`` for a client's bytes, and hand them to the board."""
+        if select.select([self._master], [], [], seconds)[0]:
+            with contextlib.suppress(BlockingIOError):
+                self._board.write(os.read(self._master, 4096))
+
+    def _speak(self, data: bytes) -> None:
+        while data:
+            try:
+                data = data[os.write(self._master, data) :]
+            except BlockingIOError:
+                self.dropped += 1
+                termios.tcflush(self._slave, termios.TCIFLUSH)
+
+    def _make_link(self, link: Path) -> None:
+        try:
+            # What a board left that was killed; any other link is somebody's.
+            if link.is_symlink() and os.path.dirname(os.readlink(link)) == os.path.dirname(self.port):
+                link.unlink()
+            link.symlink_to(self.port)
+        except OSError as error:
+            self._link = None
+            self.stop()
+            raise ContactFPGAError(f"cannot link {link} to {self.port}: {error.strerror}") from None
+
+    def _remove_link(self, link: Path) -> None:
+        """Only while it is the one that was made: by now the path may be another's."""
+        with contextlib.suppress(OSError):  # gone, or no link
+            if os.readlink(link) == self.port:
+                link.unlink()
+
+    @contextlib.contextmanager
+    def _ended_by_signals(self) -> Iterator[None]:
+        def end(*_: object) -> None:
+            self._stopping.set()
+
+        before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def slip_told(skin: Skin, share: float) -> str:
+    """What is said of a board when this share of real time slips."""
+    held = 1 - share
+    clock_hz = clock_that_holds(skin, held * skin.clock_hz)
+    advice = (
+        f"a Skin with clock_hz = {clock_hz} would hold it on this machine"
+        if clock_hz
+        else f"the clock that would hold it does not go with baud = {skin.baud} and the rest of this Skin"
+    )
+    return f"slower than real time: {held:.0%} of it at {skin.clock_hz / 1e6:g} MHz; {advice}"
+
+
+def clock_that_holds(skin: Skin, cycles_per_second: float) -> int | None:
+    """The fastest clock in Hz that the Skin can have and a machine of this speed can keep up with."""
+    for megahertz in range(int(HEADROOM * cycles_per_second / 1e6), 0, -1):
+        with contextlib.suppress(SkinError):
+            return skin.replace(clock_hz=megahertz * 1_000_000).clock_hz
+    return None
+
+
+def _say(text: str) -> None:
+    print(f"contactfpga: {text}", file=sys.stderr, flush=True)

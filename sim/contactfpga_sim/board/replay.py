@@ -1,0 +1,266 @@
+"""Recorded frames through the compiled gateware: ``contactfpga replay``."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactfpga.console import terminal
+from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.wire import protocol
+from contactfpga.wire.protocol import Frame
+from contactfpga_sim.board import native
+from contactfpga_sim.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.scenes.recordings import Recording
+
+if TYPE_CHECKING:
+    import argparse
+
+CHUNK = 256
+"""Frames that are simulated while those before are decoded."""
+
+BIT_CLOCKS = 2
+"""The fastest UART a Skin admits."""
+
+
+class ReplayError(ContactFPGAError):
+    """A frame of the input did not come out exactly once."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replayed:
+    """What the gateware made of one input frame."""
+
+    frame: Frame
+    first_record: int | None
+    """Clocks from the transfer of the frame's last row to its first record, negative if that came before; None
+    without a zone."""
+    last_record: int | None
+    """The same to its last record."""
+    duration: int
+    """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
+
+
+def zones_bound(frames: np.ndarray, connectivity: int) -> int:
+    """At least as many as the zones of any frame: runs that touch nothing in the row above."""
+    above = np.pad(frames, ((0, 0), (1, 0), (1, 1)))[:, :-1]
+    touched = above[:, :, 1:-1]
+    if connectivity == 8:
+        touched = touched | above[:, :, :-2] | above[:, :, 2:]
+    starts = frames & ~np.pad(frames, ((0, 0), (0, 0), (1, 0)))[:, :, :-1]
+    run = starts.ravel().cumsum() - 1  # number of the run that a pressed cell is in
+    joined = np.zeros(int(starts.sum()), bool)
+    joined[run[(frames & touched).ravel()]] = True
+    frame_of_run = np.nonzero(starts)[0]
+    return int(np.bincount(frame_of_run[~joined]).max(initial=0))
+
+
+def skin_for(
+    rows: int,
+    columns: int,
+    connectivity: int,
+    zones: int,
+    pitch_mm: float = 10.0,
+    barycenter_bits: int | None = None,
+) -> Skin:
+    """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
+
+    With ``barycenter_bits`` the board divides, and reports so many fraction bits. Steps of the capacity are a third at
+    most, so that recordings of one sheet share few builds.
+    """
+    shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
+    if barycenter_bits is not None:
+        shape |= {"report": "barycenter", "barycenter_bits": barycenter_bits}
+    most = Skin(**shape, zone_capacity=1).max_zones()
+    steps = (step << shift for shift in range(12) for step in (4, 5, 6, 7))
+    capacity = min(most, next(step for step in (1, 2, 3, *steps) if step >= zones))
+    slow = Skin(**shape, zone_capacity=capacity, baud=6_000_000)
+    derived = Derived(slow)
+    wire = derived.max_frame_bytes * 10 * BIT_CLOCKS + 8
+    row_clocks = max(derived.min_row_clocks, math.ceil(wire / rows))
+    return slow.replace(
+        zone_capacity=capacity,
+        settle_us=(row_clocks - 1) / derived.clocks_per_us,
+        release_us=1 / derived.clocks_per_us,
+        pitch_x_mm=pitch_mm,
+        pitch_y_mm=pitch_mm,
+    )
+
+
+def replay(frames: np.ndarray, skin: Skin) -> Iterator[Replayed]:
+    """Hold each (rows, columns) bool frame for exactly one scan of a board built from ``skin``; results in order.
+
+    Scans in which the board says hello, and some at the start, are left to an untouched sheet. Raises
+    :class:`ReplayError` if a frame does not come out exactly once.
+    """
+    plan = _Plan(skin, len(frames))
+    with CompiledBoard(skin, capture=("rows", "records")) as board, ThreadPoolExecutor(1) as pool:
+        collector = _Collector(board, plan)
+        parts = [range(start, min(start + CHUNK, plan.scans)) for start in range(0, plan.scans, CHUNK)]
+        running = pool.submit(collector.simulate, frames, parts[0])
+        for following in [*parts[1:], None]:
+            events = running.result()
+            if following is not None:
+                running = pool.submit(collector.simulate, frames, following)
+            yield from collector.collect(events)
+    collector.finish()
+
+
+class _Plan:
+    """Which scan holds which input frame."""
+
+    def __init__(self, skin: Skin, count: int):
+        derived = Derived(skin)
+        hello = len(protocol.encode_hello(skin)) * 10 * derived.bit_clocks
+        quiet = math.ceil(hello / derived.frame_clocks) + 2
+        period = derived.hello_frames
+        self.frame_of: list[int | None] = [None] * quiet
+        frame = 0
+        while frame < count:
+            if period > 2 * quiet and (len(self.frame_of) + 1) % period < quiet:
+                self.frame_of.append(None)
+                continue
+            self.frame_of.append(frame)
+            frame += 1
+        self.frame_of += [None] * (quiet + 1)
+        self.scans = len(self.frame_of)
+
+
+@dataclasses.dataclass
+class _Events:
+    rows: np.ndarray
+    records: np.ndarray
+    received: np.ndarray
+
+
+class _Collector:
+    def __init__(self, board: CompiledBoard, plan: _Plan):
+        self._board = board
+        self._plan = plan
+        self._derived = Derived(board.skin)
+        self._times: dict[int, list[int]] = {}  # scan: first row, last row, records
+        self._scan = 0
+        self._row_scan = 0
+        self._pending: list[int] = []
+        self._packet = bytearray()
+        self._next = 0
+
+    def simulate(self, frames: np.ndarray, scans: range) -> _Events:
+        skin = self._board.skin
+        cells = np.zeros((len(scans), skin.rows, skin.columns), bool)
+        for index, scan in enumerate(scans):
+            frame = self._plan.frame_of[scan]
+            if frame is not None:
+                cells[index] = frames[frame]
+        self._board.hold(cells)
+        return _Events(*(self._board.take(name) for name in ("rows", "records", "received")))
+
+    def collect(self, events: _Events) -> Iterator[Replayed]:
+        """The input frames whose last byte is among the events."""
+        self._note_times(events)
+        for cycle, value in zip(events.received["cycle"].tolist(), events.received["data"].tolist()):
+            if value != protocol.DELIMITER:
+                self._packet.append(value)
+                continue
+            if not self._packet:  # in front of a hello
+                continue
+            plain = protocol.unseal(bytes(self._packet), protocol.check_prefix(self._board.skin))
+            self._packet.clear()
+            if protocol.kind_of(plain) != protocol.KIND_HELLO:
+                yield from self._place(protocol.decode_frame(plain, self._derived), cycle)
+
+    def _note_times(self, events: _Events) -> None:
+        rows = self._board.skin.rows
+        for cycle, mark in zip(events.rows["cycle"].tolist(), events.rows["mark"].tolist()):
+            times = self._times.setdefault(self._row_scan // rows, [cycle, cycle])
+            times[1] = cycle
+            self._row_scan += 1
+            assert bool(mark) == (self._row_scan % rows == 0)
+        for cycle, end in zip(events.records["cycle"].tolist(), events.records["mark"].tolist()):
+            if end:
+                self._times[self._scan] += self._pending[:1] + self._pending[-1:]
+                self._pending.clear()
+                self._scan += 1
+            else:
+                self._pending.append(cycle)
+
+    def _place(self, frame: Frame, end: int) -> Iterator[Replayed]:
+        """Find the scan by its time; an untouched sheet's frames may be overwritten by each other."""
+        scan = self._next
+        while self._time(scan) != frame.time_us:
+            if scan >= self._plan.scans or self._plan.frame_of[scan] is not None:
+                raise ReplayError(f"scan {scan} did not reach the host; the next frame is of {frame.time_us} us")
+            scan += 1
+        self._next = scan + 1
+        first_row, last_row, *records = self._times.pop(scan)
+        if self._plan.frame_of[scan] is not None:
+            first, last = (cycle - last_row for cycle in records) if records else (None, None)
+            yield Replayed(frame, first, last, end - first_row)
+
+    def _time(self, scan: int) -> int:
+        derived = self._derived
+        strobe = scan * derived.frame_clocks + derived.settle_clocks + 1
+        return strobe // derived.clocks_per_us % (1 << 24)
+
+    def finish(self) -> None:
+        left = sum(frame is not None for frame in self._plan.frame_of[self._next :])
+        if left:
+            raise ReplayError(f"{left} frames of the input did not reach the host")
+
+
+def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
+    """One input frame as ``contactfpga replay --json`` prints it."""
+    zones: list[dict[str, Any]] = []
+    for area, sum_x, sum_y in result.frame.moments.tolist():
+        x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
+        zones.append({"area": area, "sum_x": sum_x, "sum_y": sum_y, "x_mm": x_mm, "y_mm": y_mm})
+    if result.frame.barycenters is not None:
+        steps = 1 << skin.barycenter_bits
+        for area, x, y in result.frame.barycenters.tolist():
+            zones.append({"area": area, "x_mm": x * skin.pitch_x_mm / steps, "y_mm": y * skin.pitch_y_mm / steps})
+    zones.sort(key=lambda zone: (zone["y_mm"], zone["x_mm"], zone["area"]))
+    cycles = {
+        "last_row_to_first_record": result.first_record,
+        "last_row_to_last_record": result.last_record,
+        "frame": result.duration,
+    }
+    return {"frame": index, "zones": zones, "flags": sorted(result.frame.flags), "cycles": cycles}
+
+
+def main(args: argparse.Namespace) -> int:
+    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.barycenter_bits,
+    args.json."""
+    frames = Recording.load(args.frames, args.threshold).pressed
+    _, rows, columns = frames.shape
+    bound = zones_bound(frames, args.connectivity)
+    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm, args.barycenter_bits)
+    native.load(model_of(skin))  # which is no part of the speed
+    started = time.monotonic()
+    counts, late = [0], [0]
+    for index, result in enumerate(replay(frames, skin)):
+        if args.json:
+            sys.stdout.write(json.dumps(to_json(index, result, skin)) + "\n")
+        else:
+            counts.append(result.frame.zones)
+            late.append(result.last_record or 0)
+    if not args.json:
+        seconds = time.monotonic() - started
+        for title, what in (
+            ("frames", f"{len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity"),
+            ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
+            ("last record", f"at most {max(late)} clocks after a frame's last row"),
+            ("speed", f"{len(frames) / seconds:,.0f} frames a second, once compiled"),
+        ):
+            terminal.say(f"{title:20}{what}", hang=20)
+        terminal.say("Every frame came back exactly once. One JSON object a frame: --json")
+    return 0

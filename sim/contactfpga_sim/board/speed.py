@@ -1,0 +1,58 @@
+"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.board.speed`.
+
+A core of its own is assumed: processor time is counted, of the best of some runs. No figure that a test could hold.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.virtual import VirtualBoard
+
+SKINS = {
+    "reference": Skin(),
+    "`serial`": Skin(labeller="serial"),
+    "`adaptive`": Skin(scan="adaptive"),
+    "32x32": Skin(rows=32, columns=32),
+    "64x64": Skin(rows=64, columns=64),
+}
+
+RUNS = 10
+
+RUN_S = 0.02
+"""Board time of a run."""
+
+
+def cycles_per_second(skin: Skin, scene: str = "two_fingers") -> float:
+    """Clock cycles a second of the board alone, without a client."""
+    cycles = round(RUN_S * skin.clock_hz)
+    with VirtualBoard(skin, scene) as board:
+        board.advance(cycles)  # the first run finds cold caches
+        return cycles / min(_seconds(board, cycles) for _ in range(RUNS))
+
+
+def _seconds(board: VirtualBoard, cycles: int) -> float:
+    started = time.thread_time()
+    board.advance(cycles)
+    return time.thread_time() - started
+
+
+def row(name: str, skin: Skin) -> str:
+    """One line of the table."""
+    found = cycles_per_second(skin)
+    return f"| {name} | {skin.clock_hz / 1e6:g} MHz | {found / 1e6:.1f} million | {100 * found / skin.clock_hz:.0f} % |"
+
+
+def main() -> int:
+    """Print the table."""
+    print("| Skin | clock | cycles a second | of real time |")
+    print("|---|---|---|---|")
+    for name, skin in SKINS.items():
+        print(row(name, skin), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""The virtual board: a compiled board in simulated time, behind the interface of a serial port."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes.scene import Source
+from contactfpga_sim.scenes.scene import scene as make_scene
+
+if TYPE_CHECKING:
+    import argparse
+
+CHUNK_S = 0.2e-3
+"""Simulated time between two looks at the scene and at the line."""
+
+
+class VirtualBoard:
+    """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
+
+    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
+    function of the simulated time in s that returns the pressed cells, (rows, columns) bool.
+
+    ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
+    call that waits for a frame.
+    """
+
+    def __init__(self, skin: Skin | None = None, scene: Source = None):
+        self.skin = skin or Skin()
+        self._scene = make_scene(self.skin, scene)
+        self._board = CompiledBoard(self.skin)
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+        self._board.send(data)
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        left = round(seconds * self.skin.clock_hz)
+        while True:
+            if (data := self._board.receive()) or left <= 0:
+                return data
+            cycles = min(left, max(1, round(CHUNK_S * self.skin.clock_hz)))
+            self.advance(cycles)
+            left -= cycles
+
+    def advance(self, cycles: int) -> None:
+        """Run clock cycles with the scene as it is now."""
+        self._board.press(self._scene(self.clock()))
+        self._board.run(cycles)
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+        return self._board.cycle / self.skin.clock_hz
+
+    def close(self) -> None:
+        """Free the board."""
+        self._board.close()
+
+    def __enter__(self) -> VirtualBoard:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def main(args: argparse.Namespace) -> int:
+    """``contactfpga board``: args.skin (path or None), args.scene (name, path or None), args.link (path or None)."""
+    from contactfpga_sim.board.pty_board import PtyBoard
+
+    skin = Skin.load(args.skin) if args.skin else Skin()
+    return PtyBoard(skin, args.scene, link=args.link).serve()

@@ -1,0 +1,1 @@
+"""Gateware against golden model, clock by clock, in three simulators."""

@@ -1,0 +1,45 @@
+"""The gateware top in Amaranth's own simulator, recorded as a trace."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from amaranth.hdl import Cat
+from amaranth.sim import Simulator
+
+from contactfpga_hdl.top import Top
+from contactfpga_sim.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
+from contactfpga_sim.golden.trace import Timeline, Trace
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+
+def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> Trace:
+    """Simulate ``cycles`` clocks of the board; raises :class:`OutOfTime` after ``limit_s`` seconds."""
+    top = Top(skin, probes=True)
+    simulator = Simulator(top)
+    simulator.add_clock(1e-6)
+    recorder = TraceRecorder(cycles)
+    stimulus = Stimulus(skin, timeline)
+    levels = Cat(*(getattr(top, name) for name in ports(LEVELS, skin)))
+    names = ports(PAYLOADS, skin)
+    payloads = [getattr(top, name) for name in names]
+    reads = {name: getattr(top, name) for name in stimulus.reads}
+    drives = Cat(*(getattr(top, name) for name in stimulus.drives))
+    above = len(getattr(top, stimulus.drives[0]))
+    deadline = time.monotonic() + limit_s
+
+    async def bench(ctx):
+        for cycle in range(cycles):
+            sheet, rx = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
+            ctx.set(drives, sheet | rx << above)
+            _, _, level, *values = await ctx.tick().sample(levels, *payloads)
+            recorder.note(cycle, level, dict(zip(names, values, strict=True)).__getitem__)
+            if cycle % 256 == 0 and time.monotonic() > deadline:
+                raise OutOfTime(f"{cycle} of {cycles} cycles simulated in {limit_s:g} s")
+
+    simulator.add_testbench(bench)
+    simulator.run()
+    return recorder.trace

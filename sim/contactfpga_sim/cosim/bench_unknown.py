@@ -1,0 +1,178 @@
+"""The gateware in Icarus Verilog with unknowns: from a power-up at which no register and no memory is known.
+
+A simulation of the source would hide unknowns, as ``if`` takes one for false. So all of it, memories included, is
+turned into registers and selections of bits first: there a selection by an unknown is unknown unless both sides agree.
+So is a word that was read in the clock in which it was written, as :data:`NO_COLLISIONS` has it.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactfpga_hdl.board.synthesis import NO_COLLISIONS
+from contactfpga_sim.board import native
+from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
+from contactfpga_sim.cosim.record import OutOfTime, Stimulus
+from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.sheet.matrix import words
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+from contactfpga_hdl.link.link import hello_words
+
+RESET_CLOCKS = 4
+"""Clocks of reset after power-up. The iCE40 boards give 181, an ECP5 as many as its global reset takes."""
+
+INITIALISED = (r"link\.odometer\.digits\[", r"debounce\.state\[")
+"""Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the odometer's
+digits and the states of debounce. They are put there after the first clock: until then unknown registers may write
+anywhere. In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial`
+there are more zeros: :func:`initialised`."""
+
+_GATES = (
+    f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "
+    "memory_map; dffunmap; opt_clean; write_verilog -noattr gates.v"
+)
+
+
+class Unknown(AssertionError):
+    """An output is unknown after the first clock of the reset."""
+
+
+def initialised(skin: Skin) -> tuple[str, ...]:
+    """:data:`INITIALISED`, the hello's bytes, and of the memory of the labeller `serial` the half that stays zero."""
+    words = (*INITIALISED, rf"link\.store\[({'|'.join(map(str, hello_words(skin)))})\]")
+    if skin.labeller != "serial" or skin.report == "cells":
+        return words
+    places = skin.columns if skin.connectivity == 4 else -(-skin.columns // 2)
+    half = 1 << (places - 1).bit_length()
+    return (*words, rf"label\.groups\[({'|'.join(map(str, range(half, 2 * half)))})\]")
+
+
+def available() -> bool:
+    """Whether Icarus Verilog is installed."""
+    return shutil.which("iverilog") is not None
+
+
+def run(
+    skin: Skin, timeline: Timeline, cycles: int, known_words: Sequence[str] | None = None, limit_s: float = 200.0
+) -> Trace:
+    """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
+
+    ``known_words``: patterns of what is known at power-up, :func:`initialised` if left out. Raises :class:`Unknown`
+    when a row, the transmit or the contact pin is not known, and :class:`OutOfTime`.
+    """
+    from contactfpga_hdl.top import Top
+
+    with tempfile.TemporaryDirectory(prefix="contactfpga-") as name:
+        folder = Path(name)
+        (folder / "model.il").write_text(native.rtlil(Top(skin)))
+        native.yosys(_GATES, folder)
+        patterns = initialised(skin) if known_words is None else known_words
+        gates, known = forget((folder / "gates.v").read_text(), patterns)
+        (folder / "gates.v").write_text(gates)
+        (folder / "bench.v").write_text(_bench(skin, timeline, cycles, known))
+        _run(folder, limit_s, "iverilog", "-g2005", "-o", "bench", "bench.v", "gates.v")
+        output = _run(folder, limit_s, "vvp", "-n", "bench")
+    return _trace(output, cycles)
+
+
+def _run(folder: Path, limit_s: float, *command: str) -> str:
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s)
+    except subprocess.TimeoutExpired:
+        raise OutOfTime(f"{command[0]} was not done in {limit_s:g} s") from None
+    if done.returncode:
+        raise SimulatorFailed(f"{command[0]} ended with {done.returncode}:\n{done.stderr[-2000:]}")
+    return done.stdout
+
+
+def forget(gates: str, initialised: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """The Verilog without initial values, and those by the register's name whose declaration matches a pattern."""
+    known: dict[str, str] = {}
+
+    def declaration(found: re.Match) -> str:
+        if any(re.search(pattern, found[0]) for pattern in initialised):
+            known[found[2]] = found[3]
+        return f"{found[1]}{found[2]} ;"
+
+    return re.sub(r"^( *reg (?:\[.*?\] )?)(\S+) += ([^;]+);$", declaration, gates, flags=re.MULTILINE), known
+
+
+def _trace(output: str, cycles: int) -> Trace:
+    trace = Trace(cycles)
+    tx, contact = 1, 0
+    for line in output.splitlines():
+        what, cycle, *levels = line.split()
+        if what != "pins":
+            raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}")
+        if int(levels[0]) != tx:
+            tx = int(levels[0])
+            trace.line.append((int(cycle), tx))
+        if int(levels[1]) != contact:
+            contact = int(levels[1])
+            trace.contact.append((int(cycle), contact))
+    return trace
+
+
+def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -> str:
+    """Verilog that drives the pins as the timeline says and prints the outputs' changes and the first unknown one."""
+    selected, columns = ("~rows", "~reads") if skin.selects_low else ("rows", "reads")
+    reads = " | ".join(
+        ["stuck", *(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))]
+    )
+    moves = _moves(skin, timeline, cycles)
+    moves[1 - RESET_CLOCKS] = " ".join(f"top.{name} = {value};" for name, value in known.items())
+    steps = "".join(f"        {cycle}: begin {text} end\n" for cycle, text in sorted(moves.items()))
+    cells = ", ".join(f"pressed{row} = 0" for row in range(skin.rows))
+    return f"""`timescale 1ns/1ns
+module bench;
+reg clk = 0, rst = 1, rx = 1;
+reg [{skin.columns - 1}:0] stuck = 0, {cells};
+wire [{skin.rows - 1}:0] rows;
+wire [{skin.rows - 1}:0] selected = {selected};
+wire [{skin.columns - 1}:0] reads = {reads};
+wire tx, contact;
+reg [1:0] seen = 2'bxx;
+integer cycle;
+top top(.clk(clk), .rst(rst), .rx(rx), .columns({columns}), .rows(rows), .tx(tx), .contact(contact));
+initial for (cycle = -{RESET_CLOCKS}; cycle < {cycles}; cycle = cycle + 1) begin
+    if (cycle == 0) rst = 0;
+    case (cycle)
+{steps}    endcase
+    #5;
+    if (cycle > -{RESET_CLOCKS} && ^{{rows, tx, contact}} === 1'bx) begin
+        $display("unknown %0d %b %b %b", cycle, rows, tx, contact);
+        $finish;
+    end
+    if (cycle >= 0 && seen !== {{tx, contact}}) $display("pins %0d %b %b", cycle, tx, contact);
+    seen = {{tx, contact}};
+    clk = 1;
+    #5 clk = 0;
+end
+endmodule
+"""
+
+
+def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
+    """Assignments to the bench's inputs, by the cycle from which they hold."""
+    moves: dict[int, str] = {}
+    line = Stimulus(skin, Timeline([], timeline.received))
+    before = 1
+    for cycle in range(cycles):
+        _, level = line.pins(cycle, {"rows": 0})
+        if level != before:
+            moves[cycle] = f"rx = {level};"
+        before = level
+    for cycle, cells, stuck in timeline.pieces:
+        levels = words(cells, skin.rows)
+        text = "".join(f" pressed{row} = {skin.columns}'h{word:x};" for row, word in enumerate(levels))
+        always = 0 if stuck is None else words(stuck[None], 1)[0]
+        moves[cycle] = moves.get(cycle, "") + f"{text} stuck = {skin.columns}'h{always:x};"
+    return moves

@@ -1,0 +1,87 @@
+"""What every co-simulation bench shares: the pins' input cycle by cycle, and the trace of the probes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.sheet.shift import Sheet
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer")
+"""Ports of the top that are looked at in every cycle."""
+
+PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "item_end", "byte_data")
+"""Ports of the top that are read when something is transferred."""
+
+
+def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
+    """Those of the names that the top of a Skin has."""
+    return tuple(name for name in names if not name.startswith("item_") or skin.report == "barycenter")
+
+
+_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM = (1 << place for place in range(len(LEVELS)))
+
+
+class OutOfTime(RuntimeError):
+    """A simulation passed its wall-clock limit."""
+
+
+class Stimulus:
+    """What the sheet and the line give the board, cycle by cycle; cycles must be asked for in order.
+
+    ``reads`` names the top's outputs that this depends on, ``drives`` the inputs it gives.
+    """
+
+    def __init__(self, skin: Skin, timeline: Timeline):
+        self._sheet = Sheet(skin)
+        self.reads = self._sheet.reads
+        self.drives = (self._sheet.drives, "rx")
+        self._pieces = list(reversed(timeline.pieces))
+        self._bit_clocks = facts(skin).bit_clocks
+        self._received = list(reversed(timeline.received))
+        self._start, self._data = 0, b""
+
+    def pins(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, int]:
+        """Levels of ``drives``, given those of ``reads``."""
+        if self._pieces and self._pieces[-1][0] <= cycle:
+            _, cells, stuck = self._pieces.pop()
+            self._sheet.matrix.press(cells, stuck)
+        return self._sheet.step(pins), self._rx(cycle)
+
+    def _rx(self, cycle: int) -> int:
+        if self._received and self._received[-1][0] == cycle:
+            self._start, self._data = self._received.pop()
+        byte, place = divmod((cycle - self._start) // self._bit_clocks, 10)
+        if byte >= len(self._data):
+            return 1
+        return (1 << 9 | self._data[byte] << 1) >> place & 1  # stop, data, start; sent lowest first
+
+
+class TraceRecorder:
+    """Turns the values of the top's probes, cycle by cycle, into a trace."""
+
+    def __init__(self, cycles: int):
+        self.trace = Trace(cycles)
+        self._levels = _TX
+
+    def note(self, cycle: int, levels: int, read: Callable[[str], int]) -> None:
+        """Take the values of :data:`LEVELS` in ``cycle``, the first one lowest; ``read`` gives any other port's."""
+        if levels & _ROW:
+            self.trace.rows.append((cycle, read("row_cells"), bool(read("row_last"))))
+        if levels & _RECORD:
+            self.trace.records.append((cycle, read("record_data"), bool(read("record_end"))))
+        if levels & _ITEM:
+            self.trace.items.append((cycle, read("item_data"), bool(read("item_end"))))
+        if levels & _BYTE:
+            self.trace.bytes.append((cycle, read("byte_data")))
+        changed = levels ^ self._levels
+        if changed & _TX:
+            self.trace.line.append((cycle, int(bool(levels & _TX))))
+        if changed & _CONTACT:
+            self.trace.contact.append((cycle, int(bool(levels & _CONTACT))))
+        self._levels = levels

@@ -1,0 +1,1 @@
+"""What a built bitstream holds, simulated."""

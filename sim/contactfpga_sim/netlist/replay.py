@@ -1,0 +1,202 @@
+"""What ``make bitstream-replay`` runs: frames through the netlist of a built board, compared with the golden model.
+
+The iCE40 boards' netlists are taken back out of the bitstream; the ULX3S's is the synthesised one. Compared are the
+transmit and the contact pin in every clock after the power-up reset, hence every byte.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from contactfpga.console import interrupt
+from contactfpga.errors import ContactFPGAError, MissingTool
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.board import build
+from contactfpga_hdl.board.boards import BOARDS, BoardSpec, find
+from contactfpga_sim.board import native
+from contactfpga_sim.board.compiled import model_of
+from contactfpga_sim.board.replay import skin_for
+from contactfpga_sim.cosim import bench_native
+from contactfpga_sim.cosim.compare import Mismatch, compare
+from contactfpga_sim.golden import Timeline, predict, requests
+from contactfpga_sim.netlist import extract
+from contactfpga_sim.scenes.recordings import Recording
+from contactfpga_sim.scenes.shapes import variants
+
+FOLDER = Path("build/replay")
+
+BATCH = 500
+"""Frames from one power-up."""
+
+RESET_US = 20
+"""The platform holds reset for no longer than this after power-up."""
+
+_STICK = BOARDS["icestick"].skin
+RUNS: tuple[tuple[str, Skin], ...] = (
+    ("icebreaker", skin_for(8, 8, 8, 16)),
+    ("icebreaker", BOARDS["icebreaker"].skin),
+    ("icestick", _STICK),
+    ("icestick", _STICK.replace(report="cells", clock_hz=48_000_000)),
+    ("ulx3s-12f", BOARDS["ulx3s-12f"].skin.replace(rows=8, columns=8)),
+)
+"""Boards and sheets that are replayed when no board is named. The first one sends every frame, the others overwrite
+some; the second one has its rows on shift registers, the fourth its clock from the PLL."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """A netlist that did what the golden model predicts."""
+
+    frames: int
+    """Held at the pins, each for one scan."""
+    packets: int
+    """That came over the line, hellos among them."""
+    clocks: int
+    changes: int
+    """Of the transmit and the contact pin."""
+
+    def __add__(self, other: Outcome) -> Outcome:
+        pairs = zip(dataclasses.astuple(self), dataclasses.astuple(other), strict=True)
+        return Outcome(*(one + two for one, two in pairs))
+
+
+def replay(skin: Skin, model: native.Model, frames: np.ndarray) -> Outcome:
+    """Hold each of (n, rows, columns) bool frames for one scan; raises :class:`Mismatch` at the first difference."""
+    reset = reset_clocks(skin, model)
+    total = Outcome(0, 0, 0, 0)
+    for start in range(0, len(frames), BATCH):
+        total += _replay(skin, model, frames[start : start + BATCH], reset)
+    return total
+
+
+def _replay(skin: Skin, model: native.Model, frames: np.ndarray, reset: int) -> Outcome:
+    derived = Derived(skin)
+    scan = derived.frame_clocks
+    cycles = len(frames) * scan + 2 * derived.max_frame_bytes * 10 * derived.bit_clocks
+    timeline = Timeline.frames(
+        skin, frames, received=requests(range(scan // 2, cycles, 37 * scan + 5), derived.bit_clocks)
+    )
+    expected = predict(skin, timeline, cycles)
+    got = bench_native.run(skin, _after(timeline, reset), cycles + reset, model)
+    changes = compare(expected.at_the_pins(), got.at_the_pins().since(reset))
+    return Outcome(len(frames), sum(value == 0 for _, value in expected.bytes), cycles, changes)
+
+
+def reset_clocks(skin: Skin, model: native.Model) -> int:
+    """Clocks from power-up to cycle 0 of docs/timing.md, from when the first hello begins."""
+    limit = RESET_US * Derived(skin).clocks_per_us
+    untouched = Timeline([])
+    hello = predict(skin, untouched, limit).line[0][0]
+    line = bench_native.run(skin, untouched, hello + limit, model).line
+    if not line:
+        raise Mismatch("line", (hello, 0), None)
+    return line[0][0] - hello
+
+
+def _after(timeline: Timeline, cycles: int) -> Timeline:
+    pieces = [(start + cycles, cells, stuck) for start, cells, stuck in timeline.pieces]
+    return Timeline(pieces, [(start + cycles, data) for start, data in timeline.received])
+
+
+# ---- frames
+
+
+def stimulus(skin: Skin, count: int, recordings: Sequence[np.ndarray]) -> np.ndarray:
+    """(count, rows, columns) bool frames: shapes that break labellers, windows of recordings, and random ones."""
+    rng = np.random.default_rng(count)
+    shapes = [cells for _, cells in variants(skin.rows, skin.columns)]
+    kinds: list[Iterator[np.ndarray]] = [itertools.cycle(shapes), _random(skin, rng)]
+    kinds += [_windows(skin, frames, rng) for frames in recordings if frames.any()]
+    return np.array([next(kinds[index % len(kinds)]) for index in range(count)])
+
+
+def _random(skin: Skin, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    while True:
+        yield rng.random((skin.rows, skin.columns)) < rng.choice([0.02, 0.1, 0.3, 0.5, 0.7, 0.95])
+
+
+def _windows(skin: Skin, frames: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """The part around a pressed cell of frames with any, drawn by chance; larger sheets are filled up with nothing."""
+    touched = np.flatnonzero(frames.any(axis=(1, 2)))
+    while True:
+        cells = frames[rng.choice(touched)]
+        row, column = rng.choice(np.argwhere(cells))
+        top = np.clip(row - skin.rows // 2, 0, max(0, len(cells) - skin.rows))
+        left = np.clip(column - skin.columns // 2, 0, max(0, cells.shape[1] - skin.columns))
+        part = cells[top : top + skin.rows, left : left + skin.columns]
+        yield np.pad(part, ((0, skin.rows - part.shape[0]), (0, skin.columns - part.shape[1])))
+
+
+# ---- command
+
+
+def main() -> int:
+    """Replay and print what came of it; 1 if a netlist differs from the golden model or its bitstream does not pack."""
+    parser = argparse.ArgumentParser(prog="make bitstream-replay", description=__doc__)
+    parser.add_argument("board", nargs="?", choices=list(BOARDS), help="default: 8x8 on one of each FPGA")
+    parser.add_argument("--skin", type=Path, help="the board's sheet; default: the one it is built with")
+    parser.add_argument("--frames", type=int, default=500, help="for each board (default: %(default)s)")
+    told = "a .npz file with frames named `pressed`, or a folder of such files"
+    parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
+    args = parser.parse_args()
+    if args.skin and not args.board:
+        parser.error("--skin needs the board that it is for")
+    if args.frames < 1:
+        parser.error(f"--frames is {args.frames}; it must be at least 1")
+    recordings = [Recording.load(path).pressed for path in recordings_in(args.recordings)]
+    print(f"frames       {args.frames} a board: shapes, random ones and {len(recordings)} recordings")
+    runs = RUNS
+    if args.board:
+        runs = ((args.board, Skin.load(args.skin) if args.skin else find(args.board).skin),)
+    status = 0
+    for name, skin in runs:
+        board = find(name)
+        try:
+            megahertz = skin.clock_hz // 1_000_000
+            print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}, {megahertz} MHz", flush=True)
+            _report(board, skin, stimulus(skin, args.frames, recordings))
+        except MissingTool as missing:
+            print(f"left out     {missing}")
+        except (ContactFPGAError, build.BitstreamFailed, Mismatch) as error:
+            print(f"FAILED       {error}")
+            status = 1
+    return status
+
+
+def recordings_in(path: Path | None) -> list[Path]:
+    """The file itself, or the files in a folder."""
+    if path is None:
+        return []
+    return sorted(path.glob("*.npz")) if path.is_dir() else [path]
+
+
+def _report(board: BoardSpec, skin: Skin, frames: np.ndarray) -> None:
+    folder = FOLDER / board.name
+    if board.bitstream == "bin":
+        taken = extract.from_bitstream(board, skin, folder)
+        print("bitstream    unpacked and packed again: the same bytes; the netlist is taken out of it")
+    else:
+        taken = extract.synthesised(board, skin, folder)
+        print("netlist      synthesised; not placed, not taken out of a bitstream")
+    if skin.clock_hz != board.clock_hz:
+        print("PLL          a stub drives its output net; it is always locked")
+    model = model_of(skin, taken)
+    print(f"reset        {reset_clocks(skin, model)} clocks after power-up, then cycle 0 of the golden model")
+    started = time.monotonic()
+    out = replay(skin, model, frames)
+    seconds = time.monotonic() - started
+    print(f"the same     {out.frames} frames, {out.packets} packets, {out.changes} changes of the two pins")
+    print(f"speed        {out.clocks} clocks in {seconds:.1f} s, golden model included")
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

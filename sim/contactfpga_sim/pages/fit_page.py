@@ -1,0 +1,53 @@
+"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md: `make fits`."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable
+
+from contactfpga.commands import fit_flags
+from contactfpga.console import interrupt
+from contactfpga_sim.pages import figures
+from contactfpga_sim.studies import pool
+from contactfpga_sim.studies.fit import show
+from contactfpga_sim.studies.fit.command import asked
+from contactfpga_sim.studies.fit.search import fit
+
+EXAMPLES = {
+    "bumper": "examples/scenes-bumper.toml --barycenter-mm 3 --latency-us 500",
+    "hands": "examples/scenes-hands.toml --barycenter-mm 3 --latency-us 500",
+    "sole": "examples/scenes-sole.toml --barycenter-mm 3 --latency-us 500",
+}
+"""Arguments by name."""
+
+
+def section(arguments: str) -> str:
+    """The command and what it says, but for the settings that Skin itself refuses."""
+    command = f"contactfpga fit {arguments}"
+    print(command, file=sys.stderr)
+    parser = argparse.ArgumentParser()
+    fit_flags.add(parser)
+    task, tried = asked(parser.parse_args(shlex.split(arguments)))
+    with pool.executor(None, None) as executor, pool.progress() as step:
+        found = fit(task, tried, executor, step)
+    tables = (show.rows(found, impossible=False), show.reported(found))
+    none = f"Skin itself refuses {len(found.impossible)} more settings."
+    return "\n\n".join((f"    {command}", *map(_markdown, tables), " ".join((*show.notes(found), none))))
+
+
+def _markdown(rows: list[list[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
+
+
+def _table(arguments: str) -> Callable[[], str]:
+    return lambda: section(arguments)
+
+
+TABLES = {name: _table(arguments) for name, arguments in EXAMPLES.items()}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))

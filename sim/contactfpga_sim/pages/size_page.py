@@ -1,0 +1,83 @@
+"""Measures by place and route what README and boards page state of size and clock, and writes it there.
+
+`make sizes` runs it: some 160 runs of place and route, an hour and more of one core unless they are kept from before.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from contactfpga.console import interrupt
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import boards, build, sizes
+from contactfpga_sim.pages import figures
+from contactfpga_sim.studies import size
+
+EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
+"""Sheets that the boards page shows beside the default ones."""
+
+
+def gateware_table() -> str:
+    """The whole design and the labeller alone, by sheet and device."""
+    lines = [
+        "| design | device | " + " | ".join(f"{lines}x{lines}" for lines in sizes.SIZES) + " |",
+        "|---" * (2 + len(sizes.SIZES)) + "|",
+    ]
+    for name in sizes.DESIGNS:
+        for device in sizes.DEVICES:
+            cells = " | ".join(gateware_cell(name, device, lines) for lines in sizes.SIZES)
+            lines.append(f"| {name} | {device.title} | {cells} |")
+    return "\n".join(lines)
+
+
+def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
+    """LUT4, flip-flops, block RAMs and clock of a design."""
+    print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
+    found = size.measure(lambda: sizes.DESIGNS[name](sizes.square(lines)), device)
+    return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
+
+
+def boards_table() -> str:
+    """The sheets that the boards page names, each built for its board."""
+    lines = [
+        "| board | FPGA | clock | sheet | LUT4 | flip-flops | block RAMs | logic cells | Fmax |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for board in boards.BOARDS.values():
+        lines.append(board_row(board, board.skin))
+        if board.name in EXAMPLES:
+            lines.append(board_row(board, Skin.load(EXAMPLES[board.name])))
+    return "\n".join(lines)
+
+
+def board_row(board: boards.BoardSpec, skin: Skin) -> str:
+    """What the bitstream of a Skin takes of the board's FPGA."""
+    print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
+    with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp
+        found = build.build(skin, board, Path(folder))
+    registers = [kind.upper() for kind in (skin.row_drive, skin.column_read) if kind != "direct"]
+    fields = (
+        board.title,
+        board.fpga,
+        f"{skin.clock_hz / 1e6:g} MHz",
+        " ".join((f"{skin.rows}x{skin.columns}", *registers)),
+        "{:,} of {:,}".format(*found.luts),
+        f"{found.flip_flops:,}",
+        "{} of {}".format(*found.block_rams),
+        "{:,} of {:,}".format(*found.logic_cells) if found.logic_cells else "",
+        f"{found.fmax_mhz:.1f} MHz",
+    )
+    return f"| {' | '.join(fields)} |"
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "gateware": gateware_table,
+    "boards": boards_table,
+}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))

@@ -1,0 +1,54 @@
+"""The UART's framing."""
+
+from functools import partial
+
+from amaranth.hdl import Array, Cat, Const, Mux, Signal
+
+from contactfpga_hdl.link.uart import Transmitter
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+
+def framing(proof: Proof, bit_clocks: int) -> None:
+    """Free: bytes at any time.
+
+    Claimed: after a byte is taken there is a start bit, its bits, lowest first, and a stop bit, ``bit_clocks`` each;
+    else the line is high. The next byte is taken in the last clock of the stop bit or whenever nothing is sent, and in
+    no other clock, so that no byte is lost or sent twice.
+    """
+    m = proof.m
+    dut = Transmitter(bit_clocks)
+    inside = proof.put(dut)
+    valid, byte = proof.free(1, "valid"), proof.free(8, "byte")
+    m.d.comb += [dut.bytes.valid.eq(valid), dut.bytes.payload.eq(byte)]
+    bit = Signal(range(11), init=10)  # 10: nothing is sent
+    phase = Signal(range(bit_clocks))
+    frame = Signal(10)
+    idle, ends = bit == 10, phase == bit_clocks - 1
+    proof.claim(dut.bytes.ready == (idle | (bit == 9) & ends))
+    proof.claim(dut.pin == Mux(idle, 1, Array(frame)[bit]))
+    with m.If(valid & dut.bytes.ready):
+        m.d.sync += [frame.eq(Cat(Const(0, 1), byte, Const(1, 1))), bit.eq(0), phase.eq(0)]
+    with m.Elif(~idle):
+        m.d.sync += [phase.eq(Mux(ends, 0, phase + 1)), bit.eq(bit + ends)]
+    proof.lemma((bit <= 10) & (phase < bit_clocks) & (inside["bits_left"] == 10 - bit))
+    with m.If(idle):
+        proof.lemma(inside["shift"] == 0x1FF)
+    with m.Else():
+        proof.lemma(inside["clock"] == bit_clocks - 1 - phase)
+        proof.lemma(inside["shift"] == (Cat(frame[1:], Const(0x3FF, 10)) >> bit)[:9])
+
+
+_BUGS = (
+    Bug("no start bit", Transmitter, "elaborate", "Cat(Const(0, 1), self", "Cat(Const(1, 1), self"),
+    Bug("a bit short", Transmitter, "elaborate", "bits_left.eq(10)", "bits_left.eq(9)"),
+    Bug("stop bit low", Transmitter, "elaborate", "self.bytes.payload, Const(1, 1)", "self.bytes.payload, Const(0, 1)"),
+    Bug("highest bit first", Transmitter, "elaborate", "self.bytes.payload,", "self.bytes.payload[::-1],"),
+    Bug("taken a bit early", Transmitter, "elaborate", "(bits_left == 1) & bit_ends", "(bits_left == 2) & bit_ends"),
+)
+CASES = (
+    Case("UART framing", "4 clocks a bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
+    Case("UART framing", "5 clocks a bit", partial(framing, bit_clocks=5), 2),
+    Case("UART framing", "104 clocks a bit", partial(framing, bit_clocks=104), 2),
+)

@@ -1,0 +1,1 @@
+"""What touches the sheet: contacts, families of scenes, files, recordings, and the truth about them."""

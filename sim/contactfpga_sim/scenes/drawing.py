@@ -1,0 +1,106 @@
+"""Sheets with their zones, in the terminal and in a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from rich.columns import Columns
+from rich.text import Text
+
+from contactfpga.skin import Skin
+from contactfpga.wire.protocol import Frame
+from contactfpga_sim.golden.zones import flood
+
+COLOURS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#8d6a9f", "#c97b3a", "#2e4057", "#7fb069")
+
+
+class Drawn(Protocol):
+    """What a drawing needs of a scene."""
+
+    @property
+    def scene(self) -> str: ...
+    @property
+    def cells(self) -> np.ndarray: ...
+    @property
+    def frame(self) -> Frame | None: ...
+
+
+def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
+    """Two rows of cells a line of text, each zone in a colour of its own; in ASCII a row a line."""
+    return Columns([_sheet(out, unicode) for out in outcomes], padding=(0, 3))
+
+
+def _sheet(out: Drawn, unicode: bool) -> Text:
+    labels, _ = flood(out.cells, 8)
+    count = out.frame.zones if out.frame else 0
+    text = Text(f"{out.scene}: {count} zone{'' if count == 1 else 's'}\n")
+    for pieces in _halves(labels) if unicode else _ascii(labels):
+        for character, style in pieces:
+            text.append(character, style=style)
+        text.append("\n")
+    return text
+
+
+Pieces = Iterator[tuple[str, str]]
+"""Characters of a line with their styles."""
+
+
+def _halves(labels: np.ndarray) -> Iterator[Pieces]:
+    if len(labels) % 2:
+        labels = np.vstack([labels, np.zeros((1, labels.shape[1]), int)])
+    for upper, lower in zip(labels[::2].tolist(), labels[1::2].tolist()):
+        yield ((_GLYPHS[above > 0, below > 0], _style(above, below)) for above, below in zip(upper, lower))
+
+
+def _ascii(labels: np.ndarray) -> Iterator[Pieces]:
+    for row in labels.tolist():
+        yield (("#" if number else ".", _style(number, number)) for number in row)
+
+
+_GLYPHS = {(False, False): "·", (True, False): "▀", (False, True): "▄", (True, True): "█"}
+
+
+def _style(above: int, below: int) -> str:
+    """Both halves of a full block are of one zone, or, where two zones meet, the lower one is the background."""
+    if not above and not below:
+        return "dim"
+    colours = [COLOURS[(number - 1) % len(COLOURS)] for number in (above, below) if number]
+    return colours[0] if len(set(colours)) == 1 else f"{colours[0]} on {colours[1]}"
+
+
+def to_file(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
+    """A panel a scene: its cells in the colours of their zones, and the barycenters that came over the wire."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    from matplotlib.colors import to_rgb
+
+    palette = np.array([to_rgb("#e6e9ed"), *(to_rgb(colour) for colour in COLOURS)])
+    across = 5
+    down = -(-len(outcomes) // across)
+    figure, panels = pyplot.subplots(down, across, figsize=(2.6 * across, 2.8 * down), squeeze=False)
+    for panel in panels.flat:
+        panel.axis("off")
+    half_x, half_y = skin.pitch_x_mm / 2, skin.pitch_y_mm / 2
+    extent = (
+        *(-half_x, (skin.columns - 1) * skin.pitch_x_mm + half_x),
+        *((skin.rows - 1) * skin.pitch_y_mm + half_y, -half_y),
+    )
+    for panel, out in zip(panels.flat, outcomes):
+        labels, _ = flood(out.cells, skin.connectivity)
+        shown = np.where(labels > 0, (labels - 1) % len(COLOURS) + 1, 0)
+        panel.imshow(palette[shown], extent=extent, interpolation="nearest")
+        if out.frame is not None and len(out.frame.moments):
+            area, sum_x, sum_y = out.frame.moments.T
+            x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
+            panel.plot(x_mm, y_mm, "k+", markersize=7, markeredgewidth=1.4)
+        panel.set_title(out.scene, fontsize=9)
+    figure.suptitle("Contact zones and their barycenters (+), as they came over the wire", fontsize=11)
+    figure.tight_layout()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)

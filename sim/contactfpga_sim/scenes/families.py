@@ -1,0 +1,145 @@
+"""Families of scenes at random places, for charts: the same seed gives the same scenes, each one by its number alone.
+
+A scene lies wholly on the sheet where it fits; where it does not, it lies in the middle, give or take a pitch, and
+`Scene.truth(t, skin)` counts what is on the sheet. Sheets of the same extents and another pitch get the same scenes,
+shifted with the sheet's corner.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes import contacts
+from contactfpga_sim.scenes.contacts import Contact, M, Shape, Swing
+from contactfpga_sim.scenes.scene import Scene, sheet
+
+FINGER_MM = 6.0
+"""Radius of the fingers of a pair."""
+
+TRIES = 200
+"""Places that are tried for one more finger, before the scene stays without it."""
+
+Random = np.random.Generator
+
+
+def placements(family: str, count: int, seed: int, skin: Skin, first: int = 0, **options: Any) -> list[Scene]:
+    """``count`` scenes of a family at random places on a sheet, from number ``first`` on.
+
+    ``family``: one of :data:`FAMILIES`; ``options``: its function's, such as ``gap_mm``. Scene n depends on the
+    family, the options, the seed, the sheet's pitch and size, and n only. Raises ValueError for what is not known.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"family {family!r} is not known; take one of {', '.join(FAMILIES)}")
+    if count < 0 or seed < 0 or first < 0:
+        raise ValueError(f"count is {count}, seed is {seed}, first is {first}; each must be 0 or above")
+    name = zlib.crc32(family.encode())
+    return [
+        FAMILIES[family](np.random.default_rng([name, seed, number]), skin, **options)
+        for number in range(first, first + count)
+    ]
+
+
+def bumper(rng: Random, skin: Skin) -> Scene:
+    """One contact of a bumper: an ellipse 16 to 50 mm long, at any angle, 5 to 50 N."""
+    long = rng.uniform(8, 25)
+    shape = contacts.ellipse(long, long * rng.uniform(0.4, 1))
+    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(5, 50)),))
+
+
+def fingers(rng: Random, skin: Skin, gap_mm: float = 5.0, most: int = 5) -> Scene:
+    """Two to ``most`` fingers, ellipses 10 to 20 mm long at any place and angle, at least ``gap_mm`` apart, 2 to 20 N.
+
+    A sheet without room for all of them gets fewer.
+    """
+    if gap_mm < 0 or most < 2:
+        raise ValueError(f"gap_mm is {gap_mm} and most is {most}; they must be at least 0 and 2")
+    placed: list[tuple[float, float, float]] = []
+    found = []
+    for _ in range(int(rng.integers(2, most + 1))):
+        long = rng.uniform(5, 10)
+        shape, angle = contacts.ellipse(long, long * rng.uniform(0.6, 1)), rng.uniform(0, 180)
+        force = rng.uniform(2, 20)
+        turned = tuple(part.placed(0.0, 0.0, math.radians(angle)) for part in shape)
+        for _ in range(TRIES):
+            x, y = place(rng, skin, turned)
+            if all(math.hypot(x - other_x, y - other_y) >= long + reach + gap_mm for other_x, other_y, reach in placed):
+                placed.append((x, y, long))
+                found.append(Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle, force_n=force))
+                break
+    return Scene(tuple(found))
+
+
+def pair(rng: Random, skin: Skin, gap_mm: float = 10.0, radius_mm: float = FINGER_MM) -> Scene:
+    """Two round fingers ``gap_mm`` apart between their rims, their line at any angle; 5 to 20 N each."""
+    angle = rng.uniform(0, 180)
+    loads = (contact.load(0.0) for contact in contacts.pair(gap_mm, radius_mm, 0.0, 0.0, angle))
+    x, y = place(rng, skin, tuple(part for load in loads if load for part in load.parts))
+    return Scene(contacts.pair(gap_mm, radius_mm, x, y, angle, force_n=rng.uniform(5, 20)))
+
+
+def palm(rng: Random, skin: Skin) -> Scene:
+    """A hand laid flat at any angle, 0.8 to 1.1 times its usual size, 20 to 80 N."""
+    shape = contacts.palm(rng.uniform(0.8, 1.1))
+    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 360), force_n=rng.uniform(20, 80)),))
+
+
+def sole(rng: Random, skin: Skin) -> Scene:
+    """A bare foot 220 to 280 mm long, within 30 degrees of the columns, 200 to 600 N."""
+    shape = contacts.sole(rng.uniform(220, 280))
+    return Scene((_anywhere(rng, skin, shape, rng.uniform(-30, 30), force_n=rng.uniform(200, 600)),))
+
+
+def edge(rng: Random, skin: Skin, width_mm: float = 12.0) -> Scene:
+    """A bar 50 to 120 mm long and ``width_mm`` wide at any angle, 10 to 60 N."""
+    shape = contacts.edge(rng.uniform(50, 120), width_mm)
+    return Scene((_anywhere(rng, skin, shape, rng.uniform(0, 180), force_n=rng.uniform(10, 60)),))
+
+
+def moving(rng: Random, skin: Skin, speed_mm_s: float | None = None) -> Scene:
+    """A finger that circles on the sheet, at ``speed_mm_s`` or at 50 to 1000 mm/s; 5 to 20 N."""
+    left, right, top, bottom = (end / M for end in sheet(skin))
+    finger = rng.uniform(5, 10)
+    most = max(1.0, min(right - left, bottom - top) / 2 - finger)
+    radius = rng.uniform(min(10.0, most / 2), most)
+    speed = math.exp(rng.uniform(math.log(50), math.log(1000)))
+    hertz = (speed if speed_mm_s is None else speed_mm_s) / (2 * math.pi * radius)
+    x, y = place(rng, skin, contacts.disc(radius + finger))
+    phase = rng.uniform(0, 2 * math.pi)
+    around_x, around_y = Swing(x, radius, hertz, phase), Swing(y, radius, hertz, phase - math.pi / 2)
+    return Scene((Contact(shape=contacts.disc(finger), x_mm=around_x, y_mm=around_y, force_n=rng.uniform(5, 20)),))
+
+
+FAMILIES: dict[str, Callable[..., Scene]] = {
+    family.__name__: family for family in (bumper, fingers, pair, palm, sole, edge, moving)
+}
+"""Every family by its name; its options are its keyword arguments."""
+
+
+def _anywhere(rng: Random, skin: Skin, shape: Shape, angle_deg: float, **values: Any) -> Contact:
+    """A contact of this shape, turned, anywhere on the sheet."""
+    x, y = place(rng, skin, tuple(part.placed(0.0, 0.0, math.radians(angle_deg)) for part in shape))
+    return Contact(shape=shape, x_mm=x, y_mm=y, angle_deg=angle_deg, **values)
+
+
+def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
+    """Where in mm the shape's origin lies when the shape is anywhere on the sheet."""
+    left, right, top, bottom = sheet(skin)
+    boxes = [(part.x_m, part.y_m, *part.half_box_m) for part in shape]
+    x = _along(rng, left, right, [(x - half, x + half) for x, _, half, _ in boxes], skin.pitch_x_mm)
+    y = _along(rng, top, bottom, [(y - half, y + half) for _, y, _, half in boxes], skin.pitch_y_mm)
+    return x, y
+
+
+def _along(rng: Random, low: float, high: float, ends: list[tuple[float, float]], pitch_mm: float) -> float:
+    """A place in mm for something that reaches from the least to the greatest of these ends, in m."""
+    first, last = low - min(start for start, _ in ends), high - max(end for _, end in ends)
+    if first > last:
+        middle = (first + last) / 2
+        first, last = middle - pitch_mm * M / 2, middle + pitch_mm * M / 2
+    return rng.uniform(first, last) / M

@@ -1,0 +1,171 @@
+"""What touches the sheet: contacts over time with their truth, recordings, and scenes by name.
+
+A :class:`Scene` knows no sheet: the same contacts press sheets of any pitch and size, through any cover.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from contactfpga.cover import Cover, Load
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes import cells, contacts
+from contactfpga_sim.scenes.contacts import Contact, Swing
+from contactfpga_sim.scenes.recordings import Recording
+from contactfpga_sim.scenes.shapes import SHAPES
+from contactfpga_sim.scenes.truth import Box, Truth, truth_of
+
+CellsAt = Callable[[float], np.ndarray]
+"""Time in s to the (rows, columns) bool cells that are pressed then."""
+
+FINGER_MM = 12.0
+"""Radius of a fingertip's contact."""
+
+FOOT_MM = 260.0
+"""Length of a foot, where the sheet is long enough for it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """Contacts over time. On a cylinder places are those on the sheet laid flat, and the cover counts as flat."""
+
+    contacts: tuple[Contact, ...]
+
+    def loads(self, seconds: float) -> list[Load]:
+        """What lies on the cover at that time."""
+        found = (contact.load(seconds) for contact in self.contacts)
+        return [load for load in found if load is not None]
+
+    def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
+        """Number of contacts, areas in mm2 and centroids in mm at that time, from the continuous shapes: parts that
+        overlap or touch are one contact. With a Skin, of what lies on its sheet, which ends half a pitch beyond the
+        outermost switches."""
+        parts = [part for load in self.loads(seconds) for part in load.parts]
+        return truth_of(parts, Box() if skin is None else sheet(skin))
+
+    def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
+        """(rows, columns) bool: the switches that are closed at that time. ``cover``: in the place of the Skin's; where
+        there is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
+        x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
+        y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
+        return (cover or skin.cover or Cover()).closed(self.loads(seconds), x, y[:, None])
+
+    def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
+        """:meth:`pressed` on this sheet as a function of time."""
+        if all(contact.still for contact in self.contacts):
+            still = self.pressed(0.0, skin, cover)
+            return lambda seconds: still
+        return lambda seconds: self.pressed(seconds, skin, cover)
+
+
+def sheet(skin: Skin) -> Box:
+    """The sheet laid flat, in m: half a pitch more than the outermost switches on every side."""
+    x, y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
+    return Box(-x / 2, (skin.columns - 0.5) * x, -y / 2, (skin.rows - 0.5) * y)
+
+
+def _extent(skin: Skin) -> tuple[float, float]:
+    """Width and height between the outermost switches, in mm."""
+    return (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
+
+
+def fingertip(skin: Skin) -> Scene:
+    """One fingertip at rest, a third into the sheet."""
+    width, height = _extent(skin)
+    return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=width / 3, y_mm=height / 3),))
+
+
+def two_fingers(skin: Skin) -> Scene:
+    """Two fingertips side by side, with at least one free column between them; on a single column, one free row."""
+    width, height = _extent(skin)
+    gap, angle = (1.01 * skin.pitch_y_mm, 90.0) if skin.columns == 1 else (1.01 * skin.pitch_x_mm, 0.0)
+    return Scene(contacts.pair(gap, FINGER_MM, width / 2, height / 2, angle))
+
+
+def palm(skin: Skin) -> Scene:
+    """A hand laid flat in the middle, around a hollow."""
+    width, height = _extent(skin)
+    return Scene((Contact(shape=contacts.palm(), x_mm=width / 2, y_mm=height / 2 - 8, force_n=40.0),))
+
+
+def sole(skin: Skin) -> Scene:
+    """A bare foot in the middle, along the sheet's longer side and as long as that allows."""
+    width, height = _extent(skin)
+    along, angle = (height + 0.9 * skin.pitch_y_mm, 0.0) if height >= width else (width + 0.9 * skin.pitch_x_mm, 90.0)
+    shape = contacts.sole(min(FOOT_MM, along))
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=angle, force_n=350.0),))
+
+
+def edge(skin: Skin) -> Scene:
+    """A straight edge across the sheet, 20 degrees off the rows and wide enough to press a switch in each column."""
+    width, height = _extent(skin)
+    shape = contacts.edge(2 * (width + height) + 100, 1.1 * skin.pitch_y_mm)
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, angle_deg=20.0, force_n=40.0),))
+
+
+def moving(skin: Skin) -> Scene:
+    """A fingertip that circles around the middle of the sheet twice a second."""
+    width, height = _extent(skin)
+    x = Swing(width / 2, 0.3 * width, 2.0)
+    y = Swing(height / 2, 0.3 * height, 2.0, -math.pi / 2)
+    return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
+
+
+def nothing(skin: Skin) -> Scene:
+    """An untouched sheet."""
+    return Scene(())
+
+
+CONTACTS: dict[str, Callable[[Skin], Scene]] = {
+    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, nothing)
+}
+"""Every contact scene by its name."""
+
+NAMES = (*CONTACTS, *SHAPES)
+"""All that :func:`scene` knows by name: contacts, and the shapes that break labellers."""
+
+Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
+"""What :func:`scene` takes."""
+
+
+def scene(skin: Skin, source: Source = None) -> CellsAt:
+    """The cells that a scene presses on a sheet, as a function of time.
+
+    ``source``: one of :data:`NAMES` (none given: fingertip); a Scene; a Recording, or a .npy or .npz file of one, or
+    an array (rows, columns) or (frames, rows, columns), played in a loop
+    (:mod:`contactfpga_sim.scenes.recordings`); or a function of time. Raises ValueError for anything else.
+    """
+    if source is None:
+        source = "fingertip"
+    if isinstance(source, Scene):
+        return source.on(skin)
+    if isinstance(source, Recording):
+        return source.on(skin)
+    if isinstance(source, np.ndarray):
+        return Recording.of(source, "the array").on(skin)
+    if callable(source):
+        return _checked(skin, source)
+    name = str(source)
+    if name in CONTACTS:
+        return CONTACTS[name](skin).on(skin)
+    if name in SHAPES:
+        shape = SHAPES[name](skin.rows, skin.columns)
+        return lambda seconds: shape
+    if not name.endswith((".npy", ".npz")):
+        raise ValueError(f"scene {name!r} is not known; take a .npy or .npz file or one of {', '.join(NAMES)}")
+    return Recording.load(name).on(skin)
+
+
+def _checked(skin: Skin, callback: CellsAt) -> CellsAt:
+    def scene(seconds: float) -> np.ndarray:
+        found = np.asarray(callback(seconds))
+        if found.shape != (skin.rows, skin.columns):
+            raise ValueError(f"the scene gave cells of shape {found.shape}; the sheet has {skin.rows}x{skin.columns}")
+        return cells.pressed(found, "what the scene gave")
+
+    return scene

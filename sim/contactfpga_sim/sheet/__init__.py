@@ -1,0 +1,1 @@
+"""The sheet and its wiring, as the board's pins see them."""

@@ -1,0 +1,154 @@
+"""All parameters of a run of the arm, read from one TOML file."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from pathlib import Path
+from typing import Any
+
+from contactfpga.cover import Cover
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+from contactfpga_sim.studies.arm.parts import BEHAVIOURS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
+
+_CASES = Path(__file__).parent / "cases"
+MODELS = ("point", "hertz")
+MAX_STEPS = 1_000_000
+"""In a run."""
+STEPS_A_TIME_CONSTANT = 4
+"""Steps that the current's time constant, the plant's shortest, has to have."""
+
+
+class CaseError(ContactFPGAError, ValueError):
+    """A case that cannot be; the message names the field, its value and the limit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A run of the arm. Raises :class:`CaseError`, or :class:`contactfpga.cover.CoverError` for a single number."""
+
+    link: Link
+    motor: Motor
+    control: Control
+    foam: Foam
+    switch: Contacts
+    touch: tuple[Touch, ...] = (Touch(),)
+    usb: Usb = dataclasses.field(default_factory=Usb)
+    run: Run = dataclasses.field(default_factory=Run)
+    model: str = "point"
+    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.cover.press`)."""
+
+    def __post_init__(self) -> None:
+        _one_of("behaviour", self.control.behaviour, BEHAVIOURS)
+        _one_of("model", self.model, MODELS)
+        if not self.touch:
+            raise CaseError("touch is empty; the arm must run into at least one thing")
+        if self.control.sensor_nm < self.control.torque_limit_nm:
+            raise CaseError(
+                f"torque_limit_nm is {self.control.torque_limit_nm}; the sensor reads {self.control.sensor_nm} Nm at "
+                "most and would never see it"
+            )
+        limit = self.motor.time_constant_s / STEPS_A_TIME_CONSTANT
+        if self.run.step_s > limit * (1 + 1e-9):
+            raise CaseError(
+                f"step_s is {self.run.step_s:g}; it must be at most {limit:g} s, a quarter of what the current takes"
+            )
+        if (steps := (self.run.lead_s + self.run.duration_s) / self.run.step_s) > MAX_STEPS:
+            raise CaseError(f"lead_s + duration_s is {steps:.3g} times step_s; it must be at most {MAX_STEPS:,} times")
+        for name, whole in (("period_s", self.control.period_s), ("lead_s", self.run.lead_s)):
+            part = self.run.step_s if name == "period_s" else self.control.period_s
+            if abs(whole / part - round(whole / part)) > 1e-6 or round(whole / part) < 1:
+                raise CaseError(f"{name} is {whole:g}; it must be a whole number of times {part:g} s")
+
+    @functools.cached_property
+    def cover(self) -> Cover:
+        """What presses on the switches."""
+        return Cover(self.model, self.foam.thickness_m, self.switch.switch)
+
+    def but(self, **changes: Any) -> Case:
+        """The same with other values: ``case.but(link={"speed_m_s": 0.4}, touch=({"x_mm": 85.0},))``."""
+        new: dict[str, Any] = {}
+        for name, change in changes.items():
+            old = getattr(self, name)
+            if name == "touch":
+                change = tuple(one if isinstance(one, Touch) else dataclasses.replace(old[0], **one) for one in change)
+            new[name] = dataclasses.replace(old, **change) if isinstance(change, dict) else change
+        return dataclasses.replace(self, **new)
+
+    @classmethod
+    def load(cls, name: str | Path) -> Case:
+        """A case that comes with this package, by its name (:func:`names`), or a TOML file. ``like`` in it names the
+        case it differs from."""
+        return _case(str(name), _values(str(name)))
+
+
+_PARTS = {
+    "link": Link,
+    "motor": Motor,
+    "control": Control,
+    "foam": Foam,
+    "switch": Contacts,
+    "usb": Usb,
+    "run": Run,
+}
+
+
+def names() -> list[str]:
+    """The cases that come with this package."""
+    return sorted(path.stem for path in _CASES.glob("*.toml"))
+
+
+def _values(name: str, before: tuple[str, ...] = ()) -> dict[str, Any]:
+    path = Path(name) if name.endswith(".toml") else _CASES / f"{name}.toml"
+    if not path.exists():
+        raise CaseError(f"case {name!r} is not known; take a .toml file or one of {', '.join(names())}")
+    values = tomlfile.load(path, CaseError)
+    if (like := values.pop("like", None)) is None:
+        return values
+    above = (*before, name)
+    if not isinstance(like, str) or like in above:
+        raise CaseError(f"{name}: like is {shown(like)}; it must name another case than {', '.join(above)}")
+    merged = _values(like, above)
+    for part, change in values.items():
+        both = isinstance(change, dict) and isinstance(merged.get(part), dict)
+        merged[part] = {**merged[part], **change} if both else change
+    return merged
+
+
+def _case(name: str, values: dict[str, Any]) -> Case:
+    unknown = sorted(set(values) - {*_PARTS, "touch", "model"})
+    if unknown:
+        raise CaseError(f"{name}: unknown part {unknown[0]!r}; known are {', '.join([*_PARTS, 'touch', 'model'])}")
+    parts: dict[str, Any] = {
+        part: _part(name, part, kind, values[part]) for part, kind in _PARTS.items() if part in values
+    }
+    if "touch" in values:
+        if not isinstance(values["touch"], list):
+            raise CaseError(f"{name}: touch is {shown(values['touch'])}; it must be a part, [[touch]]")
+        parts["touch"] = tuple(_part(name, "touch", Touch, one) for one in values["touch"])
+    if "model" in values:
+        parts["model"] = values["model"]
+    missing = [part for part in ("link", "motor", "control", "foam", "switch") if part not in parts]
+    if missing:
+        raise CaseError(f"{name}: the part [{missing[0]}] is missing; a case may begin with like = 'paper'")
+    return Case(**parts)
+
+
+def _part(name: str, part: str, kind: type, values: Any) -> Any:
+    if not isinstance(values, dict):
+        raise CaseError(f"{name}: {part} is {shown(values)}; it must be a part, [{part}]")
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in values:
+        if key not in known:
+            raise CaseError(f"{name}: unknown key {key!r} in [{part}]; known are {', '.join(known)}")
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise CaseError(f"{name}: [{part}]: {error}") from None
+
+
+def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise CaseError(f"{name} is {shown(value)}; it must be one of {', '.join(known)}")

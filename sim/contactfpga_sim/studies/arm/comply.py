@@ -1,0 +1,71 @@
+"""Active compliance: how the arm yields to a push and returns, and how fast it may be pushed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from contactfpga_sim.studies.arm.case import Case, CaseError
+from contactfpga_sim.studies.arm.run import Result, run
+
+BACK_M = 1e-3
+"""So near to where it was the arm counts as back."""
+
+FASTEST_M_S = 5.0
+"""No faster push is looked for."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Push:
+    """What came of a push."""
+
+    speed_m_s: float
+    peak_torque_nm: float
+    """Largest true torque between motor and arm."""
+    peak_force_n: float
+    peak_indentation_m: float
+    yields_m: float
+    """How far the arm gave way, at the lever."""
+    back_s: float | None
+    """From the first touch until it was back for good; None: not in this run."""
+    stopped: bool
+    """The torque limit ended the compliance."""
+
+
+def pushed(case: Case, speed_m_s: float) -> tuple[Push, Result]:
+    """The case's push at another speed."""
+    if case.control.behaviour != "comply":
+        raise CaseError(f"behaviour is {case.control.behaviour!r}; a push needs 'comply'")
+    touch = dataclasses.replace(case.touch[0], push_m_s=speed_m_s)
+    result = run(case.but(touch=(touch, *case.touch[1:])), "torque")
+    place = case.link.lever_m * (result.course["angle_rad"] - result.course["angle_rad"][0])
+    away = np.flatnonzero(np.abs(place) > BACK_M)
+    last = int(away[-1]) if len(away) else 0
+    back = float(result.course["time_s"][last + 1]) if last + 1 < len(place) else None
+    outcome = result.outcome
+    push = Push(
+        speed_m_s=speed_m_s,
+        peak_torque_nm=outcome.peak_torque_nm,
+        peak_force_n=outcome.peak_force_n,
+        peak_indentation_m=outcome.peak_indentation_m,
+        yields_m=float(-place.min()),
+        back_s=back if not result.events else None,
+        stopped=bool(result.events),
+    )
+    return push, result
+
+
+def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
+    """The fastest push, to ``resolution`` in m/s and rounded down, at which the torque stays below the limit."""
+
+    def holds(steps: int) -> bool:
+        speed = steps * resolution
+        short = case.but(run={"duration_s": case.touch[0].push_m / speed + case.touch[0].hold_s})
+        return pushed(short, speed)[0].peak_torque_nm < case.control.torque_limit_nm
+
+    low, high = 0, round(FASTEST_M_S / resolution)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low * resolution

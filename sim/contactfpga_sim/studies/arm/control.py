@@ -1,0 +1,120 @@
+"""The motor's controller: speed by PI, and what it does about a contact."""
+
+from __future__ import annotations
+
+import collections
+from typing import NamedTuple
+
+from contactfpga_sim.studies.arm.case import Case
+
+
+class Sensed(NamedTuple):
+    """What the controller knows at one of its samples."""
+
+    angle_rad: float
+    speed_rad_s: float
+    torque_nm: float
+    """As the sensor reads it."""
+    contact: bool
+    """As it comes to the controller."""
+    alive: bool
+    """Whether the host was heard of lately."""
+
+
+class Controller:
+    """Speed PI with one of two behaviours.
+
+    ``reverse``, the paper's: a contact, or torque at the limit, makes the arm go back until the contact is resolved,
+    then slow down to rest. ``comply``: the arm follows the torque on it like an inertia with a damper and a spring;
+    torque at the limit makes it go back all the same. Where the host falls silent the arm stops; in a contact it first
+    goes back as far as it does at most. A contact that is still there then, and may be one that nobody tells the end
+    of, is not gone back from again before it was away once; the torque limit is.
+    """
+
+    def __init__(self, case: Case):
+        self.state = "moving"
+        """``moving``, ``reversing``, ``slowing``, ``resting`` or, without a host, ``stopped``."""
+        self.events: list[tuple[float, str, str]] = []
+        """(time in s, new state, reason): ``contact``, ``torque``, ``silence``, ``resolved``, ``retreat``, ``rest``."""
+        self._control = case.control
+        self._lever = case.link.lever_m
+        self._most = case.motor.current_a
+        self._wanted = case.link.speed_m_s / self._lever
+        self._home: float | None = None
+        self._sum = 0.0
+        self._touched_at = -float("inf")
+        self._stale = False  # this contact was gone back from as far as it goes
+        self._turned_at = 0.0
+        self._old: collections.deque[Sensed] = collections.deque()
+
+    def sample(self, seconds: float, now: Sensed) -> float:
+        """The current in A to ask for until the next sample."""
+        sensed = self._late(now)
+        over = abs(sensed.torque_nm) >= self._control.torque_limit_nm
+        if now.contact:
+            self._touched_at = seconds
+        else:
+            self._stale = False
+        self._decide(seconds, sensed, now.contact and not self._stale, over, now.alive)
+        return self._speed(sensed)
+
+    def _late(self, now: Sensed) -> Sensed:
+        self._old.append(now)
+        if len(self._old) > 1 + round(self._control.delay_s / self._control.period_s):
+            self._old.popleft()
+        return self._old[0]
+
+    def _decide(self, seconds: float, sensed: Sensed, contact: bool, over: bool, alive: bool) -> None:
+        comply = self._control.behaviour == "comply" and self.state == "moving"
+        contact = contact and not comply
+        if self.state != "reversing" and (over or contact):
+            self._turn(seconds, sensed, "contact" if contact else "torque")
+        elif self.state == "reversing":
+            self._retreat(seconds, sensed)
+        elif self.state == "moving" and not alive:
+            self._wanted = 0.0
+            self._now(seconds, "stopped", "silence")
+        elif comply:
+            self._yield(sensed)
+        elif self.state == "slowing":
+            slower = self._control.slowing_m_s2 * self._control.period_s / self._lever
+            self._wanted = min(0.0, self._wanted + slower)
+            if self._wanted == 0:
+                self._now(seconds, "resting", "rest")
+
+    def _turn(self, seconds: float, sensed: Sensed, reason: str) -> None:
+        self._turned_at = sensed.angle_rad
+        self._wanted = -self._control.reverse_m_s / self._lever
+        self._now(seconds, "reversing", reason)
+
+    def _retreat(self, seconds: float, sensed: Sensed) -> None:
+        gone = self._lever * (self._turned_at - sensed.angle_rad)
+        by_contact = self.events[-1][2] == "contact"
+        if gone >= self._control.retreat_m:
+            self._stale = True
+            self._now(seconds, "slowing", "retreat")
+        elif by_contact and seconds > self._touched_at and seconds - self._touched_at >= self._control.clear_s - 1e-9:
+            self._now(seconds, "slowing", "resolved")
+
+    def _yield(self, sensed: Sensed) -> None:
+        """Admittance: I d wanted/dt = -torque - damping wanted - stiffness (angle - home)."""
+        control = self._control
+        if self._home is None:
+            self._home = sensed.angle_rad
+        push = -sensed.torque_nm - control.virtual_stiffness * (sensed.angle_rad - self._home)
+        # Implicit in the damping, so that no period is too long for it.
+        gained = self._wanted + control.period_s * push / control.virtual_kgm2
+        self._wanted = gained / (1 + control.period_s * control.virtual_damping / control.virtual_kgm2)
+
+    def _speed(self, sensed: Sensed) -> float:
+        control = self._control
+        error = self._wanted - sensed.speed_rad_s
+        grown = self._sum + control.integral * error * control.period_s
+        asked = control.proportional * error + grown
+        if abs(asked) <= self._most or error * asked < 0:
+            self._sum = grown
+        return min(self._most, max(-self._most, asked))
+
+    def _now(self, seconds: float, state: str, reason: str) -> None:
+        self.state = state
+        self.events.append((seconds, state, reason))

@@ -1,0 +1,203 @@
+"""What latency costs: force, speed and thickness against it, drawn and as numbers."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib.figure import Figure
+
+from contactfpga.console import outputs
+from contactfpga.console.interrupt import Interrupted
+from contactfpga.cover.drawing import SETTINGS, save
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.arm import sweep
+from contactfpga_sim.studies.arm.case import Case, CaseError
+from contactfpga_sim.studies.arm.sweep import Point, Task
+from contactfpga_sim.studies.pool import executor, progress
+
+PAPER_S = 6e-3
+LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))
+SPEEDS_M_S = tuple(0.02 * step for step in range(1, 31))
+THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
+LIMITS_N = np.linspace(4, 40, 145)
+INSTANTS = 8
+"""Touch instants by which the gateware's own runs differ, a controller period apart."""
+COLOURS = {"6 ms": "#333333", "UART": "#d1495b", "pin": "#2b6f9e", "limit": "#e0a030", "bound": "#66a182"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """Every task by what it is drawn as."""
+
+    force: tuple[Task, ...]
+    limited: tuple[Task, ...]
+    sheet: dict[str, tuple[Task, ...]]
+    speed: dict[str, tuple[Task, ...]]
+    thick: dict[float, tuple[Task, ...]]
+
+    @property
+    def all(self) -> list[Task]:
+        """In the order in which :meth:`split` takes the points."""
+        groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
+        return [task for group in groups for task in group]
+
+
+def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[float] = SPEEDS_M_S) -> Plan:
+    """The charts' tasks."""
+    alone, bounds = sweep.unlimited(case), sweep.bounds_s(case, Skin())
+    by_speed = {"6 ms": PAPER_S, "UART": bounds["UART"], "pin": bounds["pin"]}
+    leads = [case.run.lead_s + number * case.control.period_s for number in range(INSTANTS)]
+
+    def moving(speed: float) -> Case:
+        # Its base is far below: how flat a foam is pressed is the third chart's question.
+        return alone.but(link={"speed_m_s": speed}, foam={"base_n_m": 1e-3})
+
+    return Plan(
+        force=tuple(Task(alone, latency_s=latency) for latency in latencies),
+        limited=tuple(Task(case, latency_s=latency) for latency in latencies),
+        sheet={way: tuple(Task(case.but(run={"lead_s": lead}), way) for lead in leads) for way in ("uart", "pin")},
+        speed={
+            name: tuple(Task(moving(speed), latency_s=latency) for speed in speeds)
+            for name, latency in by_speed.items()
+        },
+        thick={
+            speed: tuple(Task(moving(speed), latency_s=latency, thickness=True) for latency in latencies)
+            for speed in THICK_SPEEDS_M_S
+        },
+    )
+
+
+def main(args: argparse.Namespace, case: Case) -> int:
+    """``contactfpga arm --charts``."""
+    if case.control.behaviour != "reverse" or not case.link.speed_m_s:
+        raise CaseError(
+            f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
+        )
+    folder = outputs.folder(args.output)
+    tasks = plan(case)
+    so_far: dict[Task, Point] = {}
+    try:
+        with executor(args.jobs, args.dask) as workers, progress() as step:
+            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(so_far, len(tasks.all), folder)) from None
+    print(write_csv(found, folder / "arm-charts.csv"), flush=True)
+    for path in draw(case, tasks, found, folder):
+        print(path)
+    return 0
+
+
+def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
+    """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
+    again = "the same command goes on from there"
+    if not found:
+        return f"interrupted before the first of {of} runs was finished; {again}"
+    path = write_csv(found, folder / "arm-charts-so-far.csv")
+    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"
+
+
+def draw(
+    case: Case, tasks: Plan, found: dict[Task, Point], folder: Path, suffixes: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """The three charts in each format."""
+    with matplotlib.rc_context(SETTINGS):
+        figures = {
+            "arm-force": _force(case, tasks, found),
+            "arm-speed": _speed(case, tasks, found),
+            "arm-thickness": _thickness(case, tasks, found),
+        }
+        return [save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
+
+
+def _axes(x: str, y: str) -> tuple[Figure, Any]:
+    figure = Figure(figsize=(6.4, 4))
+    place = figure.subplots()
+    place.set_xlabel(x)
+    place.set_ylabel(y)
+    place.grid(alpha=0.2)
+    return figure, place
+
+
+def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+    figure, place = _axes("from the switch to the controller, ms", "force, N")
+    late = [1e3 * task.latency_s for task in tasks.force]
+    for group, colour, name in (
+        (tasks.force, "#333333", "the sheet"),
+        (tasks.limited, COLOURS["limit"], "with 3 Nm limit"),
+    ):
+        points = [found[task] for task in group]
+        place.plot(late, [point.peak_force_n for point in points], color=colour, label=f"peak, {name}")
+        place.plot(
+            late, [point.force_before_n for point in points], "--", color=colour, label=f"at the reaction, {name}"
+        )
+    for way, name in (("uart", "UART"), ("pin", "pin")):
+        points = [found[task] for task in tasks.sheet[way]]
+        place.plot(
+            [1e3 * point.takes_s for point in points],
+            [point.peak_force_n for point in points],
+            "o",
+            ms=4,
+            color=COLOURS[name],
+            label=f"gateware, {name}, {len(points)} touches",
+        )
+    for name, bound in sweep.bounds_s(case, Skin()).items():
+        place.axvline(1e3 * bound, color=COLOURS.get(name, COLOURS["bound"]), lw=0.8, ls=":", label=f"bound, {name}")
+    at = found[next(task for task in tasks.force if task.latency_s == PAPER_S)]
+    place.plot(1e3 * PAPER_S, at.peak_force_n, "s", color="black", ms=7, fillstyle="none", label="the set at 6 ms")
+    place.plot(1e3 * PAPER_S, 12, "*", color="black", ms=9, label="paper, 12 N")
+    place.set_xscale("log")
+    place.legend(fontsize=7)
+    return figure
+
+
+def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+    figure, place = _axes("force limit, N", "speed, m/s")
+    for name, group in tasks.speed.items():
+        speeds = np.array([task.case.link.speed_m_s for task in group])
+        for field, style, what in (("peak_force_n", "-", "peak"), ("force_before_n", "--", "at the reaction")):
+            forces = np.array([getattr(found[task], field) for task in group])
+            safe = [sweep.safe_speed(speeds, forces, limit) for limit in LIMITS_N]
+            place.plot(LIMITS_N, safe, style, color=COLOURS[name], lw=1.2, label=f"{what}, {name}")
+    naive = [sweep.naive_speed(case, limit, PAPER_S) for limit in LIMITS_N]
+    place.plot(LIMITS_N, naive, ":", color=COLOURS["bound"], label="(δ(limit) - δ(closing)) / 6 ms")
+    place.plot(15, 0.4, "*", color="black", ms=9, label="paper: 15 N, designed for 0.4 m/s")
+    place.plot(15, 0.23, "s", color="black", ms=6, fillstyle="none", label="the set's speed at 15 N")
+    place.set_ylim(0, 0.6)
+    place.legend(fontsize=7)
+    return figure
+
+
+def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
+    figure, place = _axes("from the switch to the controller, ms", "thinnest foam that is not pressed flat, mm")
+    for colour, (speed, group) in zip(("#2b6f9e", "#333333", "#d1495b"), tasks.thick.items()):
+        thick = [1e3 * found[task].thickness_m for task in group]
+        place.plot([1e3 * task.latency_s for task in group], thick, "o-", ms=3, color=colour, label=f"{speed:g} m/s")
+    for name, bound in sweep.bounds_s(case, Skin()).items():
+        place.axvline(1e3 * bound, color=COLOURS.get(name, COLOURS["bound"]), lw=0.8, ls=":", label=f"bound, {name}")
+    place.plot(1e3 * PAPER_S, 1e3 * case.foam.thickness_m, "*", color="black", ms=9, label="paper: 6 ms, 5 mm")
+    place.set_xscale("log")
+    place.set_ylim(bottom=0)
+    place.legend(fontsize=7)
+    return figure
+
+
+def write_csv(found: dict[Task, Point], path: Path) -> Path:
+    """All numbers, a line a run, in SI units."""
+    names = [field.name for field in dataclasses.fields(Point)]
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])
+        for task, point in found.items():
+            given = (task.latency_s, task.case.link.speed_m_s, task.case.control.torque_limit_nm)
+            values = [f"{value:.6g}" for value in (*given, *dataclasses.astuple(point))]
+            table.writerow([task.way if not task.thickness else "thinnest", *values])
+    return path

@@ -1,0 +1,188 @@
+"""One run from power-up to rest, and what came of it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from contactfpga.driver import driver
+from contactfpga.errors import ReadTimeout
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.arm.case import Case, CaseError
+from contactfpga_sim.studies.arm.usb import PlantTransport
+from contactfpga_sim.studies.arm.world import WAYS, Faults, Moment, World
+
+AFTER_S = 0.25e-3
+"""So long after the reaction the torque is looked at again."""
+
+SLOW_M_S = 1e-3
+"""An arm that the controller holds counts as at rest below this speed."""
+
+STAY_S = 20e-3
+"""A run ends when the arm was at rest for so long."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """Times in s from the touch, None where it did not happen. The reaction is the controller's sample at which it
+    first turns the arm back or stops it."""
+
+    closes_s: float | None
+    """The first switch does."""
+    detected_s: float | None
+    """It has come to the controller's input."""
+    reacts_s: float | None
+    reason: str
+    """For the reaction: ``contact``, ``torque``, ``silence``, or none."""
+    positive_s: float | None
+    """From the reaction until the arm goes back."""
+    torque_before_nm: float | None
+    """At the reaction, true."""
+    torque_after_nm: float | None
+    """:data:`AFTER_S` later."""
+    force_before_n: float | None
+    """At the reaction."""
+    peak_force_n: float
+    peak_torque_nm: float
+    """Its largest size, whatever its sign."""
+    peak_indentation_m: float
+    bottomed: bool
+    """The foam was pressed flat."""
+    resolved_s: float | None
+    """No switch is closed any more, and none is later."""
+    rest_s: float | None
+    """From then on the arm is at rest, until the run ends."""
+    reversals: int
+    zones: int
+    """The most that the host reported at once."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Result:
+    """A run."""
+
+    outcome: Outcome
+    course: np.ndarray
+    """Structured, a :class:`contactfpga_sim.studies.arm.world.Moment` a step."""
+    events: tuple[tuple[float, str, str], ...]
+    """The controller's: (time in s, new state, reason)."""
+    heard: tuple[tuple[float, int], ...]
+    """What came to it from the host: (time in s, zones)."""
+
+
+def run(
+    case: Case, way: str = "uart", *, latency_s: float = 6e-3, skin: Skin | None = None, faults: Faults | None = None
+) -> Result:
+    """Let the arm run into what it touches.
+
+    ``way``: one of :data:`contactfpga_sim.studies.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
+    the sheet, by default the reference Skin. The first run of a Skin by ``pin`` or ``uart`` compiles its gateware.
+    """
+    if way not in WAYS:
+        raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
+    skin = skin or Skin()
+    cycles = case.run.step_s * skin.clock_hz
+    if way in ("pin", "uart") and abs(cycles - round(cycles)) > 1e-6:
+        raise CaseError(f"step_s is {case.run.step_s:g}; it must be a whole number of clocks of {skin.clock_hz} Hz")
+    _on_sheet(case, skin)
+    if way == "uart" and skin.send == "on_change" and 1e-3 * skin.keep_alive_ms >= case.control.watchdog_s:
+        raise CaseError(
+            f"keep_alive_ms is {skin.keep_alive_ms:g}; without a frame the controller stops the arm after "
+            f"{case.control.watchdog_s:g} s"
+        )
+    world = World(case, way, skin, latency_s, faults)
+    try:
+        if way == "uart":
+            _host(world)
+        while not _over(world):
+            world.step()
+    finally:
+        world.close()
+    return Result(_outcome(world), _array(world.course), tuple(world.controller.events), tuple(world.heard))
+
+
+def _on_sheet(case: Case, skin: Skin) -> None:
+    ends = (("x_mm", (skin.columns - 0.5) * skin.pitch_x_mm), ("y_mm", (skin.rows - 0.5) * skin.pitch_y_mm))
+    for touch in case.touch:
+        for name, end in ends:
+            if getattr(touch, name) > end:
+                raise CaseError(f"{name} of a touch is {getattr(touch, name):g}; the sheet ends at {end:g} mm")
+
+
+def _host(world: World) -> None:
+    """The program at the other end of the port: says of every frame how many zones it holds."""
+    with driver.Board(PlantTransport(world)) as board:
+        board.greet(world.case.run.lead_s)
+        while not _over(world) and not _host_dead(world):
+            try:
+                world.say(len(board.next(world.case.control.period_s)))
+            except ReadTimeout:
+                continue
+
+
+def _host_dead(world: World) -> bool:
+    return world.faults.host_dies_s is not None and world.time_s >= world.faults.host_dies_s
+
+
+def _over(world: World) -> bool:
+    if world.time_s >= world.case.run.duration_s:
+        return True
+    events = world.controller.events
+    resting = bool(events) and events[-1][1] in ("resting", "stopped")
+    return resting and world.time_s - events[-1][0] > STAY_S and _slow(world, world.course[-1])
+
+
+def _slow(world: World, moment: Moment) -> bool:
+    return abs(moment.speed_rad_s) * world.case.link.lever_m < SLOW_M_S
+
+
+def _array(course: list[Moment]) -> np.ndarray:
+    kinds = [(name, bool if name in ("closed", "contact") else float) for name in Moment._fields]
+    return np.array(course, dtype=kinds)
+
+
+def _outcome(world: World) -> Outcome:
+    course, events, lever = _array(world.course), world.controller.events, world.case.link.lever_m
+    time = course["time_s"]
+    turns = [(at, reason) for at, state, reason in events if state in ("reversing", "stopped")]
+    reacts, reason = turns[0] if turns else (None, "")
+    slow = np.abs(course["speed_rad_s"]) * lever < SLOW_M_S
+    last_fast = int(np.flatnonzero(~slow)[-1]) if not slow.all() else -1
+    closed = np.flatnonzero(course["closed"])
+    opened = closed[-1] + 1 if len(closed) and closed[-1] + 1 < len(course) else None
+    at = None if reacts is None else int(np.searchsorted(time, reacts - 1e-9))
+    after = None if reacts is None else int(np.searchsorted(time, reacts + AFTER_S - 1e-9))
+    return Outcome(
+        closes_s=float(time[closed[0]]) if len(closed) else None,
+        detected_s=world.detected_s,
+        reacts_s=reacts,
+        reason=reason,
+        positive_s=_until_back(course, at),
+        torque_before_nm=None if at is None else float(course["sensor_nm"][at]),
+        torque_after_nm=None if after is None or after >= len(course) else float(course["sensor_nm"][after]),
+        force_before_n=None if at is None else float(course["force_n"][at]),
+        peak_force_n=float(course["force_n"].max()),
+        peak_torque_nm=float(np.abs(course["sensor_nm"]).max()),
+        peak_indentation_m=float(course["indentation_m"].max()),
+        bottomed=bool(course["indentation_m"].max() > world.case.foam.thickness_m),
+        resolved_s=None if opened is None else float(time[opened]),
+        rest_s=float(time[last_fast + 1]) if last_fast + 1 < len(course) else None,
+        reversals=sum(state == "reversing" for _, state, _ in events),
+        zones=max((zones for _, zones in world.heard), default=0),
+    )
+
+
+def _until_back(course: np.ndarray, start: int | None) -> float | None:
+    """From the step ``start`` until the speed is 0, between two steps by the straight line through them."""
+    if start is None:
+        return None
+    speed, time = course["speed_rad_s"], course["time_s"]
+    back = np.flatnonzero(speed[start:] <= 0)
+    if not len(back):
+        return None
+    after = start + int(back[0])
+    if after == start:
+        return 0.0
+    share = speed[after - 1] / (speed[after - 1] - speed[after])
+    return float(time[after - 1] + share * (time[after] - time[after - 1]) - time[start])

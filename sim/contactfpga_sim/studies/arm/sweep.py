@@ -1,0 +1,155 @@
+"""The points of the charts: many short runs, worked out in pieces by any executor."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from typing import Any
+
+import numpy as np
+
+from contactfpga.cover.latency import AROUND_S, latency_s
+from contactfpga.cover.point import force_n
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.studies import kept
+from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.studies.arm.report import UNLIMITED
+from contactfpga_sim.studies.arm.run import run
+
+STEP_S = 25e-6
+"""Of the integrator where no gateware runs along; half of it changes no result by more than a hundredth."""
+
+ENDS_S, ENDS_M = 60e-3, 4e-3
+"""An arm has gone back from what it ran into by this time and what it takes for this way."""
+
+RESOLUTION_M = 0.02e-3
+"""To which a thickness is found."""
+
+THINNEST_M, THICKEST_M = 0.05e-3, 40e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A run; or, with ``thickness``, the search for the thinnest foam that is not pressed flat."""
+
+    case: Case
+    way: str = "latency"
+    latency_s: float = 0.0
+    thickness: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """What came of it, in SI; NaN for what did not happen."""
+
+    peak_force_n: float
+    force_before_n: float
+    """At the reaction."""
+    peak_indentation_m: float
+    closes_s: float
+    takes_s: float
+    """From the switch to what the controller knows."""
+    thickness_m: float = math.nan
+
+
+def work(task: Task) -> dict[str, float]:
+    """The fields of the task's :class:`Point`, from the cache where the same code worked them out before."""
+    key = f"{kept.sources()} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
+    return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
+
+
+def sweep(
+    tasks: Sequence[Task],
+    executor: Executor,
+    step: Callable[[str, int], None] = lambda name, of: None,
+    so_far: dict[Task, Point] | None = None,
+) -> list[Point]:
+    """The tasks' points, in their order; ``step(name, number of all)`` is called after each, and it is in ``so_far`` at
+    once."""
+    found = {} if so_far is None else so_far
+    futures = {executor.submit(work, task): task for task in tasks}
+    for future in as_completed(futures):
+        found[futures[future]] = Point(**future.result())
+        step("runs of the arm", len(futures))
+    return [found[task] for task in tasks]
+
+
+def _point(task: Task) -> Point:
+    short: dict[str, Any] = {"duration_s": ENDS_S + ENDS_M / task.case.link.speed_m_s}
+    if task.way == "latency":
+        short |= {"step_s": STEP_S, "lead_s": task.case.control.period_s}
+    outcome = run(task.case.but(run=short), task.way, latency_s=task.latency_s).outcome
+    closes, detected = _number(outcome.closes_s), _number(outcome.detected_s)
+    return Point(
+        outcome.peak_force_n,
+        _number(outcome.force_before_n),
+        outcome.peak_indentation_m,
+        closes,
+        detected - closes,
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _thinnest(task: Task) -> Point:
+    """The smallest thickness at which the foam is not pressed flat; a thicker one also closes its switch later."""
+
+    def at(thickness_m: float) -> tuple[Point, bool]:
+        point = _point(dataclasses.replace(task, case=task.case.but(foam={"thickness_m": thickness_m})))
+        return point, point.peak_indentation_m <= thickness_m
+
+    low = high = THINNEST_M
+    point, holds = at(high)
+    while not holds:
+        low, high = high, 2 * high
+        if high > THICKEST_M:
+            return dataclasses.replace(point, thickness_m=math.nan)
+        point, holds = at(high)
+    while high - low > RESOLUTION_M:
+        middle = (low + high) / 2
+        found, holds = at(middle)
+        low, high, point = (low, middle, found) if holds else (middle, high, point)
+    return dataclasses.replace(point, thickness_m=high)
+
+
+def bounds_s(case: Case, skin: Skin) -> dict[str, float]:
+    """The longest time from a switch to the controller's input by each way, in s, for this sheet and one zone."""
+    usb = case.usb
+    scan = Derived(skin).max_frame_slots * Derived(skin).row_clocks / skin.clock_hz
+    wire = latency_s(skin)
+    return {"pin": scan + AROUND_S, "UART": wire + usb.timer_s + usb.frame_s + usb.host_s, "last byte": wire}
+
+
+def unlimited(case: Case) -> Case:
+    """The same without the torque limit, so that the sheet alone is looked at."""
+    return case.but(control=UNLIMITED)
+
+
+def closing_n(case: Case) -> float:
+    """The force that closes a switch right below."""
+    return float(force_n(case.switch.switch, 0.0, case.foam.thickness_m))  # type: ignore[arg-type]
+
+
+def safe_speed(speeds: np.ndarray, forces: np.ndarray, limit_n: float) -> float:
+    """The highest speed up to which no force is above the limit, between two by the straight line. NaN
+    where the slowest is too fast, and where the fastest is not fast enough to tell."""
+    worst = np.maximum.accumulate(forces)
+    above = np.flatnonzero(worst > limit_n)
+    if not worst[0] <= limit_n or not len(above):
+        return math.nan
+    at = int(above[0])
+    share = (limit_n - worst[at - 1]) / (worst[at] - worst[at - 1])
+    return float(speeds[at - 1] + share * (speeds[at] - speeds[at - 1]))
+
+
+def naive_speed(case: Case, limit_n: float, latency: float) -> float:
+    """(delta(limit) - delta(closing)) / latency, at which an arm that keeps its speed has the limit's force at the
+    reaction. No safe speed: the arm goes on pressing after it."""
+    depth = [(force / case.foam.stiffness) ** (2 / 3) for force in (limit_n, closing_n(case))]
+    return max(0.0, depth[0] - depth[1]) / latency

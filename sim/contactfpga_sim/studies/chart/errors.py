@@ -1,0 +1,122 @@
+"""How far the zones of a method are from what touches the sheet, and from the cells that are pressed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from contactfpga.skin import Skin
+from contactfpga_sim.golden import label, zones
+from contactfpga_sim.golden.divide import barycenter
+from contactfpga_sim.scenes.truth import Truth
+
+Z95 = 1.959963984540054
+"""Half width of the 95 % interval in standard deviations."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Blob:
+    """A contact or a zone."""
+
+    area_mm2: float
+    x_mm: float
+    y_mm: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Errors:
+    """Of one scene: what was found, against what there is."""
+
+    miscounted: bool
+    """Another number of them was found."""
+    missed: float
+    """Share of those there are that nothing was found for."""
+    barycenter_mm: float
+    """Mean distance between each that was found and what it was found for; NaN where there is no pair."""
+    area: float
+    """Mean of the same pairs: difference of their areas over the true one; NaN where there is no pair."""
+
+
+METRICS = tuple(field.name for field in dataclasses.fields(Errors))
+
+
+def errors(found: Sequence[Blob], there: Sequence[Blob]) -> Errors:
+    """Each found one is paired with one that is there, so that the distances add up to the least."""
+    pairs = _pairs(found, there)
+    distances = [math.dist((one.x_mm, one.y_mm), (other.x_mm, other.y_mm)) for one, other in pairs]
+    areas = [abs(one.area_mm2 - other.area_mm2) / other.area_mm2 for one, other in pairs]
+    return Errors(
+        miscounted=len(found) != len(there),
+        missed=1 - len(pairs) / len(there) if there else 0.0,
+        barycenter_mm=float(np.mean(distances)) if pairs else math.nan,
+        area=float(np.mean(areas)) if pairs else math.nan,
+    )
+
+
+def _pairs(found: Sequence[Blob], there: Sequence[Blob]) -> list[tuple[Blob, Blob]]:
+    if not found or not there:
+        return []
+    places = [np.array([(one.x_mm, one.y_mm) for one in blobs]) for blobs in (found, there)]
+    distance = np.linalg.norm(places[0][:, None] - places[1][None], axis=2)
+    return [(found[i], there[j]) for i, j in zip(*linear_sum_assignment(distance), strict=True)]
+
+
+def contacts(truth: Truth) -> list[Blob]:
+    """What touches the sheet."""
+    return [Blob(one.area_mm2, one.x_mm, one.y_mm) for one in truth.contacts]
+
+
+def exact_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
+    """The connected pieces of (R, C) bool cells, by the Skin's connectivity."""
+    return [_blob(moments, skin) for moments in zones(cells, skin.connectivity)]
+
+
+def method_zones(cells: np.ndarray, skin: Skin) -> list[Blob]:
+    """What the Skin's labeller takes for zones, or with ``report = "cells"`` the host; rounded if the board divides."""
+    if skin.report == "cells":
+        return exact_zones(cells, skin)
+    work = label.labelling(cells, skin.connectivity, skin.labeller)
+    blob = _rounded if skin.report == "barycenter" else _blob
+    return [blob((zone.area, zone.sum_x, zone.sum_y), skin) for zone in work.departures]
+
+
+def _blob(moments: tuple[int, int, int], skin: Skin) -> Blob:
+    area, sum_x, sum_y = moments
+    cell = skin.pitch_x_mm * skin.pitch_y_mm
+    return Blob(area * cell, sum_x / area * skin.pitch_x_mm, sum_y / area * skin.pitch_y_mm)
+
+
+def _rounded(moments: tuple[int, int, int], skin: Skin) -> Blob:
+    """The same with the barycenter that a board sends with ``report = "barycenter"``."""
+    area, *sums = moments
+    x, y = (barycenter(total, area, skin.barycenter_bits) / 2**skin.barycenter_bits for total in sums)
+    return Blob(area * skin.pitch_x_mm * skin.pitch_y_mm, x * skin.pitch_x_mm, y * skin.pitch_y_mm)
+
+
+@dataclasses.dataclass(frozen=True)
+class Interval:
+    """A mean with the 95 % interval in which it lies."""
+
+    mean: float
+    low: float
+    high: float
+    count: int
+
+
+def interval(values: Sequence[float]) -> Interval:
+    """Of values, NaN left out: Student's with many degrees of freedom, or Wilson's where all are shares 0 or 1."""
+    known = np.array([value for value in values if not math.isnan(value)], float)
+    n = len(known)
+    if not n:
+        return Interval(math.nan, math.nan, math.nan, 0)
+    mean = float(known.mean())
+    if np.isin(known, (0.0, 1.0)).all():
+        centre = (mean + Z95**2 / (2 * n)) / (1 + Z95**2 / n)
+        half = Z95 / (1 + Z95**2 / n) * math.sqrt(mean * (1 - mean) / n + Z95**2 / (4 * n**2))
+        return Interval(mean, max(0.0, centre - half), min(1.0, centre + half), n)
+    half = Z95 * float(known.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
+    return Interval(mean, mean - half, mean + half, n)

@@ -1,0 +1,48 @@
+"""Zones of a frame of cells, labelled on the host as people do it today: OpenCV's connected components.
+
+How long that takes depends on the machine: a time here is of the one the chart is made on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import statistics
+import time
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from contactfpga_sim.scenes.families import placements
+from contactfpga_sim.studies.chart.study import Point
+
+FRAMES, REPEATS = 20, 50
+
+
+def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, float, float]]:
+    """Area, x and y of each zone of (R, C) bool ``cells``, in cells."""
+    _, _, found, centroids = cv2.connectedComponentsWithStats(cells.view(np.uint8), connectivity=connectivity)
+    return [
+        (int(area), float(x), float(y)) for area, (x, y) in zip(found[1:, cv2.CC_STAT_AREA], centroids[1:], strict=True)
+    ]
+
+
+def label_us(frames: Sequence[np.ndarray], connectivity: int) -> float:
+    """Microseconds that :func:`zones` takes for a frame: the median over frames of the median of many calls."""
+    return statistics.median(statistics.median(_once(cells, connectivity) for _ in range(REPEATS)) for cells in frames)
+
+
+def _once(cells: np.ndarray, connectivity: int) -> float:
+    start = time.perf_counter_ns()
+    zones(cells, connectivity)
+    return (time.perf_counter_ns() - start) / 1e3
+
+
+def timed(point: Point) -> Point:
+    """The same point with the host's time, where the host labels."""
+    task = point.task
+    if task.skin.report != "cells":
+        return point
+    scenes = placements(task.family, FRAMES, task.seed + 2, task.skin)
+    frames = [scene.pressed(0.0, task.skin) for scene in scenes]
+    return dataclasses.replace(point, host_us=label_us(frames, task.skin.connectivity))

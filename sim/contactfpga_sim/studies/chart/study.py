@@ -1,0 +1,192 @@
+"""The points of the chart: every method on every family of scenes, worked out in pieces by any executor."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from typing import Any
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim.scenes.families import placements
+from contactfpga_sim.scenes.scene import Scene
+from contactfpga_sim.studies import kept, size
+from contactfpga_sim.studies.chart import errors, speed
+from contactfpga_sim.studies.chart.errors import METRICS, Interval
+from contactfpga_sim.studies.chart.speed import Speed
+
+PIECE = 125
+"""Placements that are worked out together."""
+
+DEVICE = sizes.UP5K
+"""For which LUT4 and clock are given."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A method on a family of scenes."""
+
+    method: str
+    skin: Skin
+    family: str
+    count: int
+    seed: int
+    timed: int = 48
+    """Touches whose time is worked out."""
+    checked: int = 2
+    """Of these so many go through the gateware, too."""
+
+
+KINDS = ("total", "labeller", "sensing")
+"""Errors: of the method's zones against the contacts; of these zones against the connected pieces of the pressed cells;
+of these pieces against the contacts."""
+
+Found = dict[str, dict[str, list[float]]]
+"""By kind and metric, a value a scene."""
+
+Look = tuple[np.ndarray, list[errors.Blob]]
+"""(R, C) bool, the pressed cells, and what there is to be found."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """What came of a task."""
+
+    task: Task
+    errors: dict[str, dict[str, Interval]]
+    """By kind and metric."""
+    speed: Speed
+    luts: int | None
+    fmax_mhz: float | None
+    host_us: float = 0.0
+    """What the host takes to label the cells, where it does; of the machine at hand, so of two runs never the same."""
+
+
+def study(
+    tasks: Sequence[Task],
+    executor: Executor,
+    with_size: bool = True,
+    step: Callable[[str, int], None] = lambda name, of: None,
+    so_far: dict[Task, Point] | None = None,
+) -> list[Point]:
+    """Work out all tasks; ``step(kind of work, pieces of that kind)`` is called after each piece. A point is put
+    into ``so_far`` as soon as its errors and times are known; its size comes last.
+
+    What was worked out before with the same code is taken from the cache. ``executor`` is that of a process pool, or
+    any other with the same interface, a Dask cluster's for instance.
+    """
+    skins = list(dict.fromkeys(task.skin for task in tasks)) if with_size else []
+    parts: dict[Task, tuple[list[Future[Found]], Future[dict[str, float]]]] = {
+        task: (
+            [executor.submit(accuracy, task, first) for first in range(0, task.count, PIECE)],
+            executor.submit(timing, task),
+        )
+        for task in dict.fromkeys(tasks)
+    }
+    places = {skin: executor.submit(_size, skin) for skin in skins}
+    names: dict[Future[Any], str] = {
+        **dict.fromkeys((piece for pieces, _ in parts.values() for piece in pieces), "placements"),
+        **dict.fromkeys((time for _, time in parts.values()), "times"),
+        **dict.fromkeys(places.values(), "place and route"),
+    }
+    owners = {future: task for task, (pieces, time) in parts.items() for future in (*pieces, time)}
+    found = {} if so_far is None else so_far
+    of = Counter(names.values())
+    for future in as_completed(names):
+        future.result()
+        step(names[future], of[names[future]])
+        task = owners.get(future)
+        if task is None:
+            continue
+        pieces, time = parts[task]
+        if time.done() and all(piece.done() for piece in pieces):
+            measured = intervals([piece.result() for piece in pieces])
+            found[task] = Point(task, measured, Speed(**time.result()), None, None)
+    return [_sized(found[task], places[task.skin].result()) if with_size else found[task] for task in tasks]
+
+
+def _sized(point: Point, size: sizes.Size) -> Point:
+    return dataclasses.replace(point, luts=size.luts, fmax_mhz=size.fmax_mhz)
+
+
+def intervals(pieces: Sequence[Found]) -> dict[str, dict[str, Interval]]:
+    """By kind and metric, over all pieces."""
+    return {
+        kind: {name: errors.interval([value for piece in pieces for value in piece[kind][name]]) for name in METRICS}
+        for kind in KINDS
+    }
+
+
+def accuracy(task: Task, first: int) -> Found:
+    """Errors of one piece of a task's placements, by kind and metric."""
+
+    def new() -> Found:
+        last = min(first + PIECE, task.count)
+        scenes = placements(task.family, last - first, task.seed, task.skin, first=first)
+        return compared((look(scene, 0.0, task.skin) for scene in scenes), task.skin)
+
+    return kept.kept("accuracy", _key(task, "accuracy", first), new)
+
+
+def look(scene: Scene, seconds: float, skin: Skin) -> Look:
+    """A scene at an instant."""
+    return scene.pressed(seconds, skin), errors.contacts(scene.truth(seconds, skin))
+
+
+def compared(looks: Iterable[Look], skin: Skin) -> Found:
+    """Errors of a Skin's zones."""
+    found: Found = {kind: {name: [] for name in METRICS} for kind in KINDS}
+    for cells, there in looks:
+        for kind, values in zip(KINDS, _scene_errors(cells, there, skin), strict=True):
+            for name in METRICS:
+                found[kind][name].append(float(getattr(values, name)))
+    return found
+
+
+def _scene_errors(
+    cells: np.ndarray, there: list[errors.Blob], skin: Skin
+) -> tuple[errors.Errors, errors.Errors, errors.Errors]:
+    exact, found = errors.exact_zones(cells, skin), errors.method_zones(cells, skin)
+    return errors.errors(found, there), errors.errors(found, exact), errors.errors(exact, there)
+
+
+def timing(task: Task) -> dict[str, float]:
+    """The fields of a task's :class:`Speed`."""
+
+    def new() -> dict[str, float]:
+        scenes = placements(task.family, task.timed, task.seed + 1, task.skin)
+        frames = [cells for cells in (scene.pressed(0.0, task.skin) for scene in scenes) if cells.any()]
+        if not frames:
+            return dict.fromkeys((field.name for field in dataclasses.fields(Speed)), math.nan)
+        return dataclasses.asdict(speed.measure(task.skin, frames, task.checked))
+
+    return kept.kept("timing", _key(task, "timing", task.timed), new)
+
+
+def _size(skin: Skin) -> sizes.Size:
+    return size.measure(lambda: Top(skin), DEVICE, seeds=1)
+
+
+def _key(task: Task, kind: str, number: int) -> str:
+    skin = json.dumps(dataclasses.asdict(task.skin), sort_keys=True)
+    return f"{kept.sources()} {kind} {number} {task.count} {task.seed} {task.checked} {task.family} {skin}"
+
+
+def front(points: Iterable[tuple[float, float]]) -> list[int]:
+    """Numbers of the (time, error) points that no other one beats in one and equals in the other, by rising time."""
+    order = sorted(
+        (time, error, index) for index, (time, error) in enumerate(points) if np.isfinite([time, error]).all()
+    )
+    best, found = math.inf, []
+    for _, error, index in order:
+        if error < best:
+            best = error
+            found.append(index)
+    return found

@@ -1,0 +1,263 @@
+"""Knobs of the sheet as a circuit: slow columns, missing diodes, broken lines, switches and columns that stick."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.sheet.circuit import Circuit, Line
+from contactfpga_sim.studies.failures.knob import Outcome, Study
+from contactfpga_sim.studies.failures.rig import (
+    REFERENCE,
+    Rig,
+    faults,
+    hello_clocks,
+    moments,
+    places,
+    plural,
+    reported,
+    still,
+)
+
+
+def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:
+    """(rows, columns) bool: 2x2 cells at each of these (row, column)."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    for row, column in spots:
+        cells[row : row + 2, column : column + 2] = True
+    return cells
+
+
+def _judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: str = "contact") -> Outcome:
+    """A frame against the contacts that are there, to the cell."""
+    right = reported(zones) == sorted(map(moments, contacts))
+    what = f"{plural(len(zones), 'zone')} of {plural(len(contacts), unit)}"
+    if not right and len(zones) == len(contacts):
+        what = f"{zones.pressed} cells of {int(sum(contact.sum() for contact in contacts))}"
+    return Outcome(right, faults(zones), what, zones.pressed, cells, places(zones))
+
+
+# ---- settle time
+
+LAZY = REFERENCE.replace(release_us=40.0)
+
+
+def _slow(skin: Skin, pull_ohm: float, path_ohm: float, picofarad: float) -> Outcome:
+    spots = [(3, 4), (9, 10)]
+    cells = finger(skin, *spots)
+    with Rig(skin) as rig:
+        rig.board.settle(Line(picofarad * 1e-12, pull_ohm, path_ohm))
+        rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
+        zones = rig.frames()[-1]
+    return _judged(zones, cells, [finger(skin, spot) for spot in spots])
+
+
+SETTLE = Study(
+    name="settle",
+    title="Columns slower than `settle_us = 5`",
+    knob="capacitance of a column, pF",
+    amount="cells that read pressed",
+    values=tuple(np.geomspace(10, 10_000, 61).round().tolist()),
+    runs={
+        "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, 4700.0, 50.0),
+        "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, 40_000.0, 50.0),
+        "4.7 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(_slow, LAZY, 4700.0, 2000.0),
+    },
+    helps="smaller resistances; a `release_us` and `settle_us` twice what makes `stuck` go",
+)
+
+
+# ---- diodes
+
+
+def _bare(skin: Skin, count: float) -> Outcome:
+    """Three fingers at the corners of a rectangle; of one of them the switches lose their diodes one by one. Undefined
+    levels are tried both ways."""
+    spots = [(3, 4), (3, 10), (11, 4)]
+    cells = finger(skin, *spots)
+    bare = np.zeros_like(cells)
+    for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
+        bare[row, column] = True
+    read, undefined = Circuit(bare=bare).read(cells)
+    frames = [still(skin, each) for each in (read, read | undefined)]
+    worst = min(frames, key=lambda zones: zones.pressed)
+    contacts = [finger(skin, spot) for spot in spots]
+    right = all(reported(zones) == sorted(map(moments, contacts)) for zones in frames)
+    told = faults(frames[0]) if faults(frames[0]) and faults(frames[1]) else ()
+    lost, of = int((undefined & cells).sum()), int(cells.sum())
+    what = f"{lost} of {of} pressed cells undefined, row pins short-circuited"
+    return Outcome(right, told, what, worst.pressed, cells, places(worst))
+
+
+DIODES = Study(
+    name="diodes",
+    title="Switches without a sound diode on a sheet that should have them",
+    knob="such switches under one of three fingers",
+    amount="cells that surely read pressed",
+    values=(0, 1, 2, 3, 4),
+    runs={"three fingers at corners": functools.partial(_bare, REFERENCE)},
+    helps='test each diode before fitting; a board for `diodes = "none"` lets rows float and flags ghosts',
+)
+
+BARE = Skin(rows=12, columns=12, diodes="none", connectivity=4)
+BARE_CELLS = BARE.replace(report="cells")
+CORNERS = [(1, 2), (1, 8), (8, 2), (8, 8)]
+
+
+def bare_read(pressed: np.ndarray) -> np.ndarray:
+    """What a sheet without diodes reads."""
+    return Circuit(bare=np.ones((1, 1), bool), floating=True).read(pressed)[0]
+
+
+def _corners(count: float) -> Outcome:
+    spots = CORNERS[: int(count)]
+    cells = finger(BARE, *spots)
+    zones = still(BARE, bare_read(cells))
+    return _judged(zones, cells, [finger(BARE, spot) for spot in spots])
+
+
+def scattered(count: int, places_: int = 60, seed: int = 5) -> list[list[tuple[int, int]]]:
+    """Fingers of 2x2 cells at random places of the sheet without diodes, at least a cell apart."""
+    rng = np.random.default_rng([seed, count])
+    found: list[list[tuple[int, int]]] = []
+    while len(found) < places_:
+        spots: list[tuple[int, int]] = []
+        while len(spots) < count:
+            row, column = map(int, rng.integers(0, BARE.rows - 1, 2))
+            if all(max(abs(row - y), abs(column - x)) > 2 for y, x in spots):
+                spots.append((row, column))
+        found.append(spots)
+    return found
+
+
+def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
+    """The second frame of each: the first one differs from what was before."""
+    found = []
+    with Rig(skin) as rig:
+        rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), hello_clocks(skin))
+        for each in cells:
+            rig.frames()
+            rig.board.hold(bare_read(each)[None], 6 * rig.scan)
+            found.append(rig.frames()[-1])
+    return found
+
+
+def _scattered(count: float) -> Outcome:
+    """Zones are not what touches; it is told if all frames in which that is so are flagged."""
+    placed = scattered(int(count))
+    cells = [finger(BARE, *spots) for spots in placed]
+    frames = _frames(BARE, cells)
+    truth = [sorted(moments(finger(BARE, spot)) for spot in spots) for spots in placed]
+    wrong = [index for index, zones in enumerate(frames) if reported(zones) != truth[index]]
+    silent = [index for index in wrong if "ghost" not in frames[index].flags]
+    shown = (silent or wrong or [0])[0]
+    what = (
+        f"wrong zones at {100 * len(wrong) / len(frames):.0f} % of places, "
+        f"unflagged at {100 * len(silent) / len(frames):.0f} %"
+    )
+    told = () if silent else tuple({flag for index in wrong for flag in faults(frames[index])})
+    return Outcome(not wrong, told, what, len(wrong) / len(frames), cells[shown], places(frames[shown]))
+
+
+def _scattered_cells(count: float) -> Outcome:
+    """Cells that are read wrong; it is told if each of them is marked."""
+    cells = [finger(BARE, *spots) for spots in scattered(int(count))]
+    frames = _frames(BARE_CELLS, cells)
+    read, marked = (np.array([getattr(zones, name) for zones in frames]) for name in ("cells", "ghost_cells"))
+    wrong = np.flatnonzero((read != cells).any(axis=(1, 2)))
+    missed = np.flatnonzero((read & ~np.array(cells) & ~marked).any(axis=(1, 2)))
+    shares = [100 * len(some) / len(frames) for some in (wrong, missed)]
+    what = f"ghosts at {shares[0]:.0f} % of places, unmarked at {shares[1]:.0f} %"
+    told = ("ghost",) if len(wrong) and not len(missed) else ()
+    return Outcome(not len(wrong), told, what, len(wrong) / len(frames), read[wrong[0] if len(wrong) else 0])
+
+
+GHOSTS = Study(
+    name="ghosts",
+    title="Fingers on a sheet without diodes",
+    knob="fingers of 2x2 cells",
+    amount="share of places read wrong",
+    values=tuple(range(1, 9)),
+    runs={
+        "zones, random places": _scattered,
+        "cells, random places": _scattered_cells,
+    },
+    helps="diodes",
+)
+
+GHOST = Study(
+    name="ghost",
+    title="Three corners fake the fourth, without diodes",
+    knob="fingers at the corners of a rectangle",
+    amount="cells that read pressed",
+    values=(1, 2, 3, 4),
+    runs={"zones": _corners},
+    helps="diodes",
+)
+
+
+# ---- broken lines, stuck switches
+
+
+def _broken(line: str, count: float) -> Outcome:
+    """``line``: row or column."""
+    skin = REFERENCE
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[4:11, 5:12] = True
+    lines = tuple(range(7, 7 + int(count)))
+    circuit = Circuit(broken_rows=lines) if line == "row" else Circuit(broken_columns=lines)
+    return _judged(still(skin, circuit.read(cells)[0]), cells, [cells])
+
+
+BROKEN = Study(
+    name="broken",
+    title="Lines that are broken under a contact of 7x7 cells",
+    knob="broken lines side by side",
+    amount="cells that read pressed",
+    values=(0, 1, 2, 3),
+    runs={"row": functools.partial(_broken, "row"), "column": functools.partial(_broken, "column")},
+    helps="`contactfpga wire` shows lines that never read pressed",
+)
+
+STUCK_SPOTS = [(2, 3), (12, 2), (5, 12), (13, 13), (1, 9), (9, 14)]
+MASKED = REFERENCE.replace(mask=tuple(STUCK_SPOTS[:3]))
+
+
+def _stuck(skin: Skin, count: float) -> Outcome:
+    touch = finger(skin, (7, 7))
+    closed = np.zeros_like(touch)
+    for row, column in STUCK_SPOTS[: int(count)]:
+        closed[row, column] = True
+    zones = still(skin, Circuit(closed=closed).read(touch)[0])
+    return _judged(zones, touch | closed, [touch])
+
+
+def _stuck_columns(count: float) -> Outcome:
+    skin = REFERENCE
+    touch = finger(skin, (7, 7))
+    columns = np.zeros(skin.columns, bool)
+    columns[[2, 12, 4, 14, 0, 10][: int(count)]] = True
+    with Rig(skin) as rig:
+        rig.board.stick(columns)
+        rig.board.hold(touch[None], hello_clocks(skin) + 4 * Derived(skin).frame_clocks)
+        zones = rig.frames()[-1]
+    return _judged(zones, touch | columns, [touch])
+
+
+STUCK = Study(
+    name="stuck",
+    title="Switches that are stuck closed, beside a finger",
+    knob="how many are stuck",
+    amount="cells that read pressed",
+    values=(0, 1, 2, 3, 4, 5, 6),
+    runs={
+        "no mask": functools.partial(_stuck, REFERENCE),
+        "three in the mask": functools.partial(_stuck, MASKED),
+        "columns shorted to the rows' level": _stuck_columns,
+    },
+    helps="`contactfpga wire` shows switches that read pressed untouched; list them in `mask`",
+)

@@ -1,0 +1,209 @@
+"""Knobs of the line and of both its ends: baud rates that differ, noise, another clock, a host that is slow."""
+
+from __future__ import annotations
+
+import functools
+from collections import deque
+
+import numpy as np
+
+from contactfpga.commands import doctor
+from contactfpga.driver.board import Board as Driver
+from contactfpga.skin.derived import Derived
+from contactfpga.wire import protocol
+from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.studies.failures.knob import Outcome, Study
+from contactfpga_sim.studies.failures.rig import REFERENCE, Rig, hello_clocks
+from contactfpga_sim.studies.failures.uart import Heard, Line, heard
+
+FRAMES = 60
+SKIN = REFERENCE
+
+
+@functools.cache
+def recorded(scans: int = FRAMES) -> Line:
+    """A line to be heard in several ways."""
+    return Line.record(SKIN, scans, seed=3)
+
+
+def _of_line(found: Heard, extra: str = "") -> Outcome:
+    """Right if every frame arrives; a frame that was never sent is worse than one that is lost, and silent."""
+    missing = found.sent - found.arrived
+    what = f"{missing} of {found.sent} frames do not arrive" + extra
+    if found.wrong:
+        return Outcome(False, (), f"{found.wrong} frames that were never sent", missing / found.sent)
+    return Outcome(not missing and not found.told, found.told, what, missing / found.sent)
+
+
+def _baud(sign: int, per_cent: float) -> Outcome:
+    bits = Derived(SKIN).bit_clocks / (1 + sign * per_cent / 100)
+    return _of_line(heard(recorded(), recorded().read(bits)))
+
+
+ASKED = 0x15_2A_D0
+"""Of a request whose other digits mix zeros and ones; its lowest bits are left for a number."""
+
+
+def _send(rig: Rig, byte: int, bit: float) -> None:
+    """A byte whose bits last so many of the board's clocks, at its receive pin."""
+    bits = [0, *(byte >> index & 1 for index in range(8)), 1]
+    ends = [round(bit * (index + 1)) for index in range(10)]
+    for start, end, level in zip([0, *ends], ends, bits):
+        if not level:
+            rig.board.pull_low(end - start)
+        rig.board.run(end - start)
+
+
+def _asked(sign: int, per_cent: float) -> Outcome:
+    """The host's requests, at the host's rate, at the board's receive pin: does a frame answer?"""
+    bit = Derived(SKIN).bit_clocks / (1 + sign * per_cent / 100)
+    answered = 0
+    lows = (1, 2, 3, 4)
+    with Rig(SKIN) as rig:
+        rig.board.run(hello_clocks(SKIN))
+        for low in lows:
+            rig.frames()
+            for byte in protocol.encode_request(ASKED + low):
+                _send(rig, byte, bit)
+            rig.board.run(6 * rig.scan)
+            answered += any(zones.frame.heard == low for zones in rig.frames())
+    right = answered == len(lows)
+    what = f"{len(lows) - answered} of {len(lows)} requests unanswered"
+    return Outcome(right, () if right else ("ReadTimeout",), what, 1 - answered / len(lows))
+
+
+BAUD = Study(
+    name="baud",
+    title="Baud rates that differ",
+    knob="difference, %",
+    amount="share lost",
+    values=tuple(np.arange(0, 12.01, 0.25).round(2).tolist()),
+    runs={
+        "host faster, frames": functools.partial(_baud, 1),
+        "host slower, frames": functools.partial(_baud, -1),
+        "host faster, requests": functools.partial(_asked, 1),
+        "host slower, requests": functools.partial(_asked, -1),
+    },
+    helps="a Skin is refused beyond 1.5 %; `contactfpga doctor` counts what is damaged",
+)
+
+
+def _noise(rate_hz: float) -> Outcome:
+    """The port was opened before the noise began."""
+    line = recorded(200)
+    noisy = line.noisy(rate_hz, seed=1).read(Derived(SKIN).bit_clocks)
+    return _of_line(heard(line, noisy, greeted=protocol.encode_hello(SKIN)))
+
+
+NOISE = Study(
+    name="noise",
+    title="Pulses on the line",
+    knob="pulses a second",
+    amount="share of frames lost",
+    values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
+    runs={"half a bit to two bits long": _noise},
+    helps="a shorter cable, a slower `baud`",
+)
+
+
+def _clock(per_cent: float) -> Outcome:
+    """The board's crystal is fast: bits are short, and so are its microseconds."""
+    faster = 1 + per_cent / 100
+    found = heard(recorded(), recorded().read(Derived(SKIN).bit_clocks * faster))
+    if found.arrived < found.sent or found.wrong:
+        return _of_line(found)
+    told = ("doctor",) if [*doctor.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
+    return Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off", per_cent / 100)
+
+
+DOCTOR_S = 10.0
+"""How long `contactfpga doctor --seconds 10` looks."""
+
+CLOCK_PER_CENT = 0.1
+"""Times count as right that are off by no more."""
+
+CLOCK = Study(
+    name="clock",
+    title="A board whose clock is fast",
+    knob="%",
+    amount="share of frames lost, else error of times",
+    values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
+    runs={"board with `clock_hz` off": _clock},
+    helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
+)
+
+
+# ---- a host that is slow
+
+TTY_BYTES = 4095
+"""What Linux keeps of a serial port that nobody reads; what comes then is dropped."""
+
+
+class SlowHost:
+    """A virtual board behind a buffer as the system has it; time passes while the host is busy elsewhere."""
+
+    live, threaded = True, False
+    name = "the slow host"
+
+    def __init__(self) -> None:
+        self._board = VirtualBoard(SKIN, "two_fingers")
+        self._waiting: deque[int] = deque()
+
+    def work(self, seconds: float) -> None:
+        """The host does something else."""
+        end = self._board.clock() + seconds
+        while (left := end - self._board.clock()) > 1e-6:
+            self._keep(self._board.read(min(left, 1e-4)))
+
+    def _keep(self, data: bytes) -> None:
+        self._waiting.extend(data[: TTY_BYTES - len(self._waiting)])
+
+    def read(self, timeout_s: float) -> bytes:
+        if not self._waiting:
+            self._keep(self._board.read(max(timeout_s, 1e-6)))
+        data = bytes(self._waiting)
+        self._waiting.clear()
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._board.write(data)
+
+    def clock(self) -> float:
+        return self._board.clock()
+
+    def close(self) -> None:
+        self._board.close()
+
+
+TURNS = 3
+
+
+def _slow_host(milliseconds: float) -> Outcome:
+    """The driver reads all there is, then the host works for a while, and so on."""
+    transport = SlowHost()
+    with Driver(transport) as board:
+        board.greet(1.0)
+        times = []
+        for _ in range(TURNS):
+            transport.work(milliseconds / 1000)
+            until = transport.clock() + 0.002
+            while transport.clock() < until:
+                times.append(board.next().time_us)
+        stats = board.stats
+    scan_us = Derived(SKIN).frame_clocks / Derived(SKIN).clocks_per_us
+    missing = round((times[-1] - times[0]) / scan_us) + 1 - len(times) - stats.overwritten
+    told = tuple(name for name in ("lost", "unexplained") if getattr(stats, name))
+    what = f"{missing} frames missing, `lost` says {stats.lost}"
+    what += f", {stats.unexplained} whose time was not known" if stats.unexplained else ""
+    return Outcome(missing <= 0 and not stats.damaged, told, what, missing)
+
+
+HOST = Study(
+    name="host",
+    title="A host that reads every now and then",
+    knob="ms between reads",
+    amount="frames missing",
+    values=(1, 2, 5, 8, 10, 12, 14, 16, 20, 25, 30, 40, 50, 70, 100),
+    runs={"every frame of `contactfpga.open()`": _slow_host},
+    helps='`Board.latest()` where only the newest frame counts; `send = "on_change"`',
+)

@@ -1,0 +1,102 @@
+"""A compiled board with the host's receiver at the other end of its line, in simulated time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.wire import protocol
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.studies.failures.knob import Place
+
+REFERENCE = Skin()
+
+HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
+"""The most that a hello takes on the wire."""
+
+HELD_SCANS = 5
+"""Scans for which a frame is held, so that one of it reaches the host even if a hello comes between."""
+
+
+class Rig:
+    """``board`` is to be pressed and run; :meth:`frames` are those that came out meanwhile."""
+
+    def __init__(self, skin: Skin, capture: tuple[str, ...] = ()):
+        self.skin = skin
+        self.board = CompiledBoard(skin, capture)
+        self.conversation = Conversation("the board")
+        self.scan = Derived(skin).frame_clocks
+
+    def frames(self) -> list[Zones]:
+        """All frames that have come since they were taken last."""
+        events = self.conversation.receive(self.board.receive(), self.board.cycle / self.skin.clock_hz)
+        return [event.zones for event in events if isinstance(event, Arrival)]
+
+    def __enter__(self) -> Rig:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.board.close()
+
+
+def hello_clocks(skin: Skin) -> int:
+    """Scans that the hello at power-up may take from frames, in clocks."""
+    scan = Derived(skin).frame_clocks
+    return scan * (math.ceil(HELLO_BYTES * 10 * Derived(skin).bit_clocks / scan) + 2)
+
+
+def still(skin: Skin, cells: np.ndarray) -> Zones:
+    """The frame of a sheet that is pressed so."""
+    return seen(skin, cells[None])[0]
+
+
+def seen(skin: Skin, frames: np.ndarray) -> list[Zones]:
+    """What the host gets of each of (n, rows, columns) bool frames of few zones that are pressed one after the other,
+    for some whole scans each: the last frame of each."""
+    with Rig(skin) as rig:
+        start = hello_clocks(skin)
+        held = rig.scan * HELD_SCANS
+        rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)
+        rig.board.hold(frames, held)
+        rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), held)
+        found: dict[int, Zones] = {}
+        for zones in rig.frames():
+            scan = (zones.time_us * Derived(skin).clocks_per_us - start) // held
+            found[scan] = zones
+        return [found[index] for index in range(len(frames))]
+
+
+def moments(cells: np.ndarray) -> tuple[int, int, int]:
+    """Area, sum x and sum y of (rows, columns) bool cells."""
+    y, x = np.nonzero(cells)
+    return len(x), int(x.sum()), int(y.sum())
+
+
+def reported(zones: Zones) -> list[tuple[int, int, int]]:
+    """The moments of a frame's zones, in order."""
+    return sorted((area, x, y) for area, x, y in zones.frame.moments.tolist())
+
+
+def places(zones: Zones) -> tuple[Place, ...]:
+    """The barycenters of a frame's zones, in cells."""
+    return tuple((x / area, y / area) for area, x, y in sorted(zones.frame.moments.tolist(), key=_place))
+
+
+def _place(sums: list[int]) -> tuple[float, float, int]:
+    area, x, y = sums
+    return y / area, x / area, area
+
+
+def faults(zones: Zones) -> tuple[str, ...]:
+    """What a frame says against itself."""
+    return (*sorted(zones.flags - {"fault"}), *sorted(zones.faults))
+
+
+def plural(count: int, noun: str) -> str:
+    """A count with its noun."""
+    return f"{count} {noun}" + ("" if count == 1 else "s")

@@ -1,0 +1,116 @@
+"""The Skins that are tried: every method at every pitch, all on sheets of one size."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from contactfpga.skin import Skin, SkinError
+from contactfpga_sim.studies.fit.sources import Recorded, Size, Source
+
+LABELLERS: tuple[dict[str, Any], ...] = (
+    {"labeller": "single"},
+    {"labeller": "projection"},
+    *({"labeller": labeller, "connectivity": c} for labeller in ("serial", "run") for c in (8, 4)),
+)
+"""Connectivity makes no difference to the others."""
+
+METHODS = (*(labeller | {"report": "moments"} for labeller in LABELLERS), {"report": "cells"})
+"""Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds a zone."""
+
+SCANS = ("raster", "adaptive")
+PITCHES_MM = (5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
+
+
+SHEET = ("rows", "columns", "pitch_x_mm", "pitch_y_mm")
+"""Settings of the sheet itself."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A Skin to try, or why there is none."""
+
+    settings: tuple[tuple[str, Any], ...]
+    """What differs from the Skin asked for, in the order of the names."""
+    skin: Skin | None
+    refusal: str = ""
+    """What Skin says."""
+
+
+def candidates(
+    base: Skin,
+    pitches_mm: Sequence[tuple[float, float]],
+    size_mm: Size,
+    methods: Sequence[dict[str, Any]] = METHODS,
+    scans: Sequence[str] = SCANS,
+    bauds: Sequence[int] | None = None,
+) -> list[Candidate]:
+    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each method, scan and baud rate."""
+    found = {}
+    for pitch, method, scan, baud in itertools.product(pitches_mm, methods, scans, bauds or (base.baud,)):
+        settings = _sheet(pitch, size_mm) | method | {"scan": scan, "baud": baud}
+        one = _candidate(base, settings)
+        found[one.settings] = one
+    return list(found.values())
+
+
+def _sheet(pitch_mm: tuple[float, float], size_mm: Size) -> dict[str, Any]:
+    columns, rows = (max(1, round(size / pitch)) for size, pitch in zip(size_mm, pitch_mm, strict=True))
+    return {
+        "rows": rows,
+        "columns": columns,
+        "pitch_x_mm": size_mm[0] / columns,
+        "pitch_y_mm": size_mm[1] / rows,
+    }
+
+
+def _candidate(base: Skin, settings: dict[str, Any]) -> Candidate:
+    key = tuple(sorted(settings.items()))
+    changes = dict(settings)
+    if (base.rows, base.columns) != (settings["rows"], settings["columns"]):
+        changes["mask"] = ()  # it tells switches of the other sheet
+    try:
+        return Candidate(key, base.replace(**changes))
+    except SkinError as error:
+        return Candidate(key, None, str(error))
+
+
+def size_for(base: Skin | None, sources: Sequence[Source]) -> Size:
+    """Of the sheet: that of the Skin asked for, else what the sources ask for, else that of the reference Skin.
+
+    Raises ValueError where two of them disagree.
+    """
+    asked = {one: size for one in sources if (size := one.size_mm())}
+    if base is not None:
+        asked = {one: size for one, size in asked.items() if isinstance(one, Recorded)}
+    sizes = list(asked.values())
+    given = base or Skin()
+    size = (given.columns * given.pitch_x_mm, given.rows * given.pitch_y_mm)
+    if base is not None or not sizes:
+        sizes.insert(0, size)
+    for other in sizes[1:]:
+        if not all(math.isclose(one, two) for one, two in zip(sizes[0], other, strict=True)):
+            raise ValueError(
+                f"one sheet is {sizes[0][0]:g} x {sizes[0][1]:g} mm, another one {other[0]:g} x {other[1]:g} mm; "
+                "a Skin is fitted to one sheet"
+            )
+    return sizes[0]
+
+
+def pitches_for(base: Skin | None, sources: Sequence[Source], asked: Sequence[float] | None) -> list[Size]:
+    """Pitches (x, y) in mm to try: those asked for, else usual ones with that of the Skin asked for; of a recording
+    only its own."""
+    for pitch in asked or ():
+        if not 0 < pitch < math.inf:
+            raise ValueError(f"--pitch-mm is {pitch}; it must be above 0")
+    recorded = [one.recording for one in sources if isinstance(one, Recorded)]
+    if recorded:
+        pitch = recorded[0].pitch_mm or Skin().pitch_x_mm
+        if asked and list(asked) != [pitch]:
+            raise ValueError(f"--pitch-mm is {asked}; a recording has one pitch, here {pitch:g} mm")
+        return [(pitch, pitch)]
+    own = [(base.pitch_x_mm, base.pitch_y_mm)] if base is not None and not asked else []
+    return own + [(pitch, pitch) for pitch in asked or PITCHES_MM]

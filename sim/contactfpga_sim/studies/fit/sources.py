@@ -1,0 +1,197 @@
+"""Where scenes come from: families, built-in scenes, scene files and recordings, one scene a number.
+
+A source's scenes depend on what it says and on the number only, never on a name or an order. Numbers below a count
+serve to choose, those from it on to report.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import functools
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from contactfpga.inputs.files import open_regular
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes.contacts import Contact, Value
+from contactfpga_sim.scenes.families import FAMILIES, placements
+from contactfpga_sim.scenes.file import SceneFile
+from contactfpga_sim.scenes.placing import scene_of
+from contactfpga_sim.scenes.recordings import Recording
+from contactfpga_sim.scenes.scene import CONTACTS, Scene
+from contactfpga_sim.studies.chart import errors
+from contactfpga_sim.studies.chart.study import Look, look
+
+SHIFT_MM = 10.0
+"""A built-in scene lies in one place: it is moved at random by up to this much along x and y."""
+
+SECONDS = 1.0
+"""A built-in scene is looked at in a random instant of its first second."""
+
+COUNT = 500
+"""Scenes to choose with where nothing else is said."""
+
+Size = tuple[float, float]
+"""Width and height of a sheet in mm."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Source(abc.ABC):
+    """Scenes to choose a Skin with, and others to report."""
+
+    def size_mm(self) -> Size | None:
+        """Of the sheet that these scenes ask for; None where any will do."""
+        return None
+
+    def most(self, count: int) -> int:
+        """Scenes there are to choose with, ``count`` at most; and as many to report."""
+        return count
+
+    @abc.abstractmethod
+    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
+        """The scenes with these numbers, below twice ``count``, on a sheet; ``base``: the Skin asked for."""
+
+    @abc.abstractmethod
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+        """(R, C) bool of the same, without what there is to be found."""
+
+
+class Placed(Source):
+    """Contacts at places drawn at random."""
+
+    @abc.abstractmethod
+    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
+        """A scene, and the instant in s at which it is looked at."""
+
+    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
+        return [look(*self.at(skin, base, number), skin) for number in numbers]
+
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+        drawn = (self.at(skin, base, number) for number in numbers)
+        return [scene.pressed(seconds, skin) for scene, seconds in drawn]
+
+
+@dataclasses.dataclass(frozen=True)
+class Family(Placed):
+    """One of :data:`contactfpga_sim.scenes.families.FAMILIES`."""
+
+    family: str
+    seed: int = 0
+
+    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
+        return placements(self.family, 1, self.seed, skin, first=number)[0], 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class BuiltIn(Placed):
+    """One of :data:`contactfpga_sim.scenes.scene.CONTACTS`, made for the Skin asked for."""
+
+    scene: str
+    seed: int = 0
+
+    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
+        rng = np.random.default_rng([self.seed, number])
+        by_x, by_y = rng.uniform(-SHIFT_MM, SHIFT_MM, 2)
+        # Both sheets begin half a pitch before their first switch.
+        by_x += (base.pitch_x_mm - skin.pitch_x_mm) / 2
+        by_y += (base.pitch_y_mm - skin.pitch_y_mm) / 2
+        moved = (_moved(contact, float(by_x), float(by_y)) for contact in CONTACTS[self.scene](base).contacts)
+        return Scene(tuple(moved)), float(rng.uniform(0, SECONDS))
+
+
+@dataclasses.dataclass(frozen=True)
+class Shifted:
+    """A value over time, moved."""
+
+    value: Value
+    by: float
+
+    def __call__(self, seconds: float) -> float:
+        return self.by + (self.value(seconds) if callable(self.value) else self.value)
+
+
+def _moved(contact: Contact, by_x: float, by_y: float) -> Contact:
+    return dataclasses.replace(contact, x_mm=Shifted(contact.x_mm, by_x), y_mm=Shifted(contact.y_mm, by_y))
+
+
+@dataclasses.dataclass(frozen=True)
+class File(Placed):
+    """What a scene file says."""
+
+    says: SceneFile
+
+    def size_mm(self) -> Size | None:
+        width, height = self.says.width_mm, self.says.height_mm
+        return None if width is None or height is None else (width, height)
+
+    def at(self, skin: Skin, base: Skin, number: int) -> tuple[Scene, float]:
+        return scene_of(self.says, number, skin)
+
+
+@dataclasses.dataclass(frozen=True)
+class Recorded(Source):
+    """A recording: cells of one sheet, and no contacts. What there is to be found are their connected pieces, by the
+    connectivity of the Skin asked for. Scenes to choose come from its first half, those to report from the second,
+    evenly spaced in each."""
+
+    path: str
+    digest: str
+    threshold: float | None = None
+
+    @property
+    def recording(self) -> Recording:
+        """What the file holds."""
+        return _recording(self.path, self.digest, self.threshold)
+
+    def size_mm(self) -> Size | None:
+        _, rows, columns = self.recording.pressed.shape
+        pitch = self.recording.pitch_mm or Skin().pitch_x_mm
+        return columns * pitch, rows * pitch
+
+    def most(self, count: int) -> int:
+        return min(count, len(self.recording.pressed) // 2)
+
+    def looks(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[Look]:
+        judge = skin.replace(connectivity=base.connectivity)
+        return [(cells, errors.exact_zones(cells, judge)) for cells in self.cells(skin, base, numbers, count)]
+
+    def cells(self, skin: Skin, base: Skin, numbers: Sequence[int], count: int) -> list[np.ndarray]:
+        frames = self.recording.pressed
+        half = len(frames) // 2
+        return [frames[number // count * half + number % count * half // count] for number in numbers]
+
+
+@functools.lru_cache(maxsize=4)
+def _recording(path: str, digest: str, threshold: float | None) -> Recording:
+    return Recording.load(path, threshold)
+
+
+def source(name: str, seed: int | None = None, threshold: float | None = None) -> Source:
+    """By the name of a family or a built-in scene, or a path: .toml of a scene file, .npz or .npy of a recording.
+
+    ``seed``: of the places, in the place of the file's. ``threshold``: above which a recording's numbers are pressed. A
+    family hides the built-in scene of its name. Raises ValueError for anything else.
+    """
+    if name in FAMILIES:
+        return Family(name, seed or 0)
+    if name in CONTACTS:
+        return BuiltIn(name, seed or 0)
+    if name.endswith((".npz", ".npy")):
+        with open_regular(name) as file:
+            found = Recorded(name, hashlib.sha256(file.read()).hexdigest(), threshold)
+        if (frames := len(found.recording.pressed)) < 4:
+            raise ValueError(f"{name} has {frames} frames; two to choose with and two to report are the least")
+        return found
+    if name.endswith(".toml"):
+        says = SceneFile.load(name)
+        return File(says if seed is None else dataclasses.replace(says, seed=seed))
+    known = ", ".join((*FAMILIES, *(name for name in CONTACTS if name not in FAMILIES)))
+    raise ValueError(f"scene {name!r} is not known; take a .toml, .npz or .npy file, or one of {known}")
+
+
+def default_count(sources: Sequence[Source]) -> int:
+    """Scenes to choose with: the most that a file asks for."""
+    return max((one.says.count for one in sources if isinstance(one, File)), default=COUNT)

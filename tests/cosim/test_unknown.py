@@ -1,0 +1,100 @@
+"""From a power-up at which nothing is known, every output is known after the reset, and the golden model's."""
+
+import pytest
+from amaranth.hdl import Mux, Signal
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.link.link import hello_words
+from contactfpga_hdl.scan.raster import Scanner
+from contactfpga_sim.cosim import bench_unknown
+from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialised
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.cosim.covering import stimulus
+from contactfpga_sim.golden import predict
+from contactfpga_sim.golden.facts import facts
+
+SMALL = Skin(rows=8, columns=8)
+SKINS = {
+    "moments": SMALL,
+    "16x16": Skin(),
+    "4-connected": SMALL.replace(connectivity=4, zone_capacity=4),
+    "serial": SMALL.replace(labeller="serial"),
+    "serial, 4-connected": SMALL.replace(labeller="serial", connectivity=4, rows=9, columns=7, zone_capacity=4),
+    "projection": SMALL.replace(labeller="projection"),
+    "single": SMALL.replace(labeller="single"),
+    "symmetric": SMALL.replace(debounce="sym_defer_pk", debounce_press_us=60.0, debounce_release_us=120.0),
+    "eager": SMALL.replace(
+        debounce="asym_eager_defer_pk",
+        debounce_press_us=60.0,
+        debounce_release_us=120.0,
+        send="on_change",
+        keep_alive_ms=0.3,
+    ),
+    "barycenter": SMALL.replace(report="barycenter", barycenter_bits=2),
+    "cells": SMALL.replace(report="cells", diodes="row2col", send="on_change", keep_alive_ms=0.3),
+}
+
+with_icarus = pytest.mark.skipif(not bench_unknown.available(), reason="no iverilog on PATH")
+
+
+@with_icarus
+@pytest.mark.parametrize("name", SKINS)
+def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
+    skin = SKINS[name]
+    cycles = (10 if name == "16x16" else 20) * facts(skin).scan_clocks
+    timeline = stimulus(skin, cycles, seed=3)
+    assert compare(predict(skin, timeline, cycles).at_the_pins(), bench_unknown.run(skin, timeline, cycles)) > 900
+    record_property("cases", cycles)
+
+
+@with_icarus
+@pytest.mark.parametrize(("missing", "name"), [("link", "symmetric"), ("debounce", "symmetric"), ("label", "serial")])
+def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing, name):
+    skin = SKINS[name]
+    cycles = 20 * facts(skin).scan_clocks
+    kept = [pattern for pattern in initialised(skin) if missing not in pattern]
+    with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
+        bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles, kept)
+
+
+@with_icarus
+def test_a_register_without_a_reset_is_seen(monkeypatch):
+    def watch(self, m):
+        seen = Signal(reset_less=True)
+        with m.If(self._sampled):
+            now = self._pressed.any()
+            m.d.sync += [
+                seen.eq(~self._last & (seen | now)),
+                self.contact.eq(now | Mux(self._last, seen, self.contact)),
+            ]
+
+    monkeypatch.setattr(Scanner, "_watch_contact", watch)
+    cycles = 3 * facts(SMALL).scan_clocks
+    with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx [01], contact x"):
+        bench_unknown.run(SMALL, stimulus(SMALL, cycles, seed=3), cycles)
+
+
+@with_icarus
+def test_a_word_that_is_read_while_it_is_written_is_seen(monkeypatch):
+    for stage in ("sum", "join"):  # all zones in one place of the table
+        monkeypatch.setattr(f"contactfpga_hdl.label.{stage}.place_of", lambda derived, column: column & 0)
+    cycles = 6 * facts(SMALL).scan_clocks
+    with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
+        bench_unknown.run(SMALL, stimulus(SMALL, cycles, seed=3), cycles)
+
+
+@with_icarus
+def test_a_bracket_that_is_read_while_it_is_written_is_seen(monkeypatch):
+    monkeypatch.setattr("contactfpga_hdl.label.serial.place_of", lambda derived, column: column & 0)
+    skin = SKINS["serial"]
+    cycles = 6 * facts(skin).scan_clocks
+    with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
+        bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles)
+
+
+def test_only_what_is_named_keeps_its_value():
+    first = hello_words(SMALL).start
+    hello, frame = rf"  reg [7:0] \link.store[{first}] ", rf"  reg [7:0] \link.store[{first - 1}] "
+    text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", initialised(SMALL))
+    assert known == {rf"\link.store[{first}]": "8'h41"}
+    assert text == f"{hello};\n{frame};\n  reg busy ;\n  wire x = y;\n"

@@ -1,0 +1,153 @@
+"""What `sim://` and `replay://` addresses mean, and what of foreign names a terminal gets to see."""
+
+import os
+
+import numpy as np
+import pytest
+
+import contactfpga
+from contactfpga import cli
+from contactfpga.driver import recording, sim_address
+from contactfpga.driver.ports import Candidate
+from contactfpga.driver.sim_address import SimAddress
+from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.inputs.values import visible
+from contactfpga.skin import Skin
+from contactfpga_sim.board import native
+from contactfpga_sim.board.pty_board import PtyBoard
+
+SLOW = Skin(rows=2, columns=2, clock_hz=1_000_000, baud=100_000, settle_us=1000.0)
+
+
+@pytest.mark.parametrize(
+    ("address", "meant"),
+    [
+        ("sim://", SimAddress()),
+        ("sim:", SimAddress()),
+        ("sim://?scene=palm&skin=a/b.toml", SimAddress("palm", "a/b.toml")),
+        ("sim://?skin=a+b#c=d.toml", SimAddress(skin="a+b#c=d.toml")),
+        ("sim://?skin=50%25%26more%2B.toml", SimAddress(skin="50%&more+.toml")),
+        ("sim://?skin=%C3%BC%20.toml", SimAddress(skin="ü .toml")),
+        ("sim://?scene=a.npy&threshold=-1.5", SimAddress("a.npy", None, -1.5)),
+    ],
+)
+def test_an_address_has_one_reading(address, meant):
+    assert sim_address.parse(address) == meant
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("sim://?skin=a&b.toml", "'b.toml' is no option"),
+        ("sim://?skin=100%.toml", "'%.t' is no % with two hex digits; a % that is meant is written %25, a & %26"),
+        ("sim://?skin=%ff", "no UTF-8"),
+        ("sim://?skin=a&skin=b", "skin is given twice"),
+        ("sim://?skin=", "skin is empty"),
+        ("sim://board?skin=a", "it reads sim://"),
+        ("sim://?scene=a.npy&threshold=nan", "threshold is 'nan'; it must be a finite number"),
+    ],
+)
+def test_what_is_no_address_is_told(address, message):
+    with pytest.raises(PortNotFound) as caught:
+        sim_address.parse(address)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(address)
+
+
+def test_files_of_any_name_make_a_board(tmp_path):
+    skin, scene = tmp_path / "50%&+#.toml", tmp_path / "a b%41.npy"
+    skin.write_text("rows = 2\ncolumns = 2\n")
+    np.save(scene, np.array([[[0, 9], [0, 8]]], np.uint8))
+    quoted = [str(path).replace("%", "%25").replace("&", "%26") for path in (skin, scene)]
+    with contactfpga.open(f"sim://?skin={quoted[0]}&scene={quoted[1]}&threshold=8") as board:
+        assert board.next().pressed == 1
+
+
+@pytest.mark.parametrize("kind", ["fifo", "folder", "device"])
+def test_only_files_are_replayed(tmp_path, kind):
+    path = tmp_path / "x"
+    {"fifo": os.mkfifo, "folder": os.mkdir, "device": lambda path: path.symlink_to("/dev/zero")}[kind](path)
+    with pytest.raises(PortNotFound, match="not a regular file; is the path right"):
+        recording.open_recorded(f"replay://{path}")
+
+
+@pytest.mark.parametrize("link", ["same", "symlink", "hard link"])
+def test_a_recording_is_not_written_over_while_it_is_read(tmp_path, link):
+    path, other = tmp_path / "frames.bin", tmp_path / "other.bin"
+    path.write_bytes(b"precious")
+    if link == "same":
+        other = path
+    else:
+        (other.symlink_to if link == "symlink" else other.hardlink_to)(path)
+    with pytest.raises(ContactFPGAError, match="record to another file"):
+        recording.create(other, f"replay://{path}")
+    assert path.read_bytes() == b"precious"
+    recording.create(tmp_path / "new.bin", f"replay://{path}").close()
+    recording.create(other, "sim://").close()
+    assert path.read_bytes() == b""
+
+
+# ---- the link of `contactfpga board`
+
+
+def test_the_link_is_removed_with_its_board(tmp_path):
+    link = tmp_path / "port"
+    board = PtyBoard(SLOW, link=link)
+    assert os.readlink(link) == board.port
+    board.stop()
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize("kind", ["file", "link", "folder"])
+def test_what_took_the_place_of_the_link_stays(tmp_path, kind):
+    link = tmp_path / "port"
+    board = PtyBoard(SLOW, link=link)
+    link.unlink()
+    {"file": link.touch, "link": lambda: link.symlink_to("elsewhere"), "folder": link.mkdir}[kind]()
+    board.stop()
+    assert link.is_symlink() or link.exists()
+
+
+def test_a_link_that_leads_elsewhere_is_not_replaced(tmp_path):
+    link = tmp_path / "port"
+    link.symlink_to(tmp_path / "precious")
+    with pytest.raises(ContactFPGAError, match=r"cannot link .*: File exists"):
+        PtyBoard(SLOW, link=link)
+    assert os.readlink(link) == str(tmp_path / "precious")
+
+
+def test_what_a_killed_board_left_is_replaced(tmp_path):
+    link = tmp_path / "port"
+    link.symlink_to("/dev/pts/12345")
+    PtyBoard(SLOW, link=link).stop()
+    assert not link.is_symlink()
+
+
+# ---- terminals
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("plain ü 日本 .toml", "plain ü 日本 .toml"),
+        ("\x1b[31m", r"\x1b[31m"),
+        ("a\x07\n\x9b\x7f", r"a\x07\n\x9b\x7f"),
+        ("\u202e\ud800", r"\u202e\ud800"),
+    ],
+)
+def test_what_a_terminal_would_obey_is_shown(text, shown):
+    assert visible(text) == shown
+
+
+def test_serial_numbers_cannot_command_the_terminal():
+    shown = str(Candidate("/dev/ttyUSB0", "ULX3S", "A1\x1b]0;owned\x07"))
+    assert shown == r"/dev/ttyUSB0 (ULX3S, serial number A1\x1b]0;owned\x07)"
+
+
+def test_errors_cannot_command_the_terminal(capsys, monkeypatch):
+    def fail(*_, **__):
+        raise native.CompileFailed("line 1 \x1b[2J\nline 2")
+
+    monkeypatch.setattr(native, "load", fail)
+    assert cli.main(["zones", "--json", "sim://"]) == 1
+    assert capsys.readouterr().err == "contactfpga: line 1 \\x1b[2J\nline 2\n"

@@ -1,0 +1,399 @@
+"""Bytes and the clock in, events out: chunks, counters, times, restarts, other Skins, old boards."""
+
+import random
+from types import SimpleNamespace
+
+import pytest
+from model_board import SCAN_US, ModelBoard
+from wire import EPOCH_US, Wire, last_byte, old_frame, old_hello
+
+import contactfpga
+from contactfpga.commands.zones import status
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.stats import Stats
+
+SKIN = contactfpga.Skin()
+
+
+def arrived(events):
+    return [event.zones for event in events if isinstance(event, Arrival)]
+
+
+def errors(events):
+    return [event for event in events if isinstance(event, Exception)]
+
+
+class Line:
+    """A board whose bytes go straight to a conversation."""
+
+    def __init__(self, skin=SKIN, live=True, expected=None):
+        self.board = ModelBoard(skin)
+        self.host = Conversation("x", expected, live)
+        self.now = 0.0
+
+    def give(self, *packets):
+        """Frames that the host passes on of these bytes."""
+        return arrived(self.host.receive(b"".join(packets), self.now))
+
+    def hello(self, **options):
+        return self.host.receive(self.board.hello(**options), self.now)
+
+    def frame(self, **options):
+        return self.give(self.board.frame(**options))
+
+    def pause(self, seconds):
+        """Nothing is sent, and nothing received."""
+        self.board.time_us += round(seconds * 1e6)
+        self.now += seconds
+
+    @property
+    def stats(self):
+        return self.host.stats
+
+
+def test_chunks_do_not_matter():
+    board, rng = ModelBoard(SKIN), random.Random(3)
+    stream = board.hello() + b"".join(board.frame() for _ in range(300))
+    for _ in range(20):
+        host, found, rest = Conversation("x"), [], stream
+        while rest:
+            cut = rng.randrange(1, 60)
+            found += arrived(host.receive(rest[:cut], 0.0))
+            rest = rest[cut:]
+        assert [zones.sequence for zones in found] == [i % 256 for i in range(300)]
+        assert host.stats.lost == 0
+        assert not host.stats.damaged
+
+
+def test_noise_without_a_single_zero_keeps_no_more_than_a_packet():
+    host = Conversation("x")
+    for _ in range(100):
+        host.receive(b"\xaa" * 4096, 0.0)
+        assert len(host._rest) < 20_000
+    assert host.stats.damaged["noise"] > 10
+
+
+def test_overflow_carries_what_fits_and_says_so():
+    line = Line(SKIN.replace(zone_capacity=2))
+    line.hello()
+    line.board.moments = [(2, 1, 0), (3, 3, 3)]
+    (zones,) = line.frame(cells=40, zones=17, flags=["overflow"])
+    assert len(zones) == 2
+    assert (zones.total_zones, zones.pressed, zones.flags) == (17, 40, {"overflow"})
+
+
+def test_a_fault_is_told_by_name_and_counted_in_the_hello():
+    line = Line()
+    line.hello(stuck=3)
+    (zones,) = line.frame(flags=["fault"])
+    assert zones.faults == {"stuck"}
+    assert line.host.hello.stuck == 3
+    assert line.frame()[0].faults == frozenset()
+
+
+def test_packets_without_a_meaning_are_counted():
+    line, wire = Line(expected=SKIN), Wire(SKIN)
+    line.give(line.board.frame())
+    line.hello()
+    line.give(wire.seal(bytes(8) + last_byte(9)), wire.seal(last_byte(14)), wire.cells([[0] * 16] * 16))
+    assert line.stats.before_hello == 1
+    assert line.stats.unknown_kinds == 2
+    assert line.stats.damaged == {"kind": 1}
+
+
+def test_the_host_time_is_that_of_the_last_byte():
+    line = Line()
+    line.hello()
+    data = line.board.frame()
+    line.now = 3.0
+    assert line.give(data[:5]) == []
+    line.now = 4.0
+    assert line.give(data[5:])[0].host_time_s == 4.0
+    recording = Line(live=False)
+    recording.hello()
+    assert recording.frame()[0].host_time_s is None
+
+
+# ---- times
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_time_goes_on_past_its_24_bits(live):
+    line, times = Line(live=live), []
+    for index in range(200):
+        if index % 2 == 0:
+            line.hello()
+        expected = line.board.time_us
+        (zones,) = line.frame()
+        assert zones.time_us == expected
+        times.append(zones.time_us)
+        line.pause(0.9)
+    assert times[-1] > 10 * 2**24
+
+
+@pytest.mark.parametrize("up_s", [0, 4.1, 4.2, 16.7, 16.8, 3600, 1e6])
+def test_a_board_that_has_run_for_long_tells_its_time_since_power_up(up_s):
+    for late in range(0, 2 * EPOCH_US, EPOCH_US // 7):
+        line = Line()
+        line.board.time_us = round(up_s * 1e6) + late + SCAN_US
+        line.hello()
+        expected = line.board.time_us
+        assert line.frame()[0].time_us == expected
+
+
+def test_a_frame_that_waited_while_the_hello_was_sent_may_be_of_the_epoch_before():
+    line = Line()
+    line.board.time_us = 5 * EPOCH_US - 1000
+    line.hello(epoch=5)
+    assert line.frame()[0].time_us == 5 * EPOCH_US - 1000
+
+
+@pytest.mark.parametrize("pause_s", [8.9, 14.0, 17.0, 100.0, 900.0, 4000.0])
+@pytest.mark.parametrize("live", [True, False])
+def test_after_a_pause_no_frame_is_passed_on_before_a_hello(pause_s, live):
+    line = Line(live=live)
+    line.hello()
+    line.frame()
+    line.pause(pause_s)
+    if live or pause_s % 16.777216 > 4.2:
+        assert line.frame() == []
+        assert line.stats.unexplained == 1
+    line.board.sent += 1000
+    if live:
+        line.host.receive(b"", line.now)
+        line.pause(1.0)
+    line.hello()
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+    assert line.stats.lost == 1000
+    assert line.stats.restarts == 0
+
+
+def test_a_hello_that_waited_while_nobody_read_tells_no_time():
+    """A computer that slept: its buffer holds a hello, and what came after it was dropped."""
+    line = Line()
+    line.hello()
+    line.frame()
+    waiting = line.board.hello()
+    line.pause(100.0)
+    assert line.give(waiting, line.board.frame(), line.board.frame()) == []
+    line.pause(0.1)
+    assert line.frame() == []
+    line.pause(1.0)
+    line.hello()
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+
+
+def test_frames_that_wait_some_seconds_keep_their_times():
+    line = Line()
+    stream = line.board.hello() + b"".join(line.board.frame() for _ in range(1000))
+    line.now = 3.0
+    assert [zones.time_us for zones in line.give(stream)] == [SCAN_US * (1 + index) for index in range(1000)]
+    line.now = 9.0
+    assert len(line.frame()) == 1
+
+
+# ---- losses
+
+
+@pytest.mark.parametrize("missing", [1, 254, 255, 256, 257, 512, 70_000])
+def test_losses_are_exact_from_the_next_hello_on(missing):
+    line = Line()
+    line.board.sent = 1000
+    line.hello()
+    line.frame()
+    for _ in range(missing):
+        line.board.sent += 1
+        line.board.time_us += 10
+    line.frame()
+    assert line.stats.lost == missing % 256
+    line.hello()
+    assert line.stats.lost == missing
+    assert line.stats.restarts == 0
+
+
+def test_frames_lost_before_a_hello_are_counted_once():
+    line = Line()
+    line.hello()
+    line.frame()
+    for _ in range(5):
+        line.board.frame()
+    line.hello()
+    assert line.stats.lost == 5
+    line.board.frame()
+    line.frame()
+    assert line.stats.lost == 6
+
+
+def test_frames_sent_before_the_port_was_opened_are_no_loss():
+    line = Line()
+    line.board.sent = 12345
+    line.frame()
+    line.hello()
+    line.frame()
+    assert (line.stats.lost, line.stats.before_hello) == (0, 1)
+
+
+@pytest.mark.parametrize("second", range(0, 34, 1))
+def test_a_lost_frame_is_no_restart_at_any_time_of_the_wrap(second):
+    """In one second of every 16.8 the first frame of 256 was once taken for the first one since power-up."""
+    line = Line()
+    line.board.time_us, line.board.sent = second * 500_000 + SCAN_US, 250
+    line.board.heard = 5
+    line.hello()
+    line.frame()
+    for sequence in range(251, 256):
+        assert line.board.frame()
+        assert line.board.sent == sequence + 1
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+    assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (0, 5, 0)
+
+
+def test_frames_that_come_twice_are_passed_on_once(rng):
+    """Until the next hello nothing more is, as the board may have been restarted."""
+    for _ in range(30):
+        line, sent = Line(), []
+        line.board.heard = 3
+        line.hello()
+        for _ in range(rng.randrange(1, 300)):
+            sent.append(line.board.frame())
+        passed = line.give(*sent)
+        start = rng.randrange(len(sent))
+        assert line.give(*sent[start : start + rng.randrange(1, 100)]) == []
+        line.hello()
+        assert line.give(*sent[start : start + 3]) == []
+        line.hello()
+        passed += line.frame()
+        assert [zones.time_us for zones in passed] == [SCAN_US * (1 + index) for index in range(len(sent) + 1)]
+        assert (line.stats.lost, line.stats.restarts) == (0, 0)
+
+
+# ---- restarts
+
+
+def test_a_restart_is_told_by_its_hello():
+    line = Line()
+    line.board.sent, line.board.time_us, line.board.heard = 100, 5_000_000, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.hello()
+    assert [zones.time_us for zones in line.frame() + line.frame()] == [SCAN_US, 2 * SCAN_US]
+    assert (line.stats.restarts, line.stats.lost) == (1, 0)
+
+
+@pytest.mark.parametrize("up_us", [SCAN_US, 3_000_000, 2**24 - 1000, 2**24 - 1, 2**25 - 100_000])
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_restart_whose_hello_is_lost_gives_no_wrong_time(up_us, asked):
+    line = Line()
+    line.board.sent, line.board.time_us, line.board.heard = 1100, up_us, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.board.heard = 12 if asked else 0
+    for _ in range(7):
+        assert line.frame() == []
+    assert line.stats.unexplained == 7
+    line.hello()
+    assert line.stats.restarts == 1
+    assert line.stats.lost == 0
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+
+
+def test_frames_lost_since_a_restart_are_counted():
+    line = Line()
+    line.board.sent, line.board.heard = 1000, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.board.frame()
+    line.board.frame()
+    line.frame()
+    line.hello()
+    assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (1, 2, 1)
+
+
+def test_overwritten_frames_are_counted_from_the_differences():
+    line = Line()
+    line.hello()
+    line.frame(overwritten=14)
+    line.frame(overwritten=16 + 3)
+    line.frame(overwritten=16 + 3)
+    assert line.stats.overwritten == 5
+
+
+# ---- other Skins, old boards
+
+
+def test_frames_of_the_board_before_do_not_pass_after_another_bitstream_was_loaded():
+    """The old board stops inside a packet, and the new one's first hello follows without a pause."""
+    for cut in range(1, 16):
+        line = Line()
+        line.board.sent = 500
+        line.hello()
+        torn = line.board.frame()[:cut]
+        new = ModelBoard(SKIN.replace(pitch_x_mm=20.0))
+        events = line.host.receive(torn + new.hello() + new.frame(), 0.0)
+        assert [zones[0].x_mm for zones in arrived(events)] == [50.0]
+        assert "now has a 16x16 Skin" in str(errors(events)[0])
+
+
+def test_frames_of_a_new_board_whose_hello_is_lost_do_not_pass():
+    line = Line()
+    line.hello()
+    line.frame()
+    new = ModelBoard(SKIN.replace(pitch_x_mm=20.0))
+    assert line.give(*(new.frame() for _ in range(100))) == []
+    assert line.stats.damaged == {"crc": 100}
+
+
+@pytest.mark.parametrize("where", ["first", "later"])
+def test_a_board_of_protocol_1_is_named(where):
+    line = Line()
+    if where == "later":
+        line.hello()
+        line.frame()
+    events = line.host.receive(old_frame() + old_hello() + old_frame(), 0.0)
+    (error,) = errors(events)
+    assert isinstance(error, contactfpga.VersionMismatch)
+    assert "speaks protocol version 1, this host version 2" in str(error)
+    assert line.stats.foreign_version == 3
+    assert line.host.sheet is None
+
+
+def test_a_foreign_skin_is_refused_in_words_that_say_what_differs():
+    line = Line(SKIN.replace(rows=8), expected=SKIN)
+    (error,) = errors(line.hello())
+    assert "rows is 8, asked for was 16" in str(error)
+    assert "columns" not in str(error)
+    assert line.frame() == []
+    assert line.stats.foreign_skin == 1
+
+
+def test_skins_that_differ_in_what_no_hello_tells_are_said_to():
+    line = Line(SKIN, expected=SKIN.replace(settle_us=6.0))
+    (error,) = errors(line.hello())
+    assert "differ in fields that a hello does not tell" in str(error)
+    assert "settle_us = 6.0" in str(error)
+
+
+def test_a_new_name_is_no_new_skin():
+    line = Line(SKIN.replace(name="left"))
+    line.hello()
+    line.board.wire = Wire(SKIN.replace(name="right"))
+    assert not errors(line.hello())
+    assert line.host.hello.name == "right"
+    assert line.stats.skin_changes == 0
+
+
+def test_the_line_below_a_frame_says_what_was_lost():
+    line = Line()
+    line.hello()
+    (zones,) = line.frame(flags=["fault"])
+    board = SimpleNamespace(port="x", stats=Stats(lost=3))
+    told = str(status(board, zones, 200))
+    assert "stuck" in told
+    assert "frames, 3 lost, " in told

@@ -1,0 +1,262 @@
+"""The driver on pseudo-terminals: every frame in order, the newest one, restarts, queues, threads, the end."""
+
+import asyncio
+import collections
+import contextlib
+import gc
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from fake_board import ZONE, FakeBoard, background, wait_until
+from model_board import SCAN_US
+
+import contactfpga
+
+pytestmark = pytest.mark.usefixtures("_closed_ports")
+
+SKIN = contactfpga.Skin()
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
+
+
+# ---- every frame
+
+
+def test_iteration_gives_every_frame_in_order_and_counts_what_is_missing(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        frames = iter(opened)
+        assert next(frames).sequence == 1
+        for _ in range(252):
+            board.frame()
+        stream = board.frame(overwritten=30) + board.frame(overwritten=30)
+        board.frame()
+        stream += board.frame(overwritten=37)
+        board.send(stream)
+        assert [next(frames).sequence for _ in range(3)] == [254, 255, 1]
+        assert opened.stats.lost == 252 + 1
+        assert opened.stats.overwritten == 30 + 7
+        assert opened.stats.frames == 5
+
+
+def test_latest_is_the_newest_of_those_that_wait(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        sent = board.sent
+        board.send(b"".join(board.frame() for _ in range(20)))
+        wait_until(lambda: opened.stats.frames == sent + 20)
+        assert opened.latest(LONG).sequence == sent + 19
+        assert opened.stats.dropped == 0
+
+
+def test_latest_waits_when_none_is_there(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        sent = board.sent
+        with background(lambda: (time.sleep(0.1), board.send(board.frame()))):
+            assert opened.latest(LONG).sequence == sent
+        with pytest.raises(contactfpga.BoardSilent):
+            opened.latest(0.1)
+
+
+def test_a_restarted_board_is_no_loss(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        board.send(board.frame())
+        board.power_up()
+        board.send(board.hello() + board.frame() + board.frame())
+        times = [opened.next(LONG).time_us for _ in range(3)]
+    assert times == [3 * SCAN_US, SCAN_US, 2 * SCAN_US]
+    assert opened.stats.restarts == 1
+    assert opened.stats.lost == 0
+
+
+# ---- a queue for each
+
+
+def test_a_slow_program_loses_the_oldest_frames_and_is_told(board, monkeypatch):
+    monkeypatch.setattr(contactfpga.driver.board, "QUEUE", 10)
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        frames, sent = opened.stats.frames, board.sent
+        board.send(b"".join(board.frame() for _ in range(25)))
+        wait_until(lambda: opened.stats.frames == frames + 25)
+        assert [opened.next(LONG).sequence for _ in range(10)] == [sent + index for index in range(15, 25)]
+        assert opened.stats.dropped == 15
+
+
+def test_subscribers_each_get_every_frame(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        sent = board.sent
+        first, second, short = opened.subscribe(), opened.subscribe(), opened.subscribe(maxsize=2)
+        board.send(b"".join(board.frame() for _ in range(5)))
+        numbers = [sent + index for index in range(5)]
+        for queue in (first, second, opened):
+            assert [queue.next(LONG).sequence for _ in range(5)] == numbers
+        assert [short.next(LONG).sequence for _ in range(2)] == numbers[-2:]
+        assert (first.dropped, short.dropped) == (0, 3)
+
+
+def test_a_subscription_that_was_closed_says_so(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        with opened.subscribe() as queue:
+            board.send(board.frame())
+            queue.next(LONG)
+        with pytest.raises(contactfpga.BoardClosed, match="subscribe again"):
+            queue.next(LONG)
+
+
+@pytest.mark.parametrize("maxsize", [0, -1, 1.5, True, None])
+def test_a_queue_holds_a_whole_number_of_frames(board, maxsize):
+    with contactfpga.open(board.path, timeout=LONG) as opened, pytest.raises(ValueError, match="maxsize is"):
+        opened.subscribe(maxsize)
+
+
+def test_frames_come_in_async_for(board):
+    async def take(queue, count):
+        found = []
+        async for zones in queue:
+            found.append(zones.sequence)
+            if len(found) == count:
+                break
+        return found
+
+    async def both(opened):
+        queue = opened.subscribe()
+        tasks = [asyncio.create_task(take(one, 50)) for one in (queue, opened)]
+        await asyncio.sleep(0.05)
+        await asyncio.to_thread(board.send, b"".join(board.frame() for _ in range(50)))
+        return await asyncio.gather(*tasks)
+
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        numbers = [board.sent + index for index in range(50)]
+        assert asyncio.run(both(opened)) == [numbers, numbers]
+
+
+def test_a_task_that_is_canceled_takes_no_frame(board):
+    async def canceled(queue):
+        task = asyncio.ensure_future(anext(aiter(queue)))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        await asyncio.to_thread(board.send, board.frame())
+
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        queue = opened.subscribe()
+        sent = board.sent
+        asyncio.run(canceled(queue))
+        assert queue.next(LONG).sequence == sent
+
+
+@pytest.mark.parametrize("report", ["moments", "barycenter", "cells"])
+@pytest.mark.parametrize("surface", [{}, {"surface": "cylinder", "radius_mm": 60.0}])
+def test_a_batch_holds_what_the_frames_hold(report, surface):
+    skin = SKIN.replace(report=report, settle_us=20.0, **surface)
+    with FakeBoard(skin) as board, contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        queue, frames = opened.subscribe(), opened.stats.frames
+        for moments in ([ZONE, (2, 20, 8)], [], [(1, 3, 3)]):
+            board.moments = moments
+            board.send(board.frame())
+        wait_until(lambda: opened.stats.frames == frames + 3)
+        batch = opened.batch()
+        single = [queue.next(LONG) for _ in range(3)]
+    assert batch.frames["sequence"].tolist() == [zones.sequence for zones in single]
+    assert batch.frames["host_time_s"].tolist() == [zones.host_time_s for zones in single]
+    assert batch.frames["total_zones"].tolist() == [zones.total_zones for zones in single]
+    assert batch.zones["frame"].tolist() == [index for index, zones in enumerate(single) for _ in zones]
+    assert batch.zones["time_us"].tolist() == [zones.time_us for zones in single for _ in zones]
+    arrays = np.concatenate([zones.array for zones in single])
+    for name in arrays.dtype.names:
+        assert np.allclose(batch.zones[name], arrays[name]), name
+
+
+# ---- threads, and the end
+
+
+def test_several_threads_read_one_board(board):
+    found = collections.Counter()
+
+    def take(opened):
+        for _ in range(100):
+            found[opened.next(LONG).sequence] += 1
+
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        opened.latest(LONG)
+        sent = board.sent
+        threads = [threading.Thread(target=take, args=(opened,)) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for _ in range(400):
+            board.send(board.frame())
+        for thread in threads:
+            thread.join()
+    assert found == collections.Counter((sent + index) % 256 for index in range(400))
+
+
+@pytest.mark.parametrize("call", ["next", "read", "latest", "batch", "clock", "subscribe", "hello", "sheet", "skin"])
+def test_a_closed_board_says_so_every_time(board, call):
+    opened = contactfpga.open(board.path, timeout=LONG)
+    queue = opened.subscribe()
+    opened.close()
+    opened.close()
+    for _ in range(2):
+        with pytest.raises(contactfpga.BoardClosed, match="was closed; open it again"):
+            getattr(opened, call)()
+        with pytest.raises(contactfpga.BoardClosed):
+            queue.next()
+
+
+@pytest.mark.parametrize("call", ["next", "read", "latest", "batch"])
+def test_close_wakes_a_call_that_waits_in_another_thread(board, call):
+    opened = contactfpga.open(board.path, timeout=LONG)
+    opened.latest(LONG)
+    board.answers = False
+    with background(lambda: (time.sleep(0.1), opened.close())), pytest.raises(contactfpga.BoardClosed):
+        getattr(opened, call)(timeout=LONG)
+
+
+def test_a_board_that_nobody_holds_gives_its_port_back(board):
+    for _ in range(3):
+        opened = contactfpga.open(board.path, timeout=LONG)  # refused while the port is held
+        opened.next(LONG)
+        del opened
+        gc.collect()
+        wait_until(lambda: not [thread for thread in threading.enumerate() if board.path in thread.name])
+
+
+def test_the_reader_ends_with_its_board(board):
+    for _ in range(3):
+        contactfpga.open(board.path, timeout=LONG).close()
+    wait_until(lambda: not [thread for thread in threading.enumerate() if board.path in thread.name])
+
+
+def test_ctrl_c_ends_a_call_that_waits(board):
+    code = f"""
+import signal, threading, time, os, contactfpga
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+board = contactfpga.open({board.path!r}, timeout=60)
+board.latest(60)
+threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+started = time.monotonic()
+try:
+    while True:
+        board.next(60)
+except KeyboardInterrupt:
+    print("interrupted", time.monotonic() - started < 5)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert result.stdout.strip() == "interrupted True", result.stderr
+
+
+def test_bitmap_comes_as_cells():
+    with FakeBoard(contactfpga.Skin(rows=3, columns=11, report="cells", settle_us=10.0)) as board:
+        zones = contactfpga.read_zones(board.path, timeout=LONG)
+    assert [(zone.area_cells, zone.x_mm) for zone in zones] == [(3, 10.0 * column) for column in range(1, 11, 2)]
+    assert zones.cells.shape == (3, 11)
+    assert (zones.cells == [[column % 2 for column in range(11)]] * 3).all()
+    assert zones.pressed == 15

@@ -1,0 +1,229 @@
+"""The driver and the gateware itself: simulated behind sim://, and in real time behind a pseudo-terminal."""
+
+import collections
+import functools
+import itertools
+import threading
+
+import numpy as np
+import pytest
+from fake_board import background, wait_until
+
+import contactfpga
+from contactfpga_sim.board.virtual import VirtualBoard
+
+pytestmark = pytest.mark.usefixtures("_closed_ports")
+
+SKIN = contactfpga.Skin()
+LONG = 60.0  # s; what has to come comes at once, but for a machine that is busy
+
+
+def forever(call):
+    while True:
+        call()
+
+
+@pytest.fixture
+def pty_board():
+    from contactfpga_sim.board.pty_board import PtyBoard
+
+    with PtyBoard(SKIN, "two_fingers") as board:
+        yield board
+    assert board.failure is None
+
+
+# ---- sim://
+
+
+def test_simulated_board_answers_read_zones():
+    zones = contactfpga.read_zones("sim://?scene=two_fingers")
+    assert zones.flags == set()
+    assert len(zones) == 2
+    assert sum(zone.area_cells for zone in zones) == zones.pressed
+
+
+def test_a_second_read_is_of_a_later_frame():
+    first, second = (contactfpga.read_zones("sim://?scene=two_fingers") for _ in range(2))
+    assert second.time_us > first.time_us
+
+
+def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
+    file = tmp_path / "skin.toml"
+    file.write_text(SKIN.replace(send="on_change").to_toml())
+    with contactfpga.open(f"sim://?skin={file}") as opened:
+        answered = opened.next()
+        before = opened.clock()
+        with pytest.raises(contactfpga.BoardSilent, match=r"within 0\.01 s"):
+            opened.next(0.01)
+        assert opened.clock() - before == pytest.approx(0.01)
+        assert opened.next(0.1).time_us - answered.time_us == pytest.approx(100_000, abs=2 * 96)  # the keep-alive
+
+
+def test_simulated_board_loses_nothing():
+    with contactfpga.open("sim://?scene=moving") as opened:
+        frames = list(itertools.islice(opened, 12_000))
+        stats = opened.stats
+    steps = {after.time_us - before.time_us for before, after in itertools.pairwise(frames)}
+    assert stats.lost == 0
+    assert not stats.damaged
+    assert stats.hellos >= 3  # the one asked for and two of their own in over a second
+    assert steps == {96, 288}  # a hello takes the place of two frames now and then
+    assert len({zones[0].x_mm for zones in frames}) > 20
+
+
+def test_simulated_board_of_a_file(tmp_path):
+    skin = contactfpga.Skin(rows=5, columns=7, pitch_x_mm=3.0, report="cells", settle_us=20.0)
+    file = tmp_path / "skin.toml"
+    file.write_text(skin.to_toml())
+    with contactfpga.open(f"sim://?skin={file}&scene=full", skin=skin) as opened:
+        zones = opened.read()
+    assert zones.cells.shape == (5, 7)
+    assert zones.cells.all()
+
+
+def test_simulated_board_with_an_unknown_option():
+    with pytest.raises(contactfpga.PortNotFound, match=r"scene=NAME"):
+        contactfpga.open("sim://?colour=red")
+    with pytest.raises(contactfpga.PortNotFound, match="scene 'elbow' is not known"):
+        contactfpga.open("sim://?scene=elbow")
+
+
+def test_losses_are_none_by_the_count_of_the_hello_as_well():
+    """The gateware's own counters: at each hello the frames sent are those received."""
+    with contactfpga.open("sim://?scene=moving") as opened:
+        for _ in range(12_000):
+            zones = opened.next()
+        assert opened.hello.sent > 10_000
+        assert opened.stats.lost == opened.stats.restarts == opened.stats.unexplained == 0
+        assert zones.time_us == pytest.approx(opened.clock() * 1e6, abs=1000)
+
+
+# ---- a virtual board of one's own
+
+
+def test_a_virtual_board_is_pressed_by_a_function_of_time():
+    def press(seconds):
+        cells = np.zeros((16, 16), bool)
+        cells[2, 3 if seconds < 0.01 else 9] = True
+        return cells
+
+    with contactfpga.open(VirtualBoard(scene=press)) as opened:
+        assert opened.port == "the virtual board"
+        assert opened.read()[0].x_mm == 30.0
+        while opened.clock() < 0.01:
+            opened.next()
+        assert opened.read()[0].x_mm == 90.0
+
+
+@pytest.mark.parametrize("call", ["next", "read", "latest", "batch"])
+def test_what_a_function_raises_comes_out_of_the_call_that_waits(call):
+    def press(seconds):
+        if seconds > 0.005:
+            raise RuntimeError("the finger slipped")
+        return np.zeros((16, 16), bool)
+
+    with contactfpga.open(VirtualBoard(scene=press)) as opened:
+        for _ in range(2):
+            with pytest.raises(RuntimeError, match="the finger slipped"):
+                forever(getattr(opened, call))
+
+
+def test_a_function_that_gives_another_sheets_cells_says_so():
+    with pytest.raises(ValueError, match=r"cells of shape \(3, 3\); the sheet has 16x16"):
+        contactfpga.open(VirtualBoard(scene=lambda seconds: np.zeros((3, 3), bool)))
+
+
+@pytest.mark.parametrize("call", ["next", "read", "latest", "batch", "clock", "subscribe"])
+def test_a_closed_simulated_board_says_so_every_time(call):
+    virtual = VirtualBoard()
+    opened = contactfpga.open(virtual)
+    opened.close()
+    for _ in range(2):
+        with pytest.raises(contactfpga.BoardClosed):
+            getattr(opened, call)()
+        with pytest.raises(contactfpga.BoardClosed, match="make another one"):
+            virtual.read(0.001)
+        with pytest.raises(contactfpga.BoardClosed, match="make another one"):
+            virtual.clock()
+
+
+def test_close_wakes_a_thread_that_iterates_a_simulated_board():
+    def close_soon(opened):
+        wait_until(lambda: opened.stats.frames > 10)
+        opened.close()
+
+    for _ in range(5):
+        opened = contactfpga.open("sim://")
+        with background(functools.partial(close_soon, opened)), pytest.raises(contactfpga.BoardClosed):
+            collections.deque(opened, maxlen=0)
+
+
+def test_several_threads_share_a_simulated_board():
+    found = []
+    with contactfpga.open("sim://?scene=moving") as opened:
+        first = opened.next().sequence
+
+        def take():
+            for _ in range(300):
+                found.append(opened.next().sequence)
+
+        threads = [threading.Thread(target=take) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert opened.stats.lost == 0
+    assert sorted(found) == sorted((first + 1 + index) % 256 for index in range(1200))
+
+
+# ---- a pseudo-terminal
+
+
+def test_the_board_on_a_pseudo_terminal_answers_read_zones(pty_board):
+    for _ in range(3):
+        zones = contactfpga.read_zones(pty_board.port, timeout=LONG)
+        assert len(zones) == 2
+
+
+def test_a_second_client_of_the_pseudo_terminal_is_refused_and_the_first_goes_on(pty_board):
+    with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+            contactfpga.open(pty_board.port, timeout=LONG)
+        assert len(opened.read(LONG)) == 2
+    with contactfpga.open(pty_board.port, timeout=LONG) as again:
+        assert len(again.read(LONG)) == 2
+
+
+def test_a_board_that_is_stopped_while_it_is_read_is_lost(pty_board):
+    with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+        frames = opened.stats.frames
+
+        def stop():
+            wait_until(lambda: opened.stats.frames > frames + 20)
+            pty_board.stop()
+
+        with background(stop), pytest.raises(contactfpga.PortLost) as caught:
+            collections.deque(opened, maxlen=0)
+    assert pty_board.port in str(caught.value)
+    with pytest.raises(contactfpga.PortNotFound):
+        contactfpga.read_zones(pty_board.port, timeout=LONG)
+
+
+def test_a_client_that_left_does_not_end_the_board(pty_board):
+    for _ in range(3):
+        with contactfpga.open(pty_board.port, timeout=LONG) as opened:
+            assert opened.next(LONG).pressed == opened.next(LONG).pressed
+
+
+def test_a_scene_that_raises_ends_the_port_and_is_told():
+    from contactfpga_sim.board.pty_board import PtyBoard
+
+    def press(seconds):
+        if seconds > 0.3:
+            raise RuntimeError("the finger slipped")
+        return np.zeros((16, 16), bool)
+
+    with PtyBoard(SKIN, press) as board, contactfpga.open(board.port, timeout=LONG) as opened:
+        with pytest.raises(contactfpga.PortLost):
+            forever(lambda: opened.next(LONG))
+        assert str(board.failure) == "the finger slipped"

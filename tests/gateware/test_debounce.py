@@ -1,0 +1,166 @@
+"""Debounce: every switch on its own, by the rules of docs/timing.md."""
+
+import functools
+import itertools
+import math
+
+import pytest
+
+from contactfpga import Skin
+from contactfpga_hdl.debounce.even import Debounce
+
+METHODS = ("sym_defer_pk", "asym_eager_defer_pk")
+SHEETS = ((1, 1), (1, 7), (7, 1), (13, 6), (3, 5), (2, 17))
+DELAYS = ((0, 0), (0, 3), (1, 0), (1, 1), (2, 5), (5, 2), (9, 9))
+
+
+def skin_of(rows, columns, method, press, release):
+    """A Skin whose times are ``press`` and ``release`` scans."""
+    row_us = max(16, columns + 6, math.ceil((columns + 32) / rows))
+    scan_us = row_us * rows
+    return Skin(
+        rows=rows,
+        columns=columns,
+        settle_us=row_us - 1,
+        release_us=1,
+        report="cells",
+        clock_hz=1_000_000,
+        baud=250_000,
+        debounce=method,
+        debounce_press_us=press * scan_us,
+        debounce_release_us=release * scan_us,
+    )
+
+
+def debounced(method, press, release, samples):
+    """What one switch counts as after each of its samples."""
+    out, state, run, ignored = [], 0, 0, 0
+    for sample in samples:
+        if method == "sym_defer_pk":
+            run = run + 1 if sample != state else 0
+            if run == (release if state else press) + 1:
+                state, run = 1 - state, 0
+        elif not state:
+            if sample:
+                state, run, ignored = 1, 0, max(0, press - 1)
+        elif ignored:
+            ignored -= 1
+        else:
+            run = 0 if sample else run + 1
+            if run == release + 1:
+                state = 0
+        out.append(state)
+    return out
+
+
+def bouncing(rng, samples):
+    """A switch that is pressed and released at random and bounces after each change."""
+    out = []
+    while len(out) < samples:
+        for level in (0, 1):
+            out += [rng.randrange(2) for _ in range(rng.randrange(8))]
+            out += [level] * rng.choice((1, 2, 3, 5, 6, 7, 9, 10, 11, 14))
+    return out[:samples]
+
+
+@functools.cache
+def bench_of(bench, *facts):
+    dut = Debounce(skin_of(*facts))
+    return dut, bench(dut)
+
+
+def frames_through(bench, facts, frames, **stalls):
+    """Debounced frames (lists of row words) for raw ones; also source and sink, with their cycles."""
+    rows, columns = facts[:2]
+    dut, sim = bench_of(bench, *facts)
+    raw = [row | (index == rows - 1) << columns for frame in frames for index, row in enumerate(frame)]
+    source = sim.source(dut.raw, raw, stalls.get("rng"), gap=stalls.get("gap", 0))
+    sink = sim.sink(dut.rows, stalls.get("rng"), stall=stalls.get("stall", 0))
+    sim.run(30 * (columns + 5) * len(raw) + 100, until=lambda: len(sink.transfers) == len(raw))
+    lasts = [payload >> columns for _, payload in sink.transfers]
+    assert lasts == ([0] * (rows - 1) + [1]) * len(frames)
+    words = [payload & (1 << columns) - 1 for _, payload in sink.transfers]
+    return [words[start : start + rows] for start in range(0, len(words), rows)], source, sink
+
+
+def single(bench, method, press, release, samples):
+    """The samples of one switch, debounced."""
+    frames, _, _ = frames_through(bench, (1, 1, method, press, release), [[sample] for sample in samples])
+    return [frame[0] for frame in frames]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sheet", SHEETS)
+def test_every_switch_follows_the_rule_whatever_the_others_do(bench, rng, method, sheet):
+    rows, columns = sheet
+    count = max(20, 600 // (rows * (columns + 3)))
+    for press, release in rng.sample(DELAYS, 3):
+        cells = {cell: bouncing(rng, count) for cell in itertools.product(range(rows), range(columns))}
+        wanted = {cell: debounced(method, press, release, samples) for cell, samples in cells.items()}
+        frames = [[sum(cells[r, c][n] << c for c in range(columns)) for r in range(rows)] for n in range(count)]
+        got, _, _ = frames_through(bench, (*sheet, method, press, release), frames, rng=rng, gap=0.3, stall=0.3)
+        for (r, c), states in wanted.items():
+            assert [frame[r] >> c & 1 for frame in got] == states, f"switch {r}, {c} at {press}, {release}"
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("press", "release"), DELAYS)
+def test_one_switch_over_a_long_time(bench, rng, method, press, release):
+    samples = bouncing(rng, 400)
+    states = single(bench, method, press, release, samples)
+    assert states == debounced(method, press, release, samples)
+    assert set(states) == {0, 1}
+
+
+@pytest.mark.parametrize(("press", "release"), DELAYS)
+def test_symmetric_a_press_counts_after_its_time_and_so_does_a_release(bench, press, release):
+    for longer in (0, 1):
+        samples = [0] * 3 + [1] * (press + longer) + [0] * 12
+        states = single(bench, "sym_defer_pk", press, release, samples)
+        if longer:
+            assert states == [0] * (3 + press) + [1] * (release + 1) + [0] * (12 - release)
+        else:
+            assert states == [0] * len(samples)
+
+
+def test_symmetric_a_gap_of_one_sample_starts_the_time_again(bench):
+    samples = ([1] * 5 + [0]) * 4 + [1] * 6
+    assert single(bench, "sym_defer_pk", 5, 5, samples) == [0] * (len(samples) - 1) + [1]
+    held = [1] * 6 + ([0] * 5 + [1]) * 4 + [0] * 6
+    assert single(bench, "sym_defer_pk", 5, 5, held) == [0] * 5 + [1] * (len(held) - 6) + [0]
+
+
+@pytest.mark.parametrize(("press", "release"), DELAYS)
+def test_eager_a_press_counts_at_once_and_holds_for_its_time(bench, press, release):
+    samples = [0, 0, 1] + [0] * 25
+    held = 1 + max(0, press - 1) + release
+    states = single(bench, "asym_eager_defer_pk", press, release, samples)
+    assert states == [0, 0] + [1] * held + [0] * (26 - held)
+
+
+def test_eager_a_release_that_bounces_counts_from_its_last_press(bench):
+    samples = [1] * 6 + [0, 0, 1] * 3 + [0] * 8
+    assert single(bench, "asym_eager_defer_pk", 4, 2, samples) == [1] * 17 + [0] * 6
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_switch_that_bounces_changes_no_other(bench, rng, method):
+    facts = (3, 5, method, 2, 2)
+    steady = [[0b01010, 0b10101, 0b00110] for _ in range(40)]
+    still, _, _ = frames_through(bench, facts, steady)
+    for row, column in itertools.product(range(3), range(5)):
+        noisy = [[word ^ (rng.randrange(2) << column if r == row else 0) for r, word in enumerate(f)] for f in steady]
+        got, _, _ = frames_through(bench, facts, noisy)
+        others = [[word & ~(1 << column if r == row else 0) for r, word in enumerate(frame)] for frame in got]
+        assert others == [[w & ~(1 << column if r == row else 0) for r, w in enumerate(frame)] for frame in still]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sheet", [*SHEETS, (1, 64)])
+def test_a_row_comes_out_as_many_clocks_later_as_it_has_columns_and_three(bench, rng, method, sheet):
+    rows, columns = sheet
+    frames = [[rng.randrange(1 << columns) for _ in range(rows)] for _ in range(max(3, 12 // rows))]
+    _, source, sink = frames_through(bench, (*sheet, method, 1, 1), frames)
+    assert [cycle for cycle, _ in sink.transfers] == [cycle + columns + 3 for cycle in source.transfers]
+    gaps = {late - early for early, late in itertools.pairwise(source.transfers)}
+    assert max(gaps) <= max(10, columns + 6), "each row is done before the Skin lets the next one come"

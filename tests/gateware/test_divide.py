@@ -1,0 +1,200 @@
+"""Barycenters divided on the board: exact against fractions, clock by clock against docs/timing.md, and to the host."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import pytest
+from amaranth.hdl import Cat
+
+from contactfpga import Skin
+from contactfpga_hdl.report.divide import Divide, Divider
+
+
+def skin_of(rows, columns, bits, **options):
+    return Skin(rows=rows, columns=columns, report="barycenter", barycenter_bits=bits, settle_us=300, **options)
+
+
+class Oracle:
+    """Records and items of a sheet by docs/protocol.md, quotients in fractions."""
+
+    def __init__(self, rows, columns, bits):
+        self.rows, self.columns, self.bits = rows, columns, bits
+        sums = columns * sum(range(rows)), rows * sum(range(columns))
+        self.area = (rows * columns).bit_length()
+        self.sum_y, self.sum_x = (max(1, value.bit_length()) for value in sums)
+        self.clocks = (max(rows, columns) - 1).bit_length() + bits + 1  # one for each bit of the quotient
+
+    @property
+    def end(self):
+        return 1 << self.area + self.sum_x + self.sum_y
+
+    def record(self, area, sum_x, sum_y):
+        return area | sum_x << self.area | sum_y << self.area + self.sum_x
+
+    def item(self, area, sum_x, sum_y):
+        widths = [max(1, (self.rows * self.columns - 1).bit_length())]
+        widths += [max(1, ((lines - 1) * 2**self.bits).bit_length()) for lines in (self.columns, self.rows)]
+        word = offset = 0
+        for value, width in zip((area % 2 ** widths[0], *self.barycenter(area, sum_x, sum_y)), widths):
+            assert value < 1 << width
+            word |= value << offset
+            offset += width
+        return word, -(-offset // 8)
+
+    def barycenter(self, *moments):
+        area, *sums = moments
+        return [math.floor(Fraction(total * 2**self.bits, area) + Fraction(1, 2)) for total in sums]
+
+    def every_zone(self):
+        """(area, sum x, sum y) of every set of cells that is not empty: all that a labeller can let out."""
+        found = {(0, 0, 0)}
+        for y, x in itertools.product(range(self.rows), range(self.columns)):
+            found |= {(area + 1, sum_x + x, sum_y + y) for area, sum_x, sum_y in found}
+        return sorted(found - {(0, 0, 0)})
+
+
+def run(bench, rng, oracle, zones, dut=None, gap=0.0, **sink):
+    """Through a divider, an end mark behind every fifth zone; returns (cycle of transfer, record or item) of both."""
+    words = []
+    for index, zone in enumerate(zones):
+        words += [oracle.record(*zone), *([oracle.end] * (index % 5 == 4))]
+    words.append(oracle.end)
+    dut = dut or Divider(skin_of(oracle.rows, oracle.columns, oracle.bits))
+    sim = bench(dut)
+    source = sim.source(dut.records, words, rng, gap=gap)
+    taker = sim.sink(dut.items, rng, **sink)
+    sim.run(60 * len(words) * (oracle.clocks + 2), until=lambda: source.done and len(taker.transfers) == len(words))
+    wanted = [None if word == oracle.end else oracle.item(*zone) for word, zone in zip(words, spread(zones))]
+    return words, wanted, source, taker
+
+
+def spread(zones):
+    """The zones with None where an end mark goes."""
+    for index, zone in enumerate(zones):
+        yield zone
+        if index % 5 == 4:
+            yield None
+    yield None
+
+
+def check_items(wanted, taker):
+    """Each item's bits; of an end mark only that it is one."""
+    size = next(item for item in wanted if item)[1]
+    got = [word for _, word in taker.transfers]
+    assert [word >> 8 * size for word in got] == [int(item is None) for item in wanted]
+    assert [word for word, item in zip(got, wanted) if item] == [item[0] for item in wanted if item]
+
+
+SHEETS = [(1, 1), (1, 2), (2, 2), (3, 3), (1, 7), (6, 1), (2, 5), (4, 3), (4, 4)]
+
+
+@pytest.mark.parametrize("bits", [0, 1, 4, 8])
+@pytest.mark.parametrize(("rows", "columns"), SHEETS)
+def test_every_zone_of_a_small_sheet_is_rounded_exactly_and_takes_its_clocks(
+    bench, rng, record_property, rows, columns, bits
+):
+    oracle = Oracle(rows, columns, bits)
+    zones = oracle.every_zone()
+    words, wanted, source, taker = run(bench, rng, oracle, zones)
+    check_items(wanted, taker)
+    clock, before = 0, oracle.end
+    for word, taken, (offered, _) in zip(words, source.transfers, taker.transfers, strict=True):
+        if word == oracle.end:
+            clock += before != oracle.end  # an item's clock goes by
+            assert taken == offered == clock
+            clock += 1
+        else:
+            assert (taken, offered) == (clock + oracle.clocks, clock + oracle.clocks + 1)
+            clock += oracle.clocks + 1
+        before = word
+    record_property("cases", len(zones))
+
+
+@pytest.mark.parametrize("size", [16, 32, 64])
+@pytest.mark.parametrize("bits", [0, 4, 8])
+def test_zones_at_the_edge_of_rounding_on_large_sheets(bench, rng, size, bits):
+    """Sums just below, at and above half a step, for areas small, large and next to a power of two."""
+    oracle = Oracle(size, size, bits)
+    cells, zones = size * size, {(size * size, size * sum(range(size)), size * sum(range(size)))}
+    for area in (1, 2, 3, size - 1, size, size + 1, cells // 2 - 1, cells // 2, cells // 2 + 1, cells - size):
+        for _ in range(4):
+            x, y = (rng.randrange(size // 4, size - size // 4) for _ in range(2))
+            half = area * Fraction(2 * rng.randrange(2**bits) + 1, 2 ** (bits + 1))
+            for more in (-1, 0, 1):
+                sum_x, sum_y = (min(area * line + math.floor(half) + more, area * (size - 1)) for line in (x, y))
+                if max(sum_x, sum_y) <= size * sum(range(size)):
+                    zones.add((area, sum_x, sum_y))
+    assert len(zones) > 50
+    _, wanted, _, taker = run(bench, rng, oracle, sorted(zones))
+    check_items(wanted, taker)
+
+
+@pytest.mark.parametrize(("gap", "stall"), [(0.0, 0.9), (0.9, 0.0), (0.8, 0.8), (0.3, 0.3)])
+@pytest.mark.parametrize("stage", [Divider, Divide])
+def test_nothing_is_lost_or_changed_by_gaps_and_stalls(bench, rng, stage, gap, stall):
+    oracle = Oracle(4, 5, 2)
+    zones = rng.sample(oracle.every_zone(), 60)
+    _, wanted, _, taker = run(bench, rng, oracle, zones, stage(skin_of(4, 5, 2)), gap, stall=stall)
+    check_items(wanted, taker)
+
+
+def cycles_by_the_rule(oracle, words, put, size):
+    """When items are taken by a packer that takes ``size`` clocks for each, and from when on each was offered."""
+    taken, offered, free, gone, packer = [], [], 0, 0, 0
+    for word, at in zip(words, put):
+        if word == oracle.end:
+            cycle = max(at + 2, free, packer)
+            offered.append(max(at + 2, free, gone + 1))
+            free = packer = cycle + 1
+        else:
+            last_bit = max(max(at + 2, free) + oracle.clocks, gone)
+            free = last_bit + 1
+            offered.append(free)
+            cycle = max(free, packer) + size - 1
+            packer = cycle + 1
+        gone = cycle
+        taken.append(cycle)
+    return offered, taken
+
+
+@pytest.mark.parametrize("size", [1, 3, 20])
+@pytest.mark.parametrize("gap", [0.0, 0.95])
+def test_a_queue_and_a_division_take_their_clocks_before_a_packer_of_any_speed(bench, rng, size, gap):
+    oracle = Oracle(4, 5, 2)
+    zones = rng.sample(oracle.every_zone(), 40)
+    words = [oracle.end if zone is None else oracle.record(*zone) for zone in spread(zones)]
+    dut = Divide(skin_of(4, 5, 2, zone_capacity=6))
+    sim = bench(dut)
+    source = sim.source(dut.records, words, rng, gap=gap)
+    waited = 0
+
+    def reads(_cycle, seen):
+        """As the packer: an item is taken with its last byte, an end mark at once."""
+        nonlocal waited
+        valid, end = seen & 1, seen >> 1
+        takes = valid and (end or waited == size - 1)
+        waited = 0 if takes or not valid else waited + 1
+        return int(takes)
+
+    valid, ready = dut.items.valid, dut.items.ready
+    sim.drive(ready, reads, seen=Cat(valid, dut.items.payload.end))
+    shown, takes = sim.watch(valid), sim.watch(ready)
+    sim.run(100 * len(words), until=lambda: sum(takes.values) == len(words))
+    offered, taken = cycles_by_the_rule(oracle, words, source.transfers, size)
+    assert [cycle for cycle, one in enumerate(takes.values) if one] == taken
+    for begins, ends in zip(offered, taken):
+        assert not shown[begins - 1] or takes[begins - 1]
+        assert all(shown[begins : ends + 1])
+
+
+def test_an_area_of_0_which_only_a_faulty_labeller_lets_out_takes_the_same_clocks(bench):
+    """The frame says `mismatch`; whatever is sent for its barycenter, the zones behind it are right."""
+    oracle = Oracle(4, 5, 2)
+    dut = Divider(skin_of(4, 5, 2))
+    sim = bench(dut)
+    source = sim.source(dut.records, [oracle.record(0, 3, 2), oracle.record(3, 4, 5), oracle.end])
+    sink = sim.sink(dut.items)
+    sim.run(100, until=lambda: len(sink.transfers) == 3)
+    assert source.transfers[:2] == [oracle.clocks, 2 * oracle.clocks + 1]
+    assert sink.transfers[1][1] == oracle.item(3, 4, 5)[0]

@@ -1,0 +1,106 @@
+"""The labellers that are not exact: what they take for a zone, each record with its clock, and that nothing is lost."""
+
+import numpy as np
+import pytest
+from shadows import moments, zones_by_image_tools
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.labeller import LabelBench
+from contactfpga_sim.golden.label import labelling
+from contactfpga_sim.scenes import shapes
+
+LABELLERS = ("projection", "single")
+SIZES = ((4, 4), (1, 1), (1, 7), (7, 1), (9, 12), (16, 16), (3, 64))
+
+
+def frames_of(rows, columns, count=400):
+    """All of 4x4; else shapes that break labellers, and noise of every density."""
+    if (rows, columns) == (4, 4):
+        return (np.arange(1 << 16)[:, None] >> np.arange(16) & 1).astype(bool).reshape(-1, 4, 4)
+    rng = np.random.default_rng(rows * 100 + columns)
+    noise = rng.random((count, rows, columns)) < rng.uniform(0.01, 0.9, (count, 1, 1))
+    known = [cells for _, cells in shapes.variants(rows, columns)] if min(rows, columns) > 1 else []
+    return np.array([*noise, *known, np.zeros((rows, columns), bool)])
+
+
+@pytest.fixture(scope="module")
+def benches():
+    built = {}
+
+    def bench(labeller, rows, columns):
+        skin = Skin(rows=rows, columns=columns, labeller=labeller, settle_us=20.0)
+        if skin not in built:
+            built[skin] = LabelBench(skin)
+        return built[skin]
+
+    yield bench
+    for one in built.values():
+        one.close()
+
+
+@pytest.mark.parametrize("labeller", LABELLERS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_the_model_takes_for_zones_what_the_shadows_say(labeller, size):
+    for cells in frames_of(*size)[:3000]:
+        found = [(zone.area, zone.sum_x, zone.sum_y) for zone in labelling(cells, 8, labeller).departures]
+        assert sorted(found) == sorted(zones_by_image_tools(cells, labeller))
+
+
+@pytest.mark.parametrize("labeller", LABELLERS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_every_record_comes_in_its_clock(benches, record_property, labeller, size):
+    frames = frames_of(*size)
+    got = benches(labeller, *size).run(frames)
+    handed, wanted, ends = int(got.first_row[0]), [], []
+    for index, cells in enumerate(frames):
+        work = labelling(cells, 8, labeller)
+        rows = handed + np.cumsum([0, *work.busy])
+        wanted += [
+            (index, int(rows[zone.row]) + zone.clock, zone.area, zone.sum_x, zone.sum_y) for zone in work.departures
+        ]
+        ends.append(int(rows[-2]) + work.end)
+        handed = int(rows[-1])
+    records = np.column_stack([got.frame, got.cycle, got.moments])
+    assert records.tolist() == [list(record) for record in wanted]
+    assert got.end.tolist() == ends
+    record_property("cases", len(frames))
+
+
+@pytest.mark.parametrize("labeller", LABELLERS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize(("gap", "stall"), [(0, 50), (50, 0), (30, 30), (10, 90)])
+def test_stalls_change_no_zone(benches, labeller, size, gap, stall):
+    frames = frames_of(*size)[-2000:]
+    bench = benches(labeller, *size)
+    free, stalled = bench.run(frames), bench.run(frames, gap=gap, stall=stall, seed=gap + stall)
+    assert np.array_equal(stalled.frame, free.frame)
+    assert np.array_equal(stalled.moments, free.moments)
+
+
+@pytest.mark.parametrize("labeller", LABELLERS)
+def test_no_cell_is_lost(benches, labeller):
+    frames = frames_of(9, 12)
+    got = benches(labeller, 9, 12).run(frames)
+    sums = np.zeros((len(frames), 3), int)
+    np.add.at(sums, got.frame, got.moments)
+    assert sums.tolist() == [list(moments(cells)) for cells in frames]
+
+
+@pytest.mark.parametrize(
+    ("picture", "zones"),
+    [
+        ("#... .... ...#", 2),  # a free row between
+        ("#..# .... ....", 2),  # a free column between
+        ("#... .#.. ..#. ...#", 1),
+        ("##.. ##.. ...# ...#", 2),  # one band, a free column
+        ("#... #.#. #... ####", 1),  # an L around a finger: two for those who look
+        ("#### #..# #..# ####", 1),
+        ("##.. ..## .... #..#", 3),  # slanted outlines, then two more
+        ("#..# .##. .... ....", 1),
+    ],
+)
+def test_what_shadows_join(benches, picture, zones):
+    cells = np.array([[mark == "#" for mark in line] for line in picture.split()])
+    frame = np.zeros((4, 4), bool)
+    frame[: len(cells)] = cells
+    assert len(benches("projection", 4, 4).run(frame[None]).moments) == zones

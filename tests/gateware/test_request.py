@@ -1,0 +1,160 @@
+"""What the board takes for a request among the bytes it receives."""
+
+import pytest
+from amaranth.hdl import Elaboratable, Module
+from amaranth.lib import wiring
+from cobs import cobs
+from wire import check
+
+from contactfpga_hdl.link.request import RequestReader
+from contactfpga_hdl.link.uart import Receiver
+
+BIT = 3
+BYTE = 10 * BIT
+
+
+class Listener(Elaboratable):
+    """A receive pin and what is read from it."""
+
+    def __init__(self):
+        self.receiver, self.reader = Receiver(BIT), RequestReader()
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules += [self.receiver, self.reader]
+        wiring.connect(m, self.receiver.bits, self.reader.bits)
+        return m
+
+
+@pytest.fixture(scope="module")
+def listen(bench):
+    """Requests (number, hello) in some bytes that follow each other without a gap, each with the cycle after its first
+    byte's first at which it is taken; and the number in each cycle."""
+    dut = Listener()
+    sim = bench(dut)
+
+    def listen(data):
+        levels = [1] * 5
+        for byte in data:
+            for bit in [0, *(byte >> index & 1 for index in range(8)), 1]:
+                levels += [bit] * BIT
+        levels += [1] * 12
+        sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+        received, hello, heard, number = (
+            sim.watch(port) for port in (dut.reader.received, dut.reader.hello, dut.reader.heard, dut.reader.number)
+        )
+        sim.run(len(levels))
+        found = []
+        for cycle, value in enumerate(received.values):
+            if value:
+                assert heard[cycle + 1] == number[cycle + 1] % 8
+                found.append((cycle - 5, number[cycle + 1], bool(hello[cycle])))
+        return found, number.values
+
+    return listen
+
+
+def plain(number, hello=False, kind=5):
+    return bytes(0x80 | number >> 7 * place & 0x7F for place in range(3)) + bytes([kind << 4 | hello])
+
+
+def sealed(plain):
+    stuffed = cobs.encode(plain)
+    return stuffed + check(stuffed) + b"\0"
+
+
+def moment(bytes_before):
+    """When the last of so many bytes is received."""
+    return (bytes_before - 1) * BYTE + 2 + BIT // 2 + 9 * BIT
+
+
+@pytest.mark.parametrize("number", [1, 127, 128 * 128 * 127 + 5, (1 << 21) - 1, 0x155555 & ~7 | 3])
+@pytest.mark.parametrize("hello", [False, True])
+def test_a_request_is_taken_with_its_closing_delimiter(listen, number, hello):
+    found, numbers = listen(b"\0" + sealed(plain(number, hello)))
+    assert found == [(moment(10), number, hello)]
+    assert set(numbers) == {0, number}
+
+
+def test_requests_that_share_a_delimiter_are_all_taken(listen):
+    found, _ = listen(b"\0" + b"".join(sealed(plain(number, number % 2)) for number in (9, 10, 11)))
+    assert found == [(moment(1 + 9 * (index + 1)), 9 + index, index % 2 == 0) for index in range(3)]
+
+
+def test_nothing_is_taken_before_the_first_delimiter(listen):
+    assert listen(sealed(plain(9)))[0] == []
+    assert listen(b"x" + sealed(plain(9)) + sealed(plain(10)))[0] == [(moment(19), 10, False)]
+
+
+def test_the_number_is_gone_from_the_first_bit_of_the_next_packets(listen):
+    _, numbers = listen(b"\0" + sealed(plain(77)) + sealed(plain(78))[:4])
+    known = [cycle for cycle, number in enumerate(numbers) if number]
+    second_byte = 5 + 11 * BYTE + 2 + BIT // 2 + BIT  # of the next packet, its first bit
+    assert known == list(range(5 + moment(10) + 1, second_byte + 1))
+    assert set(numbers) == {0, 77}
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        sealed(plain(9, kind=4)),
+        sealed(plain(9, kind=6)),
+        sealed(plain(9, kind=13)),
+        sealed(plain(9) + b"\x51"),
+        sealed(plain(9)[1:]),
+        sealed(b"\x81" + plain(9)),
+        sealed(b""),
+        b"?\0",
+        b"\0",
+        sealed(plain(9))[:-2] + b"\0",
+        sealed(plain(9))[:-1] + b"\x80\0",
+    ],
+)
+def test_what_is_no_request_is_passed_over_and_the_next_one_taken(listen, data):
+    found, _ = listen(b"\0" + data + b"\0" + sealed(plain(10)))
+    assert found == [(moment(2 + len(data) + 9), 10, False)]
+
+
+def test_flags_without_a_meaning_are_ignored(listen):
+    assert listen(b"\0" + sealed(plain(9)[:3] + b"\x5e"))[0] == [(moment(10), 9, False)]
+
+
+def test_no_burst_of_up_to_sixteen_bits_makes_another_request(listen, rng):
+    """Of every start and length some; only the bits of the check bytes that carry none of the CRC do not count."""
+    whole = sealed(plain(0x12345 | 1, True))
+    bits = 8 * (len(whole) - 1)
+    word = int.from_bytes(whole, "little")
+    for start in range(bits):
+        data = b""
+        for length in range(1, min(16, bits - start) + 1):
+            inner = rng.randrange(1 << max(0, length - 2)) << 1 if length > 2 else 0
+            burst = (1 | inner | 1 << length - 1) << start
+            data += b"\0" + (word ^ burst).to_bytes(len(whole), "little")
+        for _, number, hello in listen(data + b"\0")[0]:
+            assert (number, hello) == (0x12345 | 1, True)
+
+
+def test_any_bytes_hold_the_requests_that_a_reader_of_whole_packets_finds(listen, rng):
+    total = 0
+    for _ in range(6):
+        data = b"\0"
+        for _ in range(25):
+            part = rng.choice([sealed(plain(rng.randrange(1 << 21), rng.random() < 0.5)), b"\0", rng.randbytes(3)])
+            if rng.random() < 0.3:
+                part = part[: rng.randrange(len(part) + 1)]
+            data += part
+        wanted, place = [], 0
+        for packet in data.split(b"\0")[:-1]:
+            place += len(packet) + 1
+            if len(packet) == 8 and packet[4] >> 4 == 5 and agrees(packet):
+                number = sum(digit % 128 << 7 * index for index, digit in enumerate(packet[1:4]))
+                wanted.append((moment(place), number, bool(packet[4] & 1)))
+        found, _ = listen(data)
+        assert found == wanted
+        total += len(found)
+    assert total > 15
+
+
+def agrees(packet):
+    """In the bits of the CRC."""
+    return all((a ^ b) & mask == 0 for a, b, mask in zip(check(packet[:5]), packet[5:], (0x7F, 0x7F, 3)))

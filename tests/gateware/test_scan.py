@@ -1,0 +1,257 @@
+"""The scanner: which row is driven when, and what it makes of the column pins (docs/timing.md, Scan)."""
+
+import dataclasses
+import types
+
+import pytest
+
+from contactfpga import Skin
+from contactfpga_hdl.scan.raster import Scanner
+
+SKINS = {
+    "1x1": {"rows": 1, "columns": 1, "settle_us": 18, "release_us": 1},
+    "1x7": {"rows": 1, "columns": 7, "settle_us": 17, "release_us": 3},
+    "7x1": {"rows": 7, "columns": 1, "settle_us": 6, "release_us": 4},
+    "3x5": {"rows": 3, "columns": 5, "settle_us": 8, "release_us": 3, "mask": ((0, 1), (2, 1), (2, 4), (1, 1))},
+    "2x20": {"rows": 2, "columns": 20, "settle_us": 1, "release_us": 25, "mask": ((0, 0), (1, 0), (1, 19))},
+    "64x2": {"rows": 64, "columns": 2, "settle_us": 9, "release_us": 1, "mask": ((63, 0), (0, 1))},
+}
+DIODES = ("col2row", "row2col")
+
+
+def skin_of(name, **options):
+    """A clock of 1 MHz, so that a microsecond is a clock, unless another one is asked for."""
+    fields = {"report": "cells", "clock_hz": 1_000_000, "baud": 250_000} | SKINS[name] | options
+    return Skin(**fields)
+
+
+@dataclasses.dataclass
+class Expected:
+    """What the rules say of a run."""
+
+    driven: list  # number of the driven row in each cycle, or None
+    rows: list  # (cycle, cells) of each transfer
+    contact: list  # level in each cycle
+    tags: dict  # cycle of a frame's last transfer: (time, stuck, requested, heard), there one clock later
+
+
+def expected(skin, pressed, requests=types.MappingProxyType({})):
+    """The rules of docs/timing.md for the pressed columns in each cycle, whatever row is driven.
+
+    ``requests``: by cycle, the bits that frames repeat."""
+    megahertz = skin.clock_hz // 1_000_000
+    S, L = round(skin.settle_us * megahertz), round(skin.release_us * megahertz)
+    T, R, cycles = S + L, skin.rows, len(pressed)
+    present = [sum(1 << c for c in range(skin.columns) if (r, c) not in skin.mask) for r in range(R)]
+    anywhere = 0
+    for word in present:
+        anywhere |= word
+    result = Expected([], [], [], {})
+    result.driven = [cycle // T % R if cycle % T < S else None for cycle in range(cycles)]
+    contact = [False] * cycles
+    level, scan, time, requested, heard, begun = False, [], 0, False, 0, 0
+    for k in range(cycles // T + 1):
+        strobe = k * T + S + 1
+        if strobe + 1 >= cycles:
+            break
+        row = k % R
+        cells = pressed[strobe - 2] & present[row]
+        result.rows.append((strobe + 1, cells))
+        if row == 0:
+            scan, time = [], strobe // megahertz % 2**24
+            requested = any(begun <= x < strobe for x in requests)
+            heard = next((bits for x, bits in sorted(requests.items(), reverse=True) if x < strobe), 0)
+            begun = strobe
+        scan.append(cells)
+        if cells:
+            level = True
+        elif row == R - 1 and not any(scan):
+            level = False
+        contact[strobe + 1 :] = [level] * (cycles - strobe - 1)
+        if row == R - 1:
+            stuck = 0
+            for slot in range(k - R, k):  # slots fR - 1 to fR + R - 2
+                stuck |= pressed[(slot + 1) * T - 1] & anywhere if slot >= 0 else 0
+            if strobe + 2 < cycles:
+                result.tags[strobe + 1] = (time, min(7, stuck.bit_count()), int(requested), heard)
+    result.contact = [int(value) for value in contact]
+    return result
+
+
+def run(bench, skin, pressed, requests=types.MappingProxyType({}), sink=None):
+    """Row pins, transfers, contact and tags of the gateware for the pressed columns in each cycle."""
+    dut = Scanner(skin)
+    sim = bench(dut)
+    all_columns = (1 << skin.columns) - 1
+    flip = all_columns if skin.diodes == "col2row" else 0
+    sim.drive(dut.pins.columns, lambda cycle: (pressed[cycle] if cycle < len(pressed) else 0) ^ flip)
+    sim.drive(dut.request, lambda cycle: int(cycle in requests))
+    heard = [0]
+
+    def last_heard(cycle):
+        heard.append(requests.get(cycle - 1, heard[-1]))
+        return heard[-1]
+
+    sim.drive(dut.heard, last_heard)
+    rows = sim.sink(dut.rows)
+    pins, contact = sim.watch(dut.pins.rows), sim.watch(dut.contact)
+    tag = [sim.watch(dut.tag[name]) for name in ("time", "stuck", "requested", "heard")]
+    sim.run(len(pressed))
+    idle = (1 << skin.rows) - 1 if skin.diodes == "col2row" else 0
+    mask = (1 << skin.columns) - 1
+    lasts = [cycle for cycle, payload in rows.transfers if payload >> skin.columns]
+    driven = []
+    for word in pins.values:
+        selected = word ^ idle
+        assert selected & (selected - 1) == 0, "two rows at once"
+        driven.append(selected.bit_length() - 1 if selected else None)
+    return Expected(
+        driven,
+        [(cycle, payload & mask) for cycle, payload in rows.transfers],
+        contact.values,
+        {cycle: tuple(watch[cycle + 1] for watch in tag) for cycle in lasts if cycle + 1 < len(pressed)},
+    )
+
+
+def assert_same(got, wanted):
+    for field in dataclasses.fields(Expected):
+        assert getattr(got, field.name) == getattr(wanted, field.name), field.name
+
+
+def scan_clocks(skin):
+    return round((skin.settle_us + skin.release_us) * skin.clock_hz / 1e6) * skin.rows
+
+
+@pytest.mark.parametrize("diodes", DIODES)
+@pytest.mark.parametrize("name", SKINS)
+def test_every_output_follows_the_rules_for_columns_that_change_each_clock(bench, rng, name, diodes):
+    skin = skin_of(name, diodes=diodes)
+    cycles = max(600, 3 * scan_clocks(skin))
+    pressed, quiet = [], 0
+    for cycle in range(cycles):
+        if cycle % 97 == 0:
+            quiet = rng.random() < 0.5  # long enough for whole scans of the small sheets without contact
+        pressed.append(0 if quiet else sum(1 << c for c in range(skin.columns) if rng.random() < 0.3))
+    requests = {cycle: rng.randrange(1, 8) for cycle in range(cycles) if rng.random() < 0.02}
+    wanted = expected(skin, pressed, requests)
+    assert {*wanted.contact} == {0, 1}
+    assert_same(run(bench, skin, pressed, requests), wanted)
+
+
+@pytest.mark.parametrize("diodes", DIODES)
+def test_one_row_at_a_time_is_driven_for_the_settle_time_and_none_in_the_release(bench, diodes):
+    skin = skin_of("3x5", diodes=diodes)
+    got = run(bench, skin, [0] * 80)
+    scan = [0] * 8 + [None] * 3 + [1] * 8 + [None] * 3 + [2] * 8 + [None] * 3
+    assert got.driven == (scan * 3)[:80]
+
+
+@pytest.mark.parametrize("diodes", DIODES)
+def test_only_the_last_driven_clock_counts(bench, diodes):
+    skin = skin_of("3x5", diodes=diodes)
+    sample = 11 + 7  # row 1
+    for late in (-1, 0, 1):
+        pressed = [0] * 60
+        pressed[sample + late] = 0b10001
+        got = run(bench, skin, pressed)
+        assert (sample + 3, 0b10001 if late == 0 else 0) in got.rows
+        assert [cells for _, cells in got.rows].count(0) == (4 if late == 0 else 5)
+
+
+def test_a_masked_switch_reads_released_and_raises_no_contact(bench):
+    skin = skin_of("3x5")
+    got = run(bench, skin, [0b10010] * 100)  # column 1 is masked everywhere, column 4 in row 2
+    assert [cells for _, cells in got.rows[:6]] == [0b10000, 0b10000, 0, 0b10000, 0b10000, 0]
+    assert set(run(bench, skin, [0b00010] * 100).contact) == {0}
+
+
+def test_contact_rises_three_clocks_after_the_sample(bench):
+    skin = skin_of("3x5")
+    for row in range(3):
+        sample = 33 + 11 * row + 7
+        pressed = [0] * 200
+        pressed[sample] = 1
+        contact = run(bench, skin, pressed).contact
+        assert contact.index(1) == sample + 3, "at most 4 clocks"
+
+
+def test_contact_falls_with_the_first_complete_scan_without_a_press(bench):
+    skin = skin_of("3x5")
+    for row in range(3):
+        pressed = [0] * 200
+        pressed[11 * row + 7] = 1
+        contact = run(bench, skin, pressed).contact
+        rise, fall = contact.index(1), 200 - contact[::-1].index(1)
+        assert rise == 11 * row + 10
+        assert fall == 33 + 22 + 7 + 3, "the last row of the scan after the one with contact"
+
+
+def test_stuck_counts_columns_pressed_while_no_row_is_driven(bench):
+    skin = skin_of("2x20")
+    T = 26
+    for count in (0, 1, 6, 7, 8, 19):
+        word = sum(1 << (c + 1) for c in range(count))  # column 0 is masked in every row
+        pressed = [word if cycle % T == T - 1 else 0 for cycle in range(3 * 2 * T)]
+        stuck = [tag[1] for tag in run(bench, skin, pressed).tags.values()]
+        assert stuck == [min(count, 7)] * 3
+
+
+def test_a_column_that_is_masked_in_every_row_is_never_stuck_and_others_are(bench):
+    skin = skin_of("2x20")
+    for column, stuck in ((0, 0), (1, 1), (19, 1)):  # 19 is masked in row 1 only
+        tags = run(bench, skin, [1 << column] * 160).tags
+        assert {tag[1] for tag in tags.values()} == {stuck}
+
+
+def test_a_stuck_column_is_told_in_one_frame_only(bench):
+    skin = skin_of("3x5")
+    for slot in range(2, 8):
+        pressed = [0] * (33 * 4 + 1)
+        pressed[11 * (slot + 1) - 1] = 1
+        stuck = [tag[1] for tag in run(bench, skin, pressed).tags.values()]
+        frame = (slot + 1) // 3
+        assert stuck == [int(index == frame) for index in range(4)]
+
+
+@pytest.mark.parametrize("megahertz", [1, 3, 12])
+def test_time_is_whole_microseconds_at_the_first_rows_strobe(bench, megahertz):
+    skin = skin_of("7x1", clock_hz=1_000_000 * megahertz, settle_us=10, release_us=1)
+    tags = run(bench, skin, [0] * (77 * megahertz * 3 + 12)).tags
+    assert [tag[0] for tag in tags.values()] == [
+        (frame * 77 * megahertz + 10 * megahertz + 1) // megahertz for frame in range(3)
+    ]
+
+
+def test_a_request_is_answered_once_by_the_next_frame_to_start(bench):
+    skin = skin_of("3x5")
+    strobe = 33 + 8 + 1  # of frame 1
+    for at, frame in ((strobe - 1, 1), (strobe, 2), (strobe + 1, 2), (0, 0)):
+        tags = run(bench, skin, [0] * (33 * 4 + 1), {at: 1}).tags
+        assert [tag[2] for tag in tags.values()] == [int(index == frame) for index in range(4)]
+
+
+def test_a_frames_tag_holds_until_the_next_frames_last_strobe(bench):
+    skin = skin_of("3x5")
+    dut = Scanner(skin)
+    sim = bench(dut)
+    sim.drive(dut.request, lambda cycle: int(cycle == 20))
+    sim.sink(dut.rows)
+    tag = sim.watch(dut.tag)
+    sim.run(33 * 4)
+    for frame in range(3):
+        last, following = 33 * frame + 22 + 9, 33 * (frame + 1) + 22 + 9
+        assert len(set(tag.values[last + 2 : following + 1])) == 1
+        assert tag[following] != tag[following + 1]
+
+
+def test_a_row_is_offered_until_it_is_taken(bench, rng):
+    skin = skin_of("3x5")
+    dut = Scanner(skin)
+    sim = bench(dut)
+    pressed = [rng.randrange(32) for _ in range(1200)]
+    sim.drive(dut.pins.columns, lambda cycle: pressed[cycle % 1200] ^ 31)
+    sink = sim.sink(dut.rows, ready=lambda cycle: rng.random() < 0.3 or cycle % 11 == 9)  # before the next row comes
+    sim.run(1200)
+    assert [payload & 31 for _, payload in sink.transfers] == [cells for _, cells in expected(skin, pressed).rows]
+    assert sink.offered[: len(sink.transfers)] == [cycle for cycle, _ in expected(skin, pressed).rows]
+    assert any(cycle != offered for (cycle, _), offered in zip(sink.transfers, sink.offered))

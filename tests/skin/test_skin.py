@@ -1,0 +1,568 @@
+"""The Skin: what it refuses and with which words, its file, its fingerprint, and what it fills in."""
+
+import dataclasses
+import json
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contactfpga import ContactFPGAError, Skin, SkinError
+from contactfpga.cover import Cover, Switch
+from contactfpga.skin.derived import Derived
+
+LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
+
+REFUSED = [
+    ({"name": 7}, "name is 7; it must be a string"),
+    ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
+    ({"name": "a\n"}, r"name is 'a\n'; it must be printable, with no spaces around it"),
+    ({"name": "ä" * 17}, f"name is '{'ä' * 17}', 34 bytes of UTF-8; at most 32 are possible"),
+    # the sheet
+    ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
+    ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
+    ({"columns": 0}, "columns is 0; it must lie between 1 and 64"),
+    ({"columns": 65}, "columns is 65; it must lie between 1 and 64"),
+    ({"columns": 8.0}, "columns is 8.0; it must be a whole number"),
+    ({"rows": True}, "rows is True; it must be a whole number"),
+    ({"rows": "16"}, "rows is '16'; it must be a whole number"),
+    ({"pitch_x_mm": 0}, "pitch_x_mm is 0.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_y_mm": -1}, "pitch_y_mm is -1.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_y_mm": 1001}, "pitch_y_mm is 1001.0; it must lie between 0.01 and 1000.0 mm"),
+    ({"pitch_x_mm": float("nan")}, "pitch_x_mm is nan; it must be a finite number"),
+    ({"pitch_x_mm": float("inf")}, "pitch_x_mm is inf; it must be a finite number"),
+    ({"pitch_x_mm": None}, "pitch_x_mm is None; it must be a finite number"),
+    ({"pitch_x_mm": "10"}, "pitch_x_mm is '10'; it must be a finite number"),
+    ({"pitch_x_mm": True}, "pitch_x_mm is True; it must be a finite number"),
+    ({"connectivity": 6}, "connectivity is 6; it must be one of 4, 8"),
+    ({"connectivity": 8.0}, "connectivity is 8.0; it must be one of 4, 8"),
+    ({"connectivity": True}, "connectivity is True; it must be one of 4, 8"),
+    ({"connectivity": "8"}, "connectivity is '8'; it must be one of 4, 8"),
+    ({"surface": 8}, "surface is 8; it must be one of 'plane', 'cylinder'"),
+    ({"surface": ["plane"]}, "surface is ['plane']; it must be one of 'plane', 'cylinder'"),
+    ({"mask": [(0, 1.0)]}, "mask holds (0, 1.0); it must hold [row, column] pairs"),
+    ({"mask": [(0, True)]}, "mask holds (0, True); it must hold [row, column] pairs"),
+    # its surface
+    ({"surface": "sphere"}, "surface is 'sphere'; it must be one of 'plane', 'cylinder'"),
+    ({"radius_mm": 50}, "radius_mm is 50.0; a plane has none, leave it out"),
+    ({"surface": "cylinder"}, "radius_mm is missing; surface = 'cylinder' needs it"),
+    ({"surface": "cylinder", "radius_mm": 0.05}, "radius_mm is 0.05; it must lie between 0.1 and 100000.0 mm"),
+    ({"surface": "cylinder", "radius_mm": -50}, "radius_mm is -50.0; it must lie between 0.1 and 100000.0 mm"),
+    (
+        {"surface": "cylinder", "radius_mm": 25},
+        "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet, which is not "
+        "supported; use at most 15 columns",
+    ),
+    # its mask
+    ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
+    ({"mask": "ab"}, "mask is 'ab'; it must be a list of [row, column]"),
+    ({"mask": [3]}, "mask holds 3; it must hold [row, column] pairs"),
+    ({"mask": [(1, 2, 3)]}, "mask holds (1, 2, 3); it must hold [row, column] pairs"),
+    ({"mask": [(1.0, 2)]}, "mask holds (1.0, 2); it must hold [row, column] pairs"),
+    ({"mask": [(True, 2)]}, "mask holds (True, 2); it must hold [row, column] pairs"),
+    ({"mask": [(16, 0)]}, "mask holds [16, 0]; the sheet has 16 rows and 16 columns"),
+    ({"mask": [(0, -1)]}, "mask holds [0, -1]; the sheet has 16 rows and 16 columns"),
+    ({"rows": 1, "columns": 1, "mask": [(0, 0)]}, "mask lists all 1 switches; at least one must be left"),
+    # scan and debounce
+    ({"diodes": "both"}, "diodes is 'both'; it must be one of 'col2row', 'row2col', 'none'"),
+    (
+        {"diodes": "none", "connectivity": 4, "report": "barycenter"},
+        "report is 'barycenter'; diodes = 'none' needs report = 'moments' or 'cells'",
+    ),
+    ({"diodes": "none"}, "connectivity is 8; diodes = 'none' needs connectivity = 4 with report = 'moments'"),
+    (
+        {"diodes": "none", "report": "cells", "scan": "adaptive"},
+        "scan is 'adaptive'; diodes = 'none' needs scan = 'raster'",
+    ),
+    (
+        {"diodes": "none", "report": "cells", "row_drive": "74hc595"},
+        "row_drive is '74hc595'; diodes = 'none' needs row_drive = 'direct'",
+    ),
+    (
+        {"diodes": "none", "connectivity": 4, "labeller": "projection"},
+        "labeller is 'projection'; diodes = 'none' needs labeller = 'run' with report = 'moments'",
+    ),
+    (
+        {"diodes": "none", "report": "cells", "mask": [(1, 2)]},
+        "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be told",
+    ),
+    ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster', 'adaptive'"),
+    ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
+    ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
+    ({"settle_us": -5}, "settle_us is -5.0; it must lie between 0.0 and 10000.0 us"),
+    ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
+    (
+        {"settle_us": 0.5},
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with "
+        "labeller = 'run'",
+    ),
+    (
+        {"settle_us": 1.0, "labeller": "serial"},
+        "settle_us + release_us is 24 clocks; 16 columns and 64 zones a frame need 27 clocks (2.25 us) with labeller = "
+        "'serial'",
+    ),
+    (
+        {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
+        "settle_us + release_us is 48 clocks; 24 columns and 1 zones a frame need 51 clocks (4.25 us) with labeller = "
+        "'serial'",
+    ),
+    ({"labeller": "fast"}, "labeller is 'fast'; it must be one of 'run', 'serial', 'projection', 'single'"),
+    (
+        {"debounce": "fast"},
+        "debounce is 'fast'; it must be one of 'none', 'sym_defer_pk', 'asym_eager_defer_pk'",
+    ),
+    (
+        {"debounce": "sym_defer_pk", "debounce_press_us": -1},
+        "debounce_press_us is -1.0; it must lie between 0.0 and 393120.0 us",
+    ),
+    (
+        {"debounce": "asym_eager_defer_pk", "debounce_release_us": 393_121},
+        "debounce_release_us is 393121.0; it must lie between 0.0 and 393120.0 us",
+    ),
+    # adaptive scan
+    ({"scan": "adaptive", "rows": 1}, "rows is 1; it must lie between 2 and 64 with scan = 'adaptive'"),
+    (
+        {"scan": "adaptive", "column_read": "74hc165"},
+        "column_read is '74hc165'; scan = 'adaptive' needs column_read = 'direct', as it looks at the columns of an "
+        "untouched sheet in each clock",
+    ),
+    (
+        {"scan": "adaptive", "settle_us": 2.0},
+        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones a frame need 43 clocks (3.58333 us) "
+        "with labeller = 'run'",
+    ),
+    (
+        {"scan": "adaptive", "rows": 64, "columns": 64},
+        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones a frame need 185 clocks (15.4167 us) "
+        "with labeller = 'run'",
+    ),
+    (
+        {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.1},
+        "keep_alive_ms is 0.1; one scan takes 0.156 ms",
+    ),
+    # report and link
+    ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'barycenter', 'cells'"),
+    ({"report": "barycenter", "barycenter_bits": -1}, "barycenter_bits is -1; it must lie between 0 and 8"),
+    ({"report": "barycenter", "barycenter_bits": 9}, "barycenter_bits is 9; it must lie between 0 and 8"),
+    ({"report": "barycenter", "barycenter_bits": 2.0}, "barycenter_bits is 2.0; it must be a whole number"),
+    ({"barycenter_bits": 3}, "barycenter_bits is 3; leave it out, or set report = 'barycenter'"),
+    ({"report": "cells", "barycenter_bits": 5}, "barycenter_bits is 5; leave it out, or set report = 'barycenter'"),
+    (
+        {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 256},
+        "settle_us + release_us is 72 clocks; 32 columns and 256 zones a frame need 90 clocks (7.5 us) "
+        "with labeller = 'run' and report = 'barycenter'",
+    ),
+    ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),
+    ({"send": "on_change", "keep_alive_ms": 101}, "keep_alive_ms is 101.0; it must lie between 0.0 and 100.0 ms"),
+    ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes 0.096 ms"),
+    ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
+    ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
+    ({"zone_capacity": 1.5}, "zone_capacity is 1.5; it must be a whole number"),
+    # shift registers
+    ({"row_drive": "74hc164"}, "row_drive is '74hc164'; it must be one of 'direct', '74hc595'"),
+    ({"column_read": "spi"}, "column_read is 'spi'; it must be one of 'direct', '74hc165'"),
+    ({"row_chains": 2}, "row_chains is 2; leave it out, or set row_drive = '74hc595'"),
+    ({"column_chains": 0}, "column_chains is 0; leave it out, or set column_read = '74hc165'"),
+    ({"row_drive": "74hc595", "row_chains": 0}, "row_chains is 0; it must lie between 1 and 16"),
+    ({"row_drive": "74hc595", "row_chains": 2.0}, "row_chains is 2.0; it must be a whole number"),
+    ({"column_read": "74hc165", "column_chains": 17}, "column_chains is 17; it must lie between 1 and 16"),
+    (
+        {"columns": 9, "column_read": "74hc165", "column_chains": 4},
+        "column_chains is 4; 9 columns in chains of 3 fill 3, set column_chains = 3",
+    ),
+    (
+        {"shift_hz": 4_000_000},
+        "shift_hz is 4000000; leave it out, or set row_drive = '74hc595' or column_read = '74hc165'",
+    ),
+    ({"row_drive": "74hc595", "shift_hz": 9_999}, "shift_hz is 9999; it must lie between 10000 and 50000000 Hz"),
+    ({"row_drive": "74hc595", "shift_hz": 8e6}, "shift_hz is 8000000.0; it must be a whole number"),
+    # clock and line
+    ({"clock_hz": 12_500_000}, "clock_hz is 12500000; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 0}, "clock_hz is 0; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"clock_hz": 401_000_000}, "clock_hz is 401000000; it must be a whole number of MHz from 1 to 400 MHz"),
+    ({"baud": 7_000_000}, "baud is 7000000; it must lie between 1200 and 6000000 for this clock"),
+    ({"baud": 300}, "baud is 300; it must lie between 1200 and 6000000 for this clock"),
+    (
+        {"baud": 5_000_000},
+        "baud is 5000000: a clock of 12000000 Hz misses it by +20.00 %, the limit is 1.5 %; nearest good rates: "
+        "4000000, 6000000",
+    ),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED, ids=[str(changes) for changes, _ in REFUSED])
+def test_refused_with_value_and_limit(changes, message):
+    with pytest.raises(SkinError) as caught:
+        Skin(**changes)
+    assert str(caught.value) == message
+    assert isinstance(caught.value, ValueError)
+    assert isinstance(caught.value, ContactFPGAError)
+
+
+@pytest.mark.parametrize("field", ["rows", "connectivity", "pitch_x_mm", "clock_hz", "baud", "shift_hz"])
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_that_no_float_holds_are_refused_in_a_short_sentence(field, digits):
+    with pytest.raises(SkinError, match=f"^{field} is ") as caught:
+        Skin(**{field: 10**digits})
+    assert len(str(caught.value)) < 200
+
+
+def test_whole_numbers_of_numpy_make_the_same_skin():
+    plain = Skin(rows=8, columns=8, connectivity=4, mask=[(1, 2)])
+    mask = np.argwhere(np.arange(64).reshape(8, 8) == 10)
+    skin = Skin(rows=np.int64(8), columns=np.uint8(8), connectivity=np.int32(4), mask=list(map(tuple, mask)))
+    assert skin == plain
+    assert skin.fingerprint == plain.fingerprint
+    assert type(skin.rows) is type(skin.connectivity) is type(skin.mask[0][0]) is int
+
+
+JUST_WITHIN = [
+    {"row_drive": "74hc595", "column_read": "74hc165", "shift_hz": 10_000},
+    {"row_drive": "74hc595", "row_chains": 16, "column_read": "74hc165", "column_chains": 16, "shift_hz": 50_000_000},
+    {"rows": 1, "columns": 1},
+    {"rows": 64, "columns": 64, "settle_us": 100},
+    {"pitch_x_mm": 0.01, "pitch_y_mm": 1000},
+    {"rows": 1, "columns": 2, "mask": [[0, 0]]},
+    {"mask": [[15, 15], (0, 0)]},
+    {"surface": "cylinder", "radius_mm": 25, "columns": 15},
+    {"clock_hz": 1_000_000, "baud": 500_000, "settle_us": 100},
+    {"clock_hz": 400_000_000},
+    {"baud": 1200},
+    {"send": "on_change", "keep_alive_ms": 0.096},
+    {"send": "on_change", "keep_alive_ms": 100},
+    {"send": "always", "keep_alive_ms": 500},
+    {"zone_capacity": 1},
+    {"report": "barycenter", "barycenter_bits": 0},
+    {"report": "barycenter", "barycenter_bits": 8},
+    {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 199},
+    {"zone_capacity": 64},
+    {"scan": "adaptive", "rows": 2},
+    {"scan": "adaptive", "settle_us": 2.6},
+    {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.156},
+    {"settle_us": 10_000, "release_us": 10_000},
+    {"settle_us": 0.8},
+    {"debounce": "sym_defer_pk", "debounce_press_us": 393_120, "debounce_release_us": 0},
+    {"debounce": "none", "debounce_press_us": -1},
+]
+
+
+@pytest.mark.parametrize("changes", JUST_WITHIN, ids=str)
+def test_what_just_keeps_the_limits_is_taken(changes):
+    skin = Skin(**changes)
+    assert all(getattr(skin, name) == value for name, value in changes.items() if name != "mask")
+
+
+@pytest.mark.parametrize("radius_mm", [3.3, 10.0, 12.5, 25.4, 100.0])
+def test_a_cylinder_takes_as_many_columns_as_the_message_says(radius_mm):
+    fields = {"surface": "cylinder", "radius_mm": radius_mm, **LONG}
+    with pytest.raises(SkinError, match="ends meet") as caught:
+        Skin(columns=64, **fields)
+    most = int(str(caught.value).split()[-2])
+    Skin(columns=most, **fields)
+    with pytest.raises(SkinError, match="ends meet"):
+        Skin(columns=most + 1, **fields)
+
+
+def test_a_small_baud_error_is_accepted():
+    assert Derived(Skin(baud=921_600)).bit_clocks == 13
+
+
+@pytest.mark.parametrize(("baud", "good"), [(2_960_000, True), (2_950_000, False)])
+def test_the_limit_of_the_baud_error(baud, good):
+    """12 MHz / 4 is 3 Mbaud: 1.35 % above the one, 1.69 % above the other."""
+    if good:
+        Skin(baud=baud)
+    else:
+        with pytest.raises(SkinError, match=r"\+1.69 %.*nearest good rates: 2400000, 3000000, 4000000"):
+            Skin(baud=baud)
+
+
+@given(st.integers(1, 200), st.integers(1200, 3_000_000))
+@settings(max_examples=300, deadline=None)
+def test_named_rates_are_good_ones(megahertz, baud):
+    clock_hz = megahertz * 1_000_000
+    if baud > clock_hz // 2:
+        return
+    refused = ""
+    try:
+        Skin(clock_hz=clock_hz, baud=baud, **LONG)
+    except SkinError as error:
+        refused = str(error)
+    if refused:
+        rates = refused.partition("nearest good rates: ")[2].split(", ")
+        assert [Skin(clock_hz=clock_hz, baud=int(rate), **LONG) for rate in rates]
+
+
+def test_every_field_has_a_default_and_a_refusal():
+    """A field that nothing can be wrong with would be one that nobody checks."""
+    touched = {name for changes, _ in REFUSED for name in changes}
+    assert touched == {field.name for field in dataclasses.fields(Skin)}
+    Skin()
+
+
+def test_the_reference_skin():
+    skin = Skin()
+    assert (skin.rows, skin.columns, skin.connectivity, skin.report) == (16, 16, 8, "moments")
+    assert (skin.clock_hz, skin.baud, skin.settle_us, skin.release_us) == (12_000_000, 3_000_000, 5.0, 1.0)
+    assert (skin.debounce, skin.send, skin.scan) == ("none", "always", "raster")
+    assert Derived(skin).frame_clocks == 16 * 72
+
+
+def test_a_skin_does_not_change():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Skin().rows = 8
+
+
+# ---- capacity
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "connectivity", "capacity"),
+    [
+        (1, 1, 8, 1),
+        (16, 16, 8, 64),
+        (16, 16, 4, 128),
+        (32, 32, 8, 256),
+        (32, 32, 4, 512),
+        (33, 32, 8, 256),
+        (33, 32, 4, 256),
+        (64, 64, 8, 256),
+        (64, 1, 8, 32),
+        (5, 7, 8, 12),
+        (5, 7, 4, 18),
+    ],
+)
+def test_default_capacity(rows, columns, connectivity, capacity):
+    skin = Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG)
+    assert skin.zone_capacity == capacity
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+def test_max_zones_is_what_the_worst_frame_of_a_small_sheet_holds(connectivity):
+    """Every frame of every sheet up to 3x4, labelled by scipy."""
+    ndimage = pytest.importorskip("scipy.ndimage")
+    structure = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    for rows in range(1, 4):
+        for columns in range(1, 5):
+            words = np.arange(1 << rows * columns)[:, None] >> np.arange(rows * columns) & 1
+            most = max(ndimage.label(word.reshape(rows, columns), structure)[1] for word in words)
+            assert Skin(rows=rows, columns=columns, connectivity=connectivity, **LONG).max_zones() == most
+
+
+@pytest.mark.parametrize(("size", "connectivity", "capacity"), [(6, 8, 9), (16, 8, 64), (16, 4, 64), (64, 8, 64)])
+def test_default_capacity_where_zones_are_divided(size, connectivity, capacity):
+    skin = Skin(rows=size, columns=size, connectivity=connectivity, report="barycenter", **LONG)
+    assert skin.zone_capacity == capacity
+
+
+def test_replace_gives_a_skin_that_begins_or_ends_to_divide_its_own_capacity():
+    skin = Skin(rows=32, columns=32, **LONG)
+    divided = skin.replace(report="barycenter")
+    assert (skin.zone_capacity, divided.zone_capacity) == (256, 64)
+    assert divided.replace(report="cells") == skin.replace(report="cells")
+    assert skin.replace(zone_capacity=7).replace(report="cells").zone_capacity == 7
+    assert divided.replace(zone_capacity=7).replace(barycenter_bits=2).zone_capacity == 7
+
+
+def test_replace_gives_a_changed_sheet_its_own_capacity():
+    assert Skin(zone_capacity=7).replace(settle_us=6.0).zone_capacity == 7
+    assert Skin(zone_capacity=7).replace(rows=8).zone_capacity == 32
+    assert Skin().replace(rows=8, zone_capacity=3).zone_capacity == 3
+    with pytest.raises(SkinError, match="rows is 65"):
+        Skin().replace(rows=65)
+
+
+# ---- file and fingerprint
+
+
+REPORTS = st.sampled_from([{"report": "moments"}, {"report": "cells"}]) | st.builds(
+    lambda bits: {"report": "barycenter", "barycenter_bits": bits}, st.integers(0, 8)
+)
+
+
+@st.composite
+def skins(draw):
+    rows, columns = draw(st.integers(1, 64)), draw(st.integers(1, 64))
+    radius_mm = draw(st.none() | st.floats(200.0, 90_000.0))
+    cell = st.tuples(st.integers(0, rows - 1), st.integers(0, columns - 1))
+    mask = draw(st.lists(cell, max_size=min(5, rows * columns - 1)))
+    return Skin(
+        rows=rows,
+        columns=columns,
+        pitch_x_mm=draw(st.floats(0.01, 15.0)),
+        pitch_y_mm=draw(st.floats(0.01, 1000.0)),
+        surface="plane" if radius_mm is None else "cylinder",
+        radius_mm=radius_mm,
+        mask=tuple(mask),
+        connectivity=draw(st.sampled_from([4, 8])),
+        diodes=draw(st.sampled_from(["col2row", "row2col"])),
+        settle_us=draw(st.floats(600.0, 10_000.0)),
+        release_us=draw(st.floats(1.0, 10_000.0)),
+        debounce=draw(st.sampled_from(["none", "sym_defer_pk", "asym_eager_defer_pk"])),
+        debounce_press_us=draw(st.floats(0.0, 5000.0)),
+        **draw(REPORTS),
+        zone_capacity=draw(st.none() | st.just(1)),
+    )
+
+
+@given(skin=skins())
+@settings(max_examples=200, deadline=None)
+def test_a_file_gives_the_same_skin_back(tmp_path_factory, skin):
+    path = tmp_path_factory.mktemp("skin") / "skin.toml"
+    path.write_text(skin.to_toml(), encoding="utf-8")
+    loaded = Skin.load(path)
+    assert loaded == skin
+    assert loaded.fingerprint == skin.fingerprint
+
+
+@given(first=skins(), second=skins())
+@settings(max_examples=100, deadline=None)
+def test_fingerprints_tell_skins_apart(first, second):
+    assert (first == second) == (first.fingerprint == second.fingerprint)
+    assert len(first.fingerprint) == 8
+
+
+OTHER = {
+    "row_drive": "74hc595",
+    "column_read": "74hc165",
+    "rows": 15,
+    "columns": 15,
+    "pitch_x_mm": 9.0,
+    "pitch_y_mm": 9.0,
+    "mask": ((1, 1),),
+    "connectivity": 4,
+    "diodes": "row2col",
+    "settle_us": 6.0,
+    "release_us": 2.0,
+    "debounce": "sym_defer_pk",
+    "debounce_press_us": 4000.0,
+    "debounce_release_us": 4000.0,
+    "labeller": "serial",
+    "report": "cells",
+    "send": "on_change",
+    "keep_alive_ms": 50.0,
+    "zone_capacity": 63,
+    "clock_hz": 24_000_000,
+    "baud": 1_000_000,
+}
+
+
+def test_every_field_is_in_the_fingerprint():
+    others = [Skin(**{name: value}) for name, value in OTHER.items()]
+    others += [Skin(surface="cylinder", radius_mm=radius_mm) for radius_mm in (100.0, 101.0)]
+    registers = Skin(row_drive="74hc595", column_read="74hc165")
+    only_there = {"row_chains": 2, "column_chains": 2, "shift_hz": 4_000_000}
+    others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
+    divided = Skin(report="barycenter")
+    others += [divided, divided.replace(barycenter_bits=3)]
+    assert set(OTHER) | {"name", "surface", "radius_mm", "scan", "barycenter_bits", *only_there} == {
+        field.name for field in dataclasses.fields(Skin)
+    }
+    assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
+
+
+def test_fingerprints_of_boards_that_are_in_use_stay_the_same():
+    assert Skin().fingerprint.hex() == "44136fa355b3678a"
+    assert Skin(rows=13, columns=6, report="cells", send="on_change").fingerprint.hex() == "d3e1f271ecb47488"
+
+
+def test_a_name_and_what_is_written_as_it_is_by_default_change_no_fingerprint():
+    assert Skin(name="left forearm", zone_capacity=64, baud=3_000_000).fingerprint == Skin().fingerprint
+    assert Skin(rows=8, zone_capacity=32).fingerprint == Skin(rows=8).fingerprint
+
+
+def test_fingerprint_is_the_same_in_another_process_and_however_it_was_written():
+    code = "from contactfpga import Skin; print(Skin(pitch_x_mm=10, mask=[[2, 1], [0, 3], [2, 1]]).fingerprint.hex())"
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert other.stdout.strip() == Skin(pitch_x_mm=10.0, mask=((0, 3), (2, 1))).fingerprint.hex()
+
+
+def test_file_with_an_unknown_key(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 8\ncolumn = 8\n")
+    with pytest.raises(SkinError, match=r"skin.toml: unknown key 'column'; known are name, rows, columns, pitch_x_mm"):
+        Skin.load(path)
+
+
+def test_file_that_is_no_toml(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows: 8\n")
+    with pytest.raises(SkinError, match=r"skin\.toml: not a TOML file"):
+        Skin.load(path)
+
+
+def test_file_with_a_value_that_cannot_work(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 99\n")
+    with pytest.raises(SkinError, match="rows is 99"):
+        Skin.load(path)
+
+
+def test_empty_file_is_the_reference_skin(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("")
+    assert Skin.load(path) == Skin()
+
+
+COVERED = """rows = 8
+[cover]
+model = "bonded"
+thickness_m = 0.004
+[cover.switch]
+force_n = 0.5
+"""
+
+
+def test_a_file_with_a_cover(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text(COVERED)
+    skin = Skin.load(path)
+    assert skin.cover == Cover("bonded", 0.004, Switch(0.5))
+    path.write_text(skin.to_toml())
+    assert Skin.load(path).cover == skin.cover
+    assert Skin.load(path).replace(columns=8).cover == skin.cover
+    thin = skin.replace(cover=Cover(share=0.25))
+    path.write_text(thin.to_toml())
+    assert Skin.load(path).cover == Cover(share=0.25)
+
+
+def test_another_cover_needs_no_other_bitstream():
+    bare, covered = Skin(), Skin(cover=Cover("bonded", 0.004))
+    assert bare == covered
+    assert bare.fingerprint == covered.fingerprint
+    assert hash(bare) == hash(covered)
+    assert bare.cover is None
+    assert pickle.loads(pickle.dumps(covered)).cover == covered.cover
+    with pytest.raises(SkinError, match=r"cover is 'foam'; it must be a contactfpga\.cover\.Cover"):
+        Skin(cover="foam")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"bonded"', '"sand"', "model is 'sand'; it must be one of patch, point, hertz, bonded, frictionless"),
+        ("thickness_m", "thickness", "unknown key 'thickness' in [cover]; known are model, thickness_m, switch, share"),
+        ("force_n = 0.5", "force = 1", "unknown key 'force' in [cover.switch]; known are force_n, area_m2"),
+        ("force_n = 0.5", "force_n = -1", "force_n is -1; it must be a finite number above 0 N"),
+        ("[cover.switch]\nforce_n = 0.5", "switch = 4", "cover.switch is 4; it must be a part, [cover.switch]"),
+        (COVERED, "cover = 3\n", "cover is 3; it must be a part, [cover]"),
+    ],
+)
+def test_a_cover_that_cannot_be_is_refused(tmp_path, old, new, message):
+    assert old in COVERED
+    path = tmp_path / "skin.toml"
+    path.write_text(COVERED.replace(old, new))
+    with pytest.raises(SkinError) as caught:
+        Skin.load(path)
+    assert "skin.toml: " in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_fields_are_plain_values():
+    """Whatever reads a Skin's fields, as the golden model does, needs no code of the host."""
+    fields = dataclasses.asdict(Skin(mask=[[1, 2]]))
+    assert json.loads(json.dumps(fields)) == fields | {"mask": [[1, 2]]}

@@ -1,0 +1,131 @@
+"""The arm's charts, and the page on it: what latency costs, point by point."""
+
+import csv
+import dataclasses
+import math
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga import cli
+from contactfpga.skin import Skin
+from contactfpga_sim.pages import arm_page
+from contactfpga_sim.studies import kept
+from contactfpga_sim.studies.arm import latency_charts, sweep
+from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.studies.arm.run import run
+from contactfpga_sim.studies.arm.sweep import Task
+
+PAPER = Case.load("paper")
+PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def nothing_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+
+
+def test_safe_speed_lies_where_the_worst_force_so_far_crosses_the_limit():
+    speeds = np.array([0.1, 0.2, 0.3, 0.4])
+    forces = np.array([5.0, 10.0, 8.0, 20.0])
+    assert sweep.safe_speed(speeds, forces, 7.5) == pytest.approx(0.15)
+    assert sweep.safe_speed(speeds, forces, 15.0) == pytest.approx(0.35)
+    assert math.isnan(sweep.safe_speed(speeds, forces, 4.9))
+    assert math.isnan(sweep.safe_speed(speeds, forces, 20.0))
+
+
+def test_the_naive_speed_is_the_papers_bound_and_no_safe_one():
+    """paper-check: 0.240 m/s for 15 N, 4.156 N and 6 ms; the peak is above 15 N already at 0.23 m/s."""
+    assert sweep.closing_n(PAPER) == pytest.approx(4.15555, abs=5e-6)
+    assert sweep.naive_speed(PAPER, 15.0, 6e-3) == pytest.approx(0.240, abs=5e-4)
+    assert run(PAPER, "latency", latency_s=6e-3).outcome.peak_force_n > 15
+
+
+def test_the_bounds_hold_for_what_the_gateware_takes(nothing_kept):
+    bounds = sweep.bounds_s(PAPER, Skin())
+    for way, name in (("uart", "UART"), ("pin", "pin")):
+        result = run(PAPER, way).outcome
+        assert 0 < result.detected_s - result.closes_s <= bounds[name]
+    assert bounds["UART"] > bounds["last byte"] > bounds["pin"]
+
+
+def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
+    case = sweep.unlimited(PAPER).but(link={"speed_m_s": 0.4})
+    point = sweep.Point(**sweep.work(Task(case, latency_s=6e-3, thickness=True)))
+    for less, flat in ((0.0, False), (2 * sweep.RESOLUTION_M, True)):
+        thick = case.but(foam={"thickness_m": point.thickness_m - less}, run={"step_s": 25e-6, "duration_s": 0.05})
+        assert run(thick, "latency", latency_s=6e-3).outcome.bottomed == flat
+    assert 4e-3 < point.thickness_m < 5e-3
+
+
+def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeypatch, capsys):
+    few = latency_charts.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
+    few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
+    monkeypatch.setattr(latency_charts, "plan", lambda case: few)
+    assert cli.main(["arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    ends = [f"{name}.{end}" for name in ("arm-force", "arm-speed", "arm-thickness") for end in ("png", "svg")]
+    assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
+    assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == sorted([*ends, "arm-charts.csv"])
+
+
+def test_charts_of_an_arm_at_rest_are_refused(capsys):
+    assert cli.main(["arm", "--case", "push", "--charts"]) == 1
+    assert "behaviour is 'comply' at 0 m/s" in capsys.readouterr().err
+
+
+def test_the_arm_needs_no_more_than_the_simulation():
+    arm = "contactfpga_sim.studies.arm"
+    code = f"import sys, {arm}.command, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_charts_of_a_few_points(nothing_kept, tmp_path):
+    tasks = latency_charts.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
+    few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})
+    steps = []
+    with ThreadPoolExecutor(2) as workers:
+        points = sweep.sweep(few.all, workers, lambda name, of: steps.append(of))
+    assert steps == [len(few.all)] * len(few.all)
+    found = dict(zip(few.all, points, strict=True))
+    at = found[few.force[1]]
+    set_run = run(sweep.unlimited(PAPER), "latency", latency_s=6e-3).outcome
+    assert at.peak_force_n == pytest.approx(set_run.peak_force_n, rel=1e-3)
+    assert at.force_before_n == pytest.approx(set_run.force_before_n, rel=1e-3)
+    assert at.takes_s == pytest.approx(6e-3, abs=1e-9)
+    slow, fast = (found[task] for task in few.speed["6 ms"])
+    assert slow.peak_force_n < fast.peak_force_n == pytest.approx(at.peak_force_n)
+    drawn = dataclasses.replace(few, sheet={"uart": few.force[:1], "pin": few.force[:1]})
+    paths = latency_charts.draw(PAPER, drawn, found, tmp_path, ("svg",))
+    assert [path.name for path in paths] == ["arm-force.svg", "arm-speed.svg", "arm-thickness.svg"]
+    texts = [path.read_text() for path in paths]
+    assert all("<svg" in text for text in texts)
+    assert "paper, 12 N" in texts[0]
+    assert latency_charts.draw(PAPER, drawn, found, tmp_path, ("svg",))[0].read_text() == texts[0]
+    text = latency_charts.write_csv(found, tmp_path / "arm.csv").read_text(encoding="utf-8")
+    lines = list(csv.DictReader(text.splitlines()))
+    assert len(lines) == len(found)
+    assert float(lines[1]["peak_force_n"]) == pytest.approx(at.peak_force_n, rel=1e-5)
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_the_page_and_its_pictures_are_what_the_command_writes(tmp_path, monkeypatch):
+    page = tmp_path / "arm.md"
+    page.write_text(
+        re.sub(r"(<!-- figures: \w+ -->).*?(<!-- end -->)", r"\1\n\2", PAGE, flags=re.DOTALL), encoding="utf-8"
+    )
+    monkeypatch.setattr(sys, "argv", ["study", str(page), str(tmp_path)])
+    assert arm_page.main() == 0
+    assert page.read_text(encoding="utf-8") == PAGE
+    drawn = sorted(tmp_path.glob("*.svg"))
+    assert len(drawn) == 5
+    for picture in drawn:
+        assert picture.read_text() == (Path(__file__).parents[2] / "docs/images" / picture.name).read_text(), (
+            picture.name
+        )

@@ -1,0 +1,219 @@
+"""Where the arm fails, and what catches it."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from contactfpga.cover import point
+from contactfpga.cover.switch import Switch
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.arm.case import Case, CaseError
+from contactfpga_sim.studies.arm.plant import Plant, finite
+from contactfpga_sim.studies.arm.run import run
+from contactfpga_sim.studies.arm.world import Faults
+
+PAPER = Case.load("paper")
+UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
+
+
+def at_rest(result):
+    return abs(result.course["speed_rad_s"][-1]) * 0.2 < 1e-3 and result.outcome.rest_s is not None
+
+
+def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
+    halfway = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
+    result = run(halfway, "uart")
+    outcome = result.outcome
+    assert outcome.closes_s is outcome.detected_s is None
+    assert outcome.zones == 0
+    assert outcome.reason == "torque"
+    assert at_rest(result)
+    needed = point.force_n(Switch(), 5e-3 * math.sqrt(2), 5e-3)
+    assert outcome.peak_force_n < needed / 3  # 64.8 N would close one
+    alone = run(halfway.but(control=UNLIMITED, run={"duration_s": 0.05}), "uart").outcome
+    assert alone.closes_s is None
+    assert alone.reason == ""
+
+
+def test_by_the_patchs_pressure_the_switch_closes_at_28_n_which_the_limit_does_not_wait_for():
+    """Huber's stress below a Hertz patch of R* = 38 mm, by hand: 3 F / (2 pi (a^2 + z^2)) = 1 N / 12.6 mm^2."""
+    wide = PAPER.but(model="hertz", control=UNLIMITED, link={"speed_m_s": 0.3}, run={"duration_s": 0.04})
+    course = run(wide, "torque").course
+
+    def stress(force):
+        patch2 = (0.75 * force * 0.038 / (PAPER.foam.stiffness * 0.75 / math.sqrt(0.038))) ** (2 / 3)
+        return 1.5 * force / (math.pi * (patch2 + 25e-6)) - 1 / 12.6e-6
+
+    closing = brentq(stress, 1.0, 100.0)
+    assert course["force_n"][course["closed"].argmax()] == pytest.approx(closing, rel=5e-3)
+    outcome = run(PAPER.but(model="hertz"), "latency").outcome
+    assert (outcome.reason, outcome.closes_s) == ("torque", None)
+
+
+def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
+    outcomes = [run(PAPER.but(link={"speed_m_s": speed}), "latency").outcome for speed in (0.3, 0.4, 0.5, 0.6)]
+    flat = [outcome.peak_indentation_m > 5e-3 for outcome in outcomes]
+    assert [outcome.bottomed for outcome in outcomes] == flat
+    assert flat == sorted(flat)
+    assert flat[0] is False
+    assert flat[-1] is True
+    hertz = [PAPER.foam.stiffness * outcome.peak_indentation_m**1.5 for outcome in outcomes]
+    for outcome, spring in zip(outcomes, hertz, strict=True):
+        if outcome.bottomed:
+            assert outcome.peak_force_n > 2 * spring
+        else:
+            assert outcome.peak_force_n == pytest.approx(spring, rel=1e-9)
+
+
+BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
+
+
+@pytest.mark.parametrize("way", ["pin", "uart"])
+def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
+    hunting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 0.0}), way)
+    assert hunting.outcome.reversals > 3
+    assert at_rest(hunting)
+    waiting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 2e-3}), way)
+    assert waiting.outcome.reversals == 1
+    assert waiting.outcome.reacts_s == hunting.outcome.reacts_s
+
+
+def test_the_boards_debounce_ends_the_hunting_by_uart_but_not_by_the_pin_which_is_not_debounced():
+    skin = Skin(debounce="asym_eager_defer_pk", debounce_press_us=2000.0, debounce_release_us=2000.0)
+    case = PAPER.but(switch=BOUNCING, control={"clear_s": 0.0})
+    by_uart, by_pin = run(case, "uart", skin=skin).outcome, run(case, "pin", skin=skin).outcome
+    assert by_uart.reversals == 1
+    assert by_uart.reacts_s == run(case, "uart").outcome.reacts_s  # eager: no later
+    assert by_pin.reversals > 3
+
+
+def delay_margin_s(case):
+    """How much later the measured speed may come until the loop through PI, current and inertia has no phase left.
+
+    A sampled loop holds its output for a period, half of which counts as delay.
+    """
+    motor, control = case.motor, case.control
+    inertia = case.link.inertia_kgm2 + motor.gear**2 * motor.rotor_kgm2
+
+    def loop(w):
+        s = 1j * w
+        pi = control.proportional + control.integral / s
+        lag = 1 + s * motor.inductance_h / (motor.resistance_ohm + motor.current_gain)
+        return motor.gear * motor.torque_constant * pi / lag / (inertia * s)
+
+    crossover = brentq(lambda w: abs(loop(w)) - 1, 1.0, 1e5)
+    return (math.pi + np.angle(loop(crossover))) / crossover - control.period_s / 2
+
+
+@pytest.mark.parametrize("proportional", [3.0, 6.0])
+def test_the_speed_loop_oscillates_from_the_latency_on_that_its_phase_margin_says(proportional):
+    def swing(delay_periods):
+        """Largest error of the speed soon after the arm turned back and left the contact, and half a second later."""
+        back = {"clear_s": 9.0, "retreat_m": 9.0, "delay_s": delay_periods * 0.25e-3, "proportional": proportional}
+        case = PAPER.but(control={**UNLIMITED, **back}, run={"step_s": 25e-6, "duration_s": 0.55})
+        course = run(case, "latency").course
+        error = np.abs(course["speed_rad_s"] + 0.23 / 0.2)
+        time = course["time_s"]
+        return error[(time > 0.04) & (time < 0.06)].max(), error[time > 0.53].max()
+
+    margin = delay_margin_s(PAPER.but(control={"proportional": proportional})) / 0.25e-3
+    for periods, stays in ((math.floor(0.9 * margin), False), (math.ceil(1.1 * margin), True)):
+        early, late = swing(periods)
+        assert (late > 0.1) == stays, (periods, early, late)
+        assert late > 0.5 * early or not stays
+
+
+def test_a_step_that_is_too_long_is_refused_and_would_blow_up():
+    """Runge-Kutta of order 4 is stable to 2.785 time constants; the current's is 0.125 ms."""
+    with pytest.raises(CaseError, match=r"step_s is 5e-05; it must be at most 3.125e-05 s"):
+        PAPER.but(run={"step_s": 50e-6})
+    plant = Plant(PAPER.but(motor={"supply_v": 1e12}))  # no limit that would hide it
+    for share, stays in ((2.7, True), (2.9, False)):
+        state = (-1.0, 0.0, 1.0)
+        for number in range(400):
+            state = plant.step(number * 1e-4, state, 0.0, share * PAPER.motor.time_constant_s)
+        assert (abs(state[2]) < 1) == stays
+        assert finite(state)
+
+
+def test_two_contacts_at_once_are_two_zones_and_both_are_left():
+    near = {"x_mm": 20.0, "y_mm": 80.0, "lever_m": 0.16}
+    two = PAPER.but(touch=({}, near))
+    result = run(two, "uart")
+    outcome = result.outcome
+    assert outcome.zones == 2
+    assert outcome.reversals == 1
+    assert at_rest(result)
+    assert result.course["force_n"][-1] == 0
+    apart = 0.2 * result.course["angle_rad"].max(), 0.16 * result.course["angle_rad"].max()
+    peaks = sum(PAPER.foam.stiffness * depth**1.5 for depth in apart)  # both are deepest at the same moment
+    assert outcome.peak_force_n == pytest.approx(peaks, rel=1e-9)
+    assert outcome.resolved_s < result.events[1][0]
+
+
+def test_the_torque_limit_lets_a_contact_near_the_joint_have_more_force():
+    """3 Nm are 15 N at 0.2 m, but 30 N at 0.1 m; the sheet does not care."""
+    far, near = ({"x_mm": 85.0, "y_mm": 85.0, "lever_m": lever} for lever in (0.2, 0.1))
+    forces = [run(PAPER.but(touch=(one,), link={"speed_m_s": 0.4}), "torque").outcome for one in (far, near)]
+    assert forces[1].force_before_n > 1.7 * forces[0].force_before_n
+    assert forces[0].reason == forces[1].reason == "torque"
+
+
+def test_a_contact_between_switches_beside_one_on_a_switch_is_not_seen_but_is_left_all_the_same():
+    two = PAPER.but(touch=({}, {"x_mm": 25.0, "y_mm": 25.0}))
+    outcome = run(two, "uart").outcome
+    assert outcome.zones == 1
+    assert outcome.reason == "contact"
+    assert outcome.rest_s is not None
+
+
+def test_a_saturated_sensor_still_trips_the_limit_and_a_limit_it_cannot_read_is_refused():
+    with pytest.raises(CaseError, match=r"torque_limit_nm is 3.0; the sensor reads 2.9 Nm at most"):
+        PAPER.but(control={"sensor_nm": 2.9})
+    fast = run(PAPER.but(link={"speed_m_s": 0.6}), "torque").outcome
+    assert fast.torque_before_nm > 3.0  # past the range at the sample
+    assert fast.reason == "torque"
+
+
+@pytest.mark.parametrize("dies_s", [8e-3, 15e-3])
+@pytest.mark.parametrize(("way", "who"), [("pin", "board"), ("uart", "board"), ("uart", "host")])
+def test_a_board_or_host_that_dies_in_a_contact_does_not_drive_the_arm_back_for_ever(way, who, dies_s):
+    result = run(PAPER, way, faults=Faults(**{f"{who}_dies_s": dies_s}))
+    assert [reason for _, _, reason in result.events] == ["contact", "retreat", "rest"]
+    assert at_rest(result)
+    assert result.course["force_n"][-1] == 0
+    lever = PAPER.link.lever_m
+    gone = lever * (result.course["angle_rad"].max() - result.course["angle_rad"].min())
+    ramp = PAPER.control.reverse_m_s**2 / (2 * PAPER.control.slowing_m_s2)
+    assert gone < PAPER.control.retreat_m + ramp + 3e-3
+
+
+@pytest.mark.parametrize(("way", "who"), [("pin", "board"), ("uart", "board"), ("uart", "host")])
+def test_one_that_dies_before_the_contact_leaves_it_to_the_torque_limit(way, who):
+    result = run(PAPER, way, faults=Faults(**{f"{who}_dies_s": 4e-3}))
+    assert result.outcome.reason == "torque"
+    assert at_rest(result)
+    limited = run(PAPER, "torque").outcome
+    assert result.outcome.peak_force_n == pytest.approx(limited.peak_force_n, rel=1e-9)
+
+
+def test_a_board_that_speaks_more_rarely_than_the_watchdog_waits_is_refused():
+    with pytest.raises(
+        CaseError, match=r"keep_alive_ms is 100; without a frame the controller stops the arm after 0.02 s"
+    ):
+        run(PAPER, "uart", skin=Skin(send="on_change"))
+
+
+@pytest.mark.parametrize("who", ["board", "host"])
+def test_an_arm_that_hears_nothing_any_more_stops_before_it_touches(who):
+    dies = -5e-3
+    far = PAPER.but(touch=({"gap_m": 0.03},))
+    result = run(far, "uart", faults=Faults(**{f"{who}_dies_s": dies}))
+    stopped, state, reason = result.events[0]
+    assert (state, reason) == ("stopped", "silence")
+    watchdog = PAPER.control.watchdog_s
+    assert dies < stopped <= dies + watchdog + PAPER.usb.timer_s + PAPER.usb.host_s + 2 * PAPER.control.period_s
+    assert result.outcome.peak_force_n == 0
+    assert at_rest(result)

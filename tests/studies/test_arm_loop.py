@@ -1,0 +1,189 @@
+"""The arm's loop through the compiled gateware and the real driver, against the golden model and simple sums."""
+
+import dataclasses
+import functools
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+from contactfpga.cover.latency import latency_s
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.wire import protocol
+from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.studies.arm.run import run
+from contactfpga_sim.studies.arm.usb import Chip
+from contactfpga_sim.studies.arm.world import Faults
+
+SKIN = Skin()
+PAPER = Case.load("paper")
+DIRECT = PAPER.but(usb={"timer_s": 0.0, "frame_s": 10e-6, "host_s": 0.0})
+"""Bytes come to the program as they are, to the next step."""
+STEP = PAPER.run.step_s
+LEAD = PAPER.run.lead_s
+
+
+@functools.cache
+def paper(way):
+    return run(PAPER, way)
+
+
+@functools.cache
+def direct():
+    return run(DIRECT, "uart").outcome
+
+
+@pytest.fixture
+def by_pin():
+    return paper("pin")
+
+
+@pytest.fixture
+def by_uart():
+    return paper("uart")
+
+
+@pytest.fixture(scope="module")
+def golden():
+    """What the golden model says of a sheet whose switch at (8, 8) closes when ours does."""
+    cells = np.zeros((SKIN.rows, SKIN.columns), bool)
+    cells[8, 8] = True
+    closes = round((paper("pin").outcome.closes_s + LEAD) * SKIN.clock_hz)
+    return predict(SKIN, Timeline([(closes, cells, None)]), closes + 8 * Derived(SKIN).frame_clocks)
+
+
+def frame_ends(trace):
+    """Times in s from the touch at which the stop bits of frames with a zone end."""
+    ends, packet = [], bytearray()
+    for cycle, value in trace.bytes:
+        if value != protocol.DELIMITER:
+            packet.append(value)
+            continue
+        if not packet:  # in front of a hello
+            continue
+        plain = protocol.unseal(bytes(packet), protocol.check_prefix(SKIN))
+        packet.clear()
+        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, Derived(SKIN)).cells:
+            ends.append((cycle + 1 + 10 * Derived(SKIN).bit_clocks) / SKIN.clock_hz - LEAD)
+    return ends
+
+
+def test_the_pin_rises_in_the_clock_in_which_the_golden_model_says(by_pin, golden):
+    cycle = next(cycle for cycle, level in golden.contact if level)
+    assert by_pin.outcome.detected_s == pytest.approx(cycle / SKIN.clock_hz - LEAD, abs=1e-9)
+
+
+def test_the_driver_hands_over_the_first_frame_that_the_golden_model_sends(golden):
+    detected = direct().detected_s
+    assert 0 <= detected - frame_ends(golden)[0] <= 2 * STEP
+
+
+def test_the_usb_chip_and_the_host_add_their_time(by_uart, golden):
+    usb = PAPER.usb
+    late = by_uart.outcome.detected_s - frame_ends(golden)[0]
+    assert usb.host_s <= late <= usb.timer_s + usb.frame_s + usb.host_s + 2 * STEP
+    assert by_uart.outcome.detected_s > direct().detected_s
+
+
+def test_what_comes_together_in_a_usb_packet_is_heard_at_once(by_uart):
+    times = [at for at, _ in by_uart.heard if at > 0]
+    packets = np.array([at for at, _ in itertools.groupby(times)])
+    assert (np.diff(packets) >= PAPER.usb.timer_s - STEP).all()
+    counts = [len(list(group)) for _, group in itertools.groupby(times)]
+    assert max(counts) == 11  # frames take 96 us, the timer 1 ms
+
+
+def test_detection_is_no_later_than_the_sum_of_its_bounds(by_pin, by_uart):
+    scan = Derived(SKIN).frame_clocks / SKIN.clock_hz
+    assert by_pin.outcome.detected_s - by_pin.outcome.closes_s <= scan + 3e-6
+    usb = PAPER.usb
+    bound = latency_s(SKIN) + usb.timer_s + usb.frame_s + usb.host_s
+    assert by_uart.outcome.detected_s - by_uart.outcome.closes_s <= bound
+    for outcome in (by_pin.outcome, by_uart.outcome):
+        assert 0 <= outcome.reacts_s - outcome.detected_s <= PAPER.control.period_s
+
+
+def test_sooner_is_softer(by_pin, by_uart):
+    alone = paper("torque").outcome
+    late = paper("latency").outcome
+    forces = [one.peak_force_n for one in (by_pin.outcome, by_uart.outcome, late, alone)]
+    assert forces == sorted(forces)
+    assert forces[0] < 0.6 * forces[2]
+    assert alone.reason == "torque"
+    assert alone.detected_s is None
+
+
+@pytest.mark.parametrize("way", ["latency", "pin", "uart", "torque"])
+def test_the_arm_goes_back_until_nothing_is_closed_then_slows_to_rest(way):
+    result = paper(way)
+    outcome = result.outcome
+    assert [state for _, state, _ in result.events] == ["reversing", "slowing", "resting"]
+    slows = result.events[1][0]
+    assert outcome.closes_s < outcome.reacts_s < outcome.resolved_s < slows < outcome.rest_s
+    end = result.course[-1]
+    assert end["force_n"] == 0
+    assert abs(end["speed_rad_s"]) * 0.2 < 1e-3
+
+
+def test_a_byte_damaged_on_the_wire_costs_a_frame(golden):
+    """One byte of the first frame that tells of the contact: the next frame does, 96 us later."""
+    first, second = frame_ends(golden)[:2]
+    byte = 10 * Derived(SKIN).bit_clocks / SKIN.clock_hz
+    clean = direct()
+    noisy = run(DIRECT, "uart", faults=Faults(noise_s=(first - 8.5 * byte, first - 7.5 * byte))).outcome
+    assert noisy.detected_s - clean.detected_s == pytest.approx(second - first, abs=2 * STEP)
+    assert noisy.reacts_s >= clean.reacts_s
+
+
+def test_noise_delays_the_reaction_and_costs_force(by_uart):
+    noise = Faults(noise_s=(by_uart.outcome.closes_s, by_uart.outcome.closes_s + 4e-3))
+    noisy = run(PAPER, "uart", faults=noise).outcome
+    assert noisy.detected_s > noise.noise_s[1]
+    assert noisy.reason == "contact"
+    assert noisy.peak_force_n > 1.3 * by_uart.outcome.peak_force_n
+
+
+@pytest.mark.parametrize("timer_ms", [1, 16])
+def test_the_chip_sends_when_its_timer_runs_out_or_a_packet_is_full(timer_ms):
+    """A byte a microframe of 125 us; and 600 of them at once."""
+    usb = dataclasses.replace(PAPER.usb, timer_s=timer_ms * 1e-3)
+    chip, came = Chip(usb), []
+    for frame in range(1, 1200):
+        if frame < 1000:
+            chip.put((frame - 0.5) * usb.frame_s, frame % 256)
+        if frame == 644:
+            for _ in range(600):
+                chip.put((frame - 0.5) * usb.frame_s, 0)
+        came.append(len(chip.take(frame * usb.frame_s)))
+    period = timer_ms * 8
+    assert [frame + 1 for frame in range(640) if came[frame]] == list(range(period, 641, period))
+    assert set(came[:640]) == {0, period}
+    assert came[643] == 510
+    assert sum(came) == 999 + 600
+
+
+def test_a_latency_timer_left_at_16_ms_costs_what_a_full_packet_takes(golden, by_uart):
+    """A frame of 17 bytes every 96 us fills a packet in 3 ms, which is sooner; still it costs force."""
+    leads = [LEAD + 4 * number * PAPER.control.period_s for number in range(3)]
+    outcomes = [run(PAPER.but(usb={"timer_s": 16e-3}, run={"lead_s": lead}), "uart").outcome for lead in leads]
+    full = 510 / 17 * Derived(SKIN).frame_clocks / SKIN.clock_hz
+    worst = max(one.detected_s for one in outcomes) - frame_ends(golden)[0]
+    assert PAPER.usb.timer_s + PAPER.usb.frame_s + PAPER.usb.host_s < worst < full + 3 * PAPER.usb.frame_s
+    assert max(one.peak_force_n for one in outcomes) > by_uart.outcome.peak_force_n + 1
+
+
+def test_halving_the_step_changes_nothing_by_more_than_a_hundredth_through_the_gateware(by_uart):
+    fine = run(PAPER.but(run={"step_s": STEP / 2}), "uart").outcome
+    for field in dataclasses.fields(fine):
+        value = getattr(fine, field.name)
+        found = getattr(by_uart.outcome, field.name)
+        assert found == (pytest.approx(value, rel=0.01) if isinstance(value, float) else value), field.name
+
+
+def test_a_whole_run_takes_seconds(by_uart):
+    started = time.perf_counter()
+    run(PAPER, "uart")
+    assert time.perf_counter() - started < 10

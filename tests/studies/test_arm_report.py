@@ -1,0 +1,189 @@
+"""`contactfpga arm`: its table, its pictures, its cases, and the push that it yields to."""
+
+import dataclasses
+import functools
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga import cli
+from contactfpga_sim.pages import arm_page, figures
+from contactfpga_sim.studies.arm import command, comply, report
+from contactfpga_sim.studies.arm.case import Case, CaseError, names
+from contactfpga_sim.studies.arm.run import run
+
+PAPER = Case.load("paper")
+PUSH = Case.load("push")
+
+
+@pytest.fixture(scope="module")
+def found():
+    return report.columns(PAPER, "paper", 6e-3)
+
+
+@pytest.fixture
+def ran_before(found, monkeypatch):
+    """The command's runs, without running them again."""
+    asked = []
+    monkeypatch.setattr(report, "columns", lambda *given: asked.append(given) or found)
+    yield found
+    assert asked == [(PAPER, "paper", pytest.approx(6e-3), None)]
+
+
+def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert cli.main(["arm", "--output", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    full = next(line for line in lines if line.startswith("speed stays positive"))  # has a cell in every column
+    ends = [cell.end() for cell in re.finditer(r"\S+(?: \S+)*", full)]
+    begin = next(number for number, line in enumerate(lines) if line.startswith("switch closes"))
+    ends[0] = len("sensor torque before the reaction, Nm")
+    table = [
+        [line[first:last].strip() for first, last in zip([0, *ends], ends)]
+        for line in lines[begin : begin + len(report.ROWS) + 1]
+    ]
+    cells = {name: others for name, *others in table}
+    assert len(cells) == len(report.ROWS) + 1
+    late, by_uart = ran_before["6 ms"].outcome, ran_before["UART"].outcome
+    before = ["2.3", "2.54", f"{late.torque_before_nm:.2f}", "+11 %"]
+    assert cells["sensor torque before the reaction, Nm"][:4] == before
+    assert cells["contact force at the reaction, N"][0] == "12"
+    assert cells["speed stays positive for, ms"][:4] == ["5", "5.05", "5.05", "+1 %"]
+    assert cells["peak force, N"][2] == f"{late.peak_force_n:.2f}"
+    assert cells["peak force, N"][4] == f"{by_uart.peak_force_n:.2f}"
+    assert cells["because of"][2:] == ["contact", "", "contact", "contact", "torque", "torque", "contact"]
+    said = " ".join(lines)
+    assert "chosen, not measured" in said
+    assert "The paper takes its 12 N as the force at which the switch closes" in said
+    pictures = {path.name for path in tmp_path.iterdir()}
+    assert pictures == {f"arm-{name}.{end}" for name in ("fig6-speed", "fig7-torque") for end in ("png", "svg")}
+    assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
+
+
+def test_the_columns_are_what_they_are_called(found):
+    assert list(found) == ["6 ms", "UART", "pin", "limit alone", "at 12 N, 6 ms", "at 12 N, no limit"]
+    outcomes = [result.outcome for result in found.values()]
+    assert [outcome.reason for outcome in outcomes] == ["contact"] * 3 + ["torque"] * 2 + ["contact"]
+    closing = [result.course["force_n"][result.course["closed"].argmax()] for result in found.values()]
+    assert closing[:4] == pytest.approx([4.1556] * 4, rel=0.01)
+    assert closing[4:] == pytest.approx([12.0] * 2, rel=0.01)
+    assert outcomes[5].reacts_s - outcomes[5].closes_s == pytest.approx(6e-3, abs=0.25e-3)
+    assert outcomes[1].zones == 1
+
+
+def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_before):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["arm", "--json"]) == 0
+    known = json.loads(capsys.readouterr().out)
+    assert known["runs"] == {name: dataclasses.asdict(result.outcome) for name, result in ran_before.items()}
+    for field, printed in known["paper"].items():
+        ours = known["runs"]["6 ms"][field]
+        assert known["deviation_from_paper"][field] == pytest.approx(ours / printed - 1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsys, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('like = "paper"\n[link]\nspeed_m_s = 0.1\n')
+    assert cli.main(["arm", "--case", str(path), "--json", "--latency", "3"]) == 0
+    known = json.loads(capsys.readouterr().out)
+    assert "paper" not in known
+    assert list(known["runs"]) == ["3 ms", "UART", "pin", "limit alone"]
+    assert known["runs"]["3 ms"]["peak_force_n"] < 12
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[link]\ninertia_kgm2 = 1\nlever_m = 1\nspeed_m_s = 1\n", "the part [motor] is missing"),
+        ('like = "paper"\n[arm]\n', "unknown part 'arm'"),
+        ('like = "paper"\n[foam]\nthick = 1\n', "unknown key 'thick' in [foam]"),
+        ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
+        ('like = "paper"\n[foam]\npoisson = 0.7\n', "poisson is 0.7"),
+        ('like = "paper"\n[control]\nbehaviour = "flee"\n', "behaviour is 'flee'; it must be one of reverse, comply"),
+        (
+            'like = "paper"\n[control]\nperiod_s = 0.255e-3\n',
+            "period_s is 0.000255; it must be a whole number of times",
+        ),
+        ('like = "paper"\n[run]\nstep_s = 1e-4\n', "step_s is 0.0001; it must be at most 3.125e-05"),
+        ('like = "paper"\n[run]\nstep_s = 3.125e-6\n', "step_s is 3.125e-06; it must be a whole number of clocks"),
+        ('like = "paper"\ntouch = []\n', "touch is empty"),
+        ('like = "nobody"\n', "case 'nobody' is not known"),
+        ("x = \n", "not a TOML file"),
+        ('like = "paper"\n[[touch]]\nx_mm = 156.0\n', "x_mm of a touch is 156; the sheet ends at 155 mm"),
+    ],
+)
+def test_a_case_that_cannot_be_is_refused_with_its_value(tmp_path, capsys, text, said):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert cli.main(["arm", "--case", str(path), "--json"]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_every_case_that_comes_along_is_known_and_differs_from_the_paper():
+    assert names() == ["paper", "paper-offset", "push"]
+    assert Case.load("paper-offset") == PAPER.but(touch=({"x_mm": 83.6344},))
+    assert tomllib.loads((Path(command.__file__).parent / "cases/push.toml").read_text())["like"] == "paper"
+
+
+def test_the_arm_yields_to_a_push_and_returns_and_the_torque_stays_below_the_limit():
+    fastest = comply.fastest_m_s(PUSH)
+    push, result = comply.pushed(PUSH, fastest)
+    assert not result.events
+    assert push.peak_torque_nm < 3.0
+    assert np.abs(result.course["sensor_nm"]).max() == push.peak_torque_nm
+    assert push.yields_m == pytest.approx(PUSH.touch[0].push_m, rel=0.25)
+    assert push.back_s < PUSH.run.duration_s
+    assert 0.2 * abs(result.course["angle_rad"][-1]) < comply.BACK_M
+    beyond = comply.pushed(PUSH.but(run={"duration_s": 0.2}), fastest + 0.01)[0]
+    assert beyond.peak_torque_nm >= 3.0
+    assert fastest > 0.2
+
+
+def test_a_slow_push_is_held_by_the_virtual_spring_alone():
+    """While it is held: foam force times lever is the spring's torque; the foam takes its part of the way."""
+    case = PUSH.but(touch=({"push_m_s": 0.1, "hold_s": 1.0},), run={"duration_s": 0.9})
+    result = run(case, "torque")
+    held = result.course[-1]
+    spring = -case.control.virtual_stiffness * held["angle_rad"]
+    assert held["sensor_nm"] == pytest.approx(spring, rel=0.02)
+    assert 0.2 * held["force_n"] == pytest.approx(spring, rel=0.02)
+    assert held["indentation_m"] - 0.2 * held["angle_rad"] == pytest.approx(0.03, rel=1e-6)
+
+
+def test_a_push_of_an_arm_that_does_not_comply_is_refused():
+    with pytest.raises(CaseError, match="behaviour is 'reverse'"):
+        comply.pushed(PAPER, 0.1)
+
+
+def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
+    monkeypatch.setattr(comply, "fastest_m_s", lambda case: 0.25)
+    monkeypatch.setattr(command, "SHARES", (1.0, 1.4))
+    monkeypatch.setattr(comply, "pushed", functools.cache(comply.pushed))
+    assert cli.main(["arm", "--case", "push", "--json"]) == 0
+    known = json.loads(capsys.readouterr().out)
+    assert [push["stopped"] for push in known["pushes"]] == [False, True]
+    assert known["pushes"][0]["speed_m_s"] == known["fastest_m_s"] == 0.25
+    assert known["pushes"][1]["back_s"] is None
+    assert cli.main(["arm", "--case", "push"]) == 0
+    said = capsys.readouterr().out
+    assert "stays below 3 Nm up to a push of 0.250 m/s" in said
+    assert "torque limit" in said
+
+
+PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
+
+
+def test_the_pages_set_is_what_the_command_gives(found):
+    assert figures.update(PAGE, {"set": lambda: arm_page.set_table(found)}) == PAGE
+
+
+def test_the_page_has_a_section_for_every_table():
+    assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == ["set", "sheet", "speeds", "pushes", "failures", "steps"]
+    assert figures.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
+        "<!-- figures: steps -->\nnew\n<!-- end -->"
+    )

