@@ -69,10 +69,10 @@ SETTINGS: dict[str, Any] = {
 def new(height_in: float) -> Figure:
     """A figure of the page's width whose parts make room for one another, on a card."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
     from matplotlib.patches import FancyBboxPatch
 
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
     rounded = f"round,pad=0,rounding_size={8 / 96}"
     card = FancyBboxPatch(
         (0, 0), WIDTH_IN, height_in, boxstyle=rounded, transform=figure.dpi_scale_trans, fc=CARD, ec="none", zorder=-10
