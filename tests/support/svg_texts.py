@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 import re
 import xml.etree.ElementTree as ElementTree
@@ -35,11 +37,22 @@ class Picture(NamedTuple):
     words: tuple[Words, ...]
 
 
+@functools.cache
 def read(path: Path) -> Picture:
     """The texts of the picture in this file."""
     root = ElementTree.parse(path).getroot()
     _, _, width, height = map(float, root.attrib["viewBox"].split())
     return Picture(width, height, tuple(_walk(root, np.eye(3), {})))
+
+
+def overlapping(picture: Picture) -> list[tuple[str, str]]:
+    """Every two texts that lie on each other."""
+    least = np.array([one.corners.min(axis=0) for one in picture.words])
+    most = np.array([one.corners.max(axis=0) for one in picture.words])
+    near = (least[:, None] < most[None]).all(axis=2) & (least[None] < most[:, None]).all(axis=2)
+    pairs = [pair for pair in itertools.combinations(range(len(least)), 2) if near[pair]]
+    words = [(picture.words[first], picture.words[second]) for first, second in pairs]
+    return [(one.text, other.text) for one, other in words if overlap(one, other)]
 
 
 def overlap(one: Words, other: Words) -> bool:
@@ -79,15 +92,20 @@ def _words(text: str, node: ElementTree.Element, places: np.ndarray, style: dict
     size = float(style.get("font-size", "16").removesuffix("px"))
     weight = "bold" if style.get("font-weight", "") in ("bold", "600", "700") else "normal"
     family = "DejaVu Sans Mono" if "mono" in style.get("font-family", "").lower() else "DejaVu Sans"
-    path = TextPath((0, 0), text, size=size, prop=FontProperties(family=family, weight=weight), usetex=False)
-    advance = path.get_extents().x1
-    left = {"middle": -advance / 2, "end": -advance}.get(style.get("text-anchor", ""), 0.0)
-    ink = path.get_extents()
+    start, end, low, high = (size * share for share in _ink(text, family, weight))
+    left = {"middle": -end / 2, "end": -end}.get(style.get("text-anchor", ""), 0.0)
     x, y = float(node.get("x", 0)) + left, float(node.get("y", 0))
-    box = [(ink.x0 + x, y - ink.y1), (ink.x1 + x, y - ink.y1), (ink.x1 + x, y - ink.y0), (ink.x0 + x, y - ink.y0)]
+    box = [(start + x, y - high), (end + x, y - high), (end + x, y - low), (start + x, y - low)]
     corners = (places @ np.array([(*corner, 1.0) for corner in box]).T).T[:, :2]
     scale = math.sqrt(abs(np.linalg.det(places[:2, :2])))
     return Words(text, size * scale, corners)
+
+
+@functools.cache
+def _ink(text: str, family: str, weight: str) -> tuple[float, float, float, float]:
+    """From where to where the letters reach along the line and above it, for a font of size 1."""
+    ink = TextPath((0, 0), text, size=100, prop=FontProperties(family=family, weight=weight)).get_extents()
+    return ink.x0 / 100, ink.x1 / 100, ink.y0 / 100, ink.y1 / 100
 
 
 def _transform(text: str) -> np.ndarray:
