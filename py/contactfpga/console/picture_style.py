@@ -84,6 +84,6 @@ def new(height_in: float) -> Figure:
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a picture without the time at which it was drawn."""
-    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    figure.savefig(path, dpi=2 * 96, metadata=metadata)
+    drawn_with = {".svg": {"Date": None}, ".png": {"Software": None}}
+    figure.savefig(path, dpi=2 * 96, metadata=drawn_with.get(path.suffix))
     return path
