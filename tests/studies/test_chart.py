@@ -25,7 +25,7 @@ from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.chart import errors, front_picture, host, numbers, picture, speed, steady, study
 from contactfpga_sim.studies.chart.command import FAMILIES_DRAWN
-from contactfpga_sim.studies.chart.errors import Blob
+from contactfpga_sim.studies.chart.errors import Blob, Interval
 from contactfpga_sim.studies.chart.methods import EXTENT_MM, METHODS
 from contactfpga_sim.studies.chart.study import Task
 
@@ -279,6 +279,27 @@ def test_zero_has_a_place_of_its_own_on_the_axis_of_shares():
         zero, least, most = panel.transData.transform([(100, 0), (100, 0.01), (100, 1)])[:, 1]
         assert panel.bbox.y0 < zero < least - 5 < most < panel.bbox.y1
         assert "0 %" in [label.get_text() for label in panel.get_yticklabels()]
+
+
+def test_no_point_lies_outside_its_panel():
+    points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
+    far = dataclasses.replace(points[0].speed, median_us=9_000.0, worst_us=30_000.0)
+    wrong = {
+        kind: errors | {"barycenter_mm": Interval(170.0, 160.0, 180.0, 9)} for kind, errors in points[0].errors.items()
+    }
+    points.append(dataclasses.replace(points[0], speed=far, errors=wrong))
+    figures_ = [picture.picture(points), front_picture.picture(points)]
+    for panel in (panel for figure in figures_ for panel in figure.axes):
+        for x, y in (place for line in panel.lines if line.get_marker() != "None" for place in line.get_xydata()):
+            assert panel.get_xlim()[0] < x < panel.get_xlim()[1]
+            assert panel.get_ylim()[0] < y < panel.get_ylim()[1]
+    for name, panel in zip("ab", (figures_[0].axes[0], figures_[1].axes[0])):
+        assert max(x for line in panel.lines for x in line.get_xdata()) >= 9_000, name
+    points = [dataclasses.replace(point, speed=points[0].speed) for point in points[:2]]
+    figure = picture.picture(points)
+    figure.draw_without_rendering()
+    least, most = figure.axes[0].get_xlim()
+    assert [tick for tick in figure.axes[0].get_xticks() if least < tick < most] == [100, 200, 500, 1000]
 
 
 def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own():

@@ -89,13 +89,14 @@ def design_map(task: Task) -> Figure:
     thickness = np.linspace(1e-3, 2 * task.thickness_m, 120)
     pitch = np.linspace(1e-3, 2 * task.pitch_m, 120)
     levels = [5, 10, 20, 50, 100, 200, 500]
+    named = []
     for place, name in zip(places, ("halfspace", "bonded")):
         forces = _closing(task.switch, pitch[:, None] / math.sqrt(2), thickness[None, :], name)
         fits = (forces <= task.force_n) & (pitch[:, None] <= task.pitch_m) & (thickness <= task.thickness_m)
         place.contourf(1e3 * thickness, 1e3 * pitch, fits.astype(float), levels=[0.5, 1.5], colors=[FITS])
         lines = place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=levels, colors=COLORS[name], linewidths=0.8)
         tops = [_top(1e3 * thickness, 1e3 * pitch, forces <= level) for level in levels if (forces <= level).any()]
-        place.clabel(lines, fmt="%g N", fontsize=style.SMALL, colors=style.INK, manual=tops)
+        named.append((place, lines, tops))
         place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=[task.force_n], colors=style.INK, linewidths=2)
         place.axvline(1e3 * task.thickness_m, **LIMIT)
         place.axhline(1e3 * task.pitch_m, **LIMIT)
@@ -109,6 +110,11 @@ def design_map(task: Task) -> Figure:
         "within all limits": Patch(facecolor=FITS),
     }
     figure.legend(list(keys.values()), list(keys), loc="outside lower center", ncols=3)
+    figure.draw_without_rendering()  # the names turn with the lines, and need to know how these will lie
+    for place, lines, tops in named:
+        for text in place.clabel(lines, fmt="%g N", fontsize=style.SMALL, colors=style.INK, manual=tops):
+            if float(text.get_text().removesuffix(" N")) > task.force_n:  # on the card, where a limit may cross it
+                text.set_bbox({"facecolor": style.CARD, "edgecolor": "none", "pad": 0.5})
     return figure
 
 

@@ -6,6 +6,7 @@ make a difference. Every method of the chart is drawn, as measured: 12 MHz and 3
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga.console import picture_style as style
-from contactfpga_sim.studies.chart.picture import markers, reached_us
+from contactfpga_sim.studies.chart.picture import LENGTHS_MM, ends, error, markers, reached_us
 from contactfpga_sim.studies.chart.study import Point, front
 
 FAMILY = "fingers"
@@ -32,7 +33,6 @@ TICKS_US = {
     5000: "5 ms",
     10_000: "10 ms",
 }
-TICKS_MM = (0.5, 1, 2, 5, 10, 20)
 LINE = 10**0.13
 """By so much a line of words is below the one above, on the axis of errors."""
 
@@ -65,12 +65,12 @@ def picture(points: Sequence[Point]) -> Figure:
     """Error over time, the front by name."""
     figure = style.new(4.4)
     panel = figure.subplots()
-    _axes(panel)
-    places = [(reached_us(point), point.errors["total"]["barycenter_mm"].mean) for point in points]
+    _axes(panel, points)
+    places = [(reached_us(point), error(point, "barycenter_mm")) for point in points]
     best = front(places)
     for other in OTHERS:
         panel.axvline(other.us, color=style.ORANGE, linewidth=1.6, linestyle=style.DASHES[1])
-        panel.text(other.us * 1.05, ENDS_MM[1] * 0.9, other.label, va="top", **SMALL)
+        panel.text(other.us * 1.05, panel.get_ylim()[1] * 0.9, other.label, va="top", **SMALL)
     cells = [index for index, point in enumerate(points) if point.task.skin.report == "cells"]
     host = [index for index in cells if index not in best]
     for index, (point, place) in enumerate(zip(points, places, strict=True)):
@@ -86,10 +86,12 @@ def picture(points: Sequence[Point]) -> Figure:
     return figure
 
 
-def _axes(panel: Any) -> None:
-    panel.set(xscale="log", yscale="log", xlim=ENDS_US, ylim=ENDS_MM)
+def _axes(panel: Any, points: Sequence[Point]) -> None:
+    panel.set(xscale="log", yscale="log")
     panel.set_xticks(list(TICKS_US), TICKS_US.values())
-    panel.set_yticks(TICKS_MM, map("{:g}".format, TICKS_MM))
+    panel.set_yticks(LENGTHS_MM, map("{:g}".format, LENGTHS_MM))
+    panel.set_xlim(*ends((point.speed.worst_us + point.host_us for point in points), ENDS_US))
+    panel.set_ylim(*ends((error(point, "barycenter_mm") for point in points), ENDS_MM))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.yaxis.set_minor_locator(NullLocator())
     panel.set_xlabel("from touch to host: median, and a line to the slowest touch")
@@ -100,7 +102,7 @@ def _axes(panel: Any) -> None:
 
 def _mark(panel: Any, point: Point, place: tuple[float, float], color: str, shapes: dict[float, str]) -> None:
     x, y = place
-    hollow = point.errors["total"]["miscounted"].mean >= MISCOUNTED
+    hollow = error(point, "miscounted") >= MISCOUNTED
     front_or_host = color != style.GREY
     if front_or_host:
         panel.plot([x, point.speed.worst_us + point.host_us], [y, y], color=color, linewidth=1, alpha=0.6)
@@ -117,7 +119,7 @@ def _mark(panel: Any, point: Point, place: tuple[float, float], color: str, shap
 
 def _name_front(panel: Any, named: Sequence[tuple[str, float, float]]) -> None:
     """To the left of each point and below it, where nothing else can lie as it would be better in both."""
-    above = ENDS_MM[1]
+    above = math.inf
     for name, x, y in named:
         above = min(y / LINE**0.3, above / LINE)
         panel.text(x * 0.95, above, name, ha="right", va="top", **SMALL)

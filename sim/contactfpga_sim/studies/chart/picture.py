@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,11 +33,17 @@ class Metric(NamedTuple):
     scale: dict[str, Any]
     ticks: tuple[float, ...]
     ends: tuple[float, float]
+    """Of the axis, unless a point lies beyond."""
     show: Callable[[float], str]
 
 
+LENGTHS_MM = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200)
+TIMES_US = (20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000)
+"""Ticks, as far as an axis reaches."""
+
+ENDS_US = (85, 1200)
 METRICS = (
-    Metric("barycenter_mm", "barycenter error, mm", {"value": "log"}, (0.5, 1, 2, 5, 10, 20), (0.3, 40), "{:g}".format),
+    Metric("barycenter_mm", "barycenter error, mm", {"value": "log"}, LENGTHS_MM, (0.3, 40), "{:g}".format),
     Metric(
         "miscounted",
         "scenes miscounted",
@@ -46,8 +53,6 @@ METRICS = (
         lambda share: f"{100 * share:g} %",
     ),
 )
-TIMES_US = (100, 200, 500, 1000)
-"""Ticks of the axis of time."""
 
 
 def save(points: Sequence[Point], folder: Path) -> None:
@@ -66,6 +71,7 @@ def picture(points: Sequence[Point]) -> Figure:
     for row, family in zip(panels, families, strict=True):
         some = [point for point in points if point.task.family == family]
         for panel, metric in zip(row, METRICS, strict=True):
+            _axes(panel, points, metric)
             _panel(panel, some, metric)
             panel.set_ylabel(metric.label)
             panel.set_title(family, loc="left", fontweight="bold")
@@ -80,6 +86,18 @@ def picture(points: Sequence[Point]) -> Figure:
 def reached_us(point: Point) -> float:
     """Median from the touch to the zones at the host, labelled there if need be."""
     return point.speed.median_us + point.host_us
+
+
+def error(point: Point, name: str) -> float:
+    """Mean of the method's zones against the contacts."""
+    return point.errors["total"][name].mean
+
+
+def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
+    """An axis' usual ends, or such that all values lie between them."""
+    finite = [value for value in values if math.isfinite(value)]
+    least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
+    return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
 
 
 def kind(skin: Skin) -> str:
@@ -106,7 +124,8 @@ def markers(points: Sequence[Point]) -> dict[float, str]:
     return {pitch: MARKERS[index % len(MARKERS)] for index, pitch in enumerate(sorted(pitches))}
 
 
-def _panel(panel: Any, points: Sequence[Point], metric: Metric) -> None:
+def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
+    """Alike for all families."""
     panel.set_xscale("log")
     panel.set_yscale(**metric.scale)
     panel.set_xticks(TIMES_US, map(str, TIMES_US))
@@ -114,12 +133,16 @@ def _panel(panel: Any, points: Sequence[Point], metric: Metric) -> None:
     panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: metric.show(value)))
     panel.xaxis.set_minor_locator(NullLocator())
     panel.yaxis.set_minor_locator(NullLocator())
-    panel.set_ylim(*metric.ends)
+    panel.set_xlim(*ends(map(reached_us, points), ENDS_US))
+    panel.set_ylim(*ends((error(point, metric.name) for point in points), metric.ends))
     panel.tick_params(labelbottom=True)
     panel.grid()
     if metric.ticks[0] == 0:
         panel.axhline(0, color=style.SOFT, linewidth=0.8)
-    places = [(reached_us(point), point.errors["total"][metric.name].mean) for point in points]
+
+
+def _panel(panel: Any, points: Sequence[Point], metric: Metric) -> None:
+    places = [(reached_us(point), error(point, metric.name)) for point in points]
     best = front(places)
     panel.step(*np.array([places[index] for index in best]).reshape(-1, 2).T, where="post", color=style.INK, lw=0.8)
     _marks(panel, points, places)
