@@ -32,6 +32,7 @@ TICKS_US = {
     2000: "2 ms",
     5000: "5 ms",
     10_000: "10 ms",
+    20_000: "20 ms",
 }
 LINE = 10**0.13
 """By so much a line of words is below the one above, on the axis of errors."""
@@ -53,6 +54,8 @@ OTHERS = (
     Other(1000.0, "array read at 1 kHz:\none period"),
     Other(6000.0, "Battaglia et al.:\nsensing and\ncontrol, 6 ms"),
 )
+"""What an array's sampling alone takes at worst before anything is sent; and the latencies of scanning and of computing
+the control that the paper adds up in its Section IV."""
 
 
 def save(points: Sequence[Point], path: Path) -> Path:
