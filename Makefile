@@ -88,6 +88,7 @@ chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, in
 chart-page: $(VENV)/.stamp-chart | compiler ## the same for docs/chart.md, with its tables (half an hour)
 	$(VENV)/bin/contactfpga chart --output docs/chart $(ARGS)
 	$(PY) -m contactfpga_sim.pages.chart_page docs/chart.md
+	$(PY) -m contactfpga_sim.pages.chart_pictures
 
 fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
 	$(PY) -m contactfpga_sim.pages.fit_page docs/fit.md

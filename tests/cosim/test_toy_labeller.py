@@ -84,6 +84,21 @@ def test_the_chart_draws_it(tmp_path):
 
 def test_fit_tries_it(capsys):
     asked = ["fit", "bumper", "--labeller", "toy_labeller:TOY", "--labeller", "single", "--pitch-mm", "20"]
-    cli.main([*asked, "--scan", "raster", "--placements", "8", "--jobs", "1", "--miscounted", "none", "--missed", "none", "--json"])
+    cli.main(
+        [
+            *asked,
+            "--scan",
+            "raster",
+            "--placements",
+            "8",
+            "--jobs",
+            "1",
+            "--miscounted",
+            "none",
+            "--missed",
+            "none",
+            "--json",
+        ]
+    )
     found = json.loads(capsys.readouterr().out)
     assert "toy_labeller:TOY" in json.dumps(found)

@@ -116,5 +116,5 @@ def test_study_as_a_command(tmp_path, monkeypatch, capsys):
     assert formula_study.main() == 0
     assert "Plastazote" in page.read_text(encoding="utf-8")
     drawn = sorted(file.name for file in tmp_path.glob("*.svg"))
-    assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-formula_study.svg"]
+    assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]
     assert capsys.readouterr().out.count("drew ") == 4

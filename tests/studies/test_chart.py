@@ -7,6 +7,7 @@ import math
 import shlex
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,12 +20,12 @@ from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
 from contactfpga_sim.golden import zones
-from contactfpga_sim.pages import chart_page, figures
+from contactfpga_sim.pages import chart_page, chart_pictures, figures
 from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.chart import errors, host, numbers, picture, speed, steady, study
+from contactfpga_sim.studies.chart import errors, front_picture, host, numbers, picture, speed, steady, study
 from contactfpga_sim.studies.chart.command import FAMILIES_DRAWN
-from contactfpga_sim.studies.chart.errors import Blob
+from contactfpga_sim.studies.chart.errors import Blob, Interval
 from contactfpga_sim.studies.chart.methods import EXTENT_MM, METHODS
 from contactfpga_sim.studies.chart.study import Task
 
@@ -246,7 +247,7 @@ def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
 
 
 def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
-    """Picture and table of docs/chart.md come from docs/chart/chart.csv."""
+    """Pictures and table of docs/chart.md and README.md come from docs/chart/chart.csv."""
     monkeypatch.chdir(ROOT)
     points = numbers.read(chart_page.NUMBERS)
     assert {point.task.method for point in points} == set(METHODS)
@@ -254,8 +255,62 @@ def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     assert min(point.task.count for point in points) >= 1000
     picture.save(points, tmp_path)
     assert (tmp_path / "chart.svg").read_text() == (ROOT / "docs/chart/chart.svg").read_text()
+    front_picture.save(points, tmp_path / "front.svg")
+    assert (tmp_path / "front.svg").read_text() == (ROOT / chart_pictures.FRONT).read_text()
     page = (ROOT / "docs/chart.md").read_text()
     assert figures.update(page, {"front": chart_page.front_table}) == page
+
+
+def test_the_picture_of_the_front_names_it_and_what_it_is_compared_with(tmp_path):
+    points = [point for point in numbers.read(ROOT / chart_page.NUMBERS) if point.task.family == front_picture.FAMILY]
+    best = study.front([(picture.reached_us(one), one.errors["total"]["barycenter_mm"].mean) for one in points])
+    host = {point.task.method for point in points if point.task.skin.report == "cells"}
+    (panel,) = front_picture.picture(points).axes
+    named = {text.get_text() for text in panel.texts}
+    assert named == {points[index].task.method for index in best} | host | {one.label for one in front_picture.OTHERS}
+    times = {float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]}
+    assert times == {1000.0, 6000.0}
+    assert all(panel.get_xlim()[0] < picture.reached_us(point) < panel.get_xlim()[1] for point in points)
+
+
+def test_zero_has_a_place_of_its_own_on_the_axis_of_shares():
+    panels = picture.picture(numbers.read(ROOT / chart_page.NUMBERS)).axes
+    for panel in panels[1::2]:
+        zero, least, most = panel.transData.transform([(100, 0), (100, 0.01), (100, 1)])[:, 1]
+        assert panel.bbox.y0 < zero < least - 5 < most < panel.bbox.y1
+        assert "0 %" in [label.get_text() for label in panel.get_yticklabels()]
+
+
+def test_no_point_lies_outside_its_panel():
+    points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
+    far = dataclasses.replace(points[0].speed, median_us=9_000.0, worst_us=30_000.0)
+    wrong = {
+        kind: errors | {"barycenter_mm": Interval(170.0, 160.0, 180.0, 9)} for kind, errors in points[0].errors.items()
+    }
+    points.append(dataclasses.replace(points[0], speed=far, errors=wrong))
+    figures_ = [picture.picture(points), front_picture.picture(points)]
+    for panel in (panel for figure in figures_ for panel in figure.axes):
+        for x, y in (place for line in panel.lines if line.get_marker() != "None" for place in line.get_xydata()):
+            assert panel.get_xlim()[0] < x < panel.get_xlim()[1]
+            assert panel.get_ylim()[0] < y < panel.get_ylim()[1]
+    for name, panel in zip("ab", (figures_[0].axes[0], figures_[1].axes[0])):
+        assert max(x for line in panel.lines for x in line.get_xdata()) >= 9_000, name
+    points = [dataclasses.replace(point, speed=points[0].speed) for point in points[:2]]
+    figure = picture.picture(points)
+    figure.draw_without_rendering()
+    least, most = figure.axes[0].get_xlim()
+    assert [tick for tick in figure.axes[0].get_xticks() if least < tick < most] == [100, 200, 500, 1000]
+
+
+def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own():
+    points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
+    toy = SimpleNamespace(report="moments", scan="raster", labeller="toy", pitch_x_mm=7.0)
+    points.append(dataclasses.replace(points[0], task=dataclasses.replace(points[0].task, method="toy", skin=toy)))
+    before, found = picture.colors(points[:24]), picture.colors(points)
+    assert found == before | {"toy": found["toy"]}
+    assert len(set(found.values())) == len(found)
+    (legend,) = picture.picture(points).legends
+    assert {"toy", "pitch 7 mm"} <= {text.get_text() for text in legend.get_texts()}
 
 
 @pytest.mark.campaign

@@ -14,7 +14,7 @@ from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.pages import failures_page, figures
-from contactfpga_sim.studies.failures import electric, knob_pictures, line, shapes, touch
+from contactfpga_sim.studies.failures import axes, electric, knob_pictures, line, shapes, touch
 from contactfpga_sim.studies.failures.catalogue import STUDIES
 from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
 from contactfpga_sim.studies.failures.uart import Line
@@ -298,6 +298,48 @@ def test_a_picture_shows_every_value(turned):
         drawn = [knob_pictures._kind(outcome) for found in methods.values() for outcome in found.outcomes]
         assert bars == drawn
         assert len(root.findall(f"{space}polyline")) == len(methods)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_values_lie_true_to_scale(name):
+    values = STUDIES[name].values
+    spans, scale = axes.placed(values, 50.0, 400.0)
+    assert (spans[0].start, spans[-1].end) == (50.0, pytest.approx(450.0))
+    first = 1 if "0 stands apart" in scale else 0
+    there = np.log10(values[first:]) if scale else np.array(values, float)
+    unit = (spans[-1].middle - spans[first].middle) / (there[-1] - there[0])
+    for place, span in zip(there, spans[first:], strict=True):
+        assert span.middle == pytest.approx(spans[first].middle + unit * (place - there[0]))
+        assert span.start < span.middle < span.end
+
+
+def test_zero_and_what_is_unevenly_spaced_are_said():
+    assert axes.placed((0, 1, 2, 3), 0, 100)[1] == ""
+    assert axes.placed((3, 2, 1, 0), 0, 100)[1] == ""
+    assert axes.placed((1, 2, 4, 8), 0, 100)[1] == " (logarithmic)"
+    assert axes.placed((0, 1, 10, 100), 0, 100)[1] == " (logarithmic; 0 stands apart)"
+
+
+@pytest.mark.parametrize(
+    ("amounts", "ticks"),
+    [
+        ([0, 0], [0, 1]),
+        ([1, 2], [0, 1, 2]),
+        ([0.3, 1.0], [0, 0.25, 0.5, 0.75, 1]),
+        ([49, 0], [0, 20, 40, 60]),
+        ([2543], [0, 1000, 2000, 3000]),
+        ([3.87], [0, 1, 2, 3, 4]),
+    ],
+)
+def test_amounts_reach_at_most_the_top_of_the_frame(amounts, ticks):
+    assert axes.rounded_up(amounts) == ticks
+
+
+def test_the_highest_amount_is_drawn_where_its_axis_says(turned):
+    root = ElementTree.fromstring(knob_pictures.svg(STUDIES["winding"], turned["winding"]))
+    lines = [line.get("points").split() for line in root.iter("{http://www.w3.org/2000/svg}polyline")]
+    heights = {float(point.partition(",")[2]) for line in lines for point in line}
+    assert heights == {knob_pictures.TOP, knob_pictures.TOP + knob_pictures.HIGH / 2}  # two zones, and one
 
 
 def test_the_command_writes_a_study(tmp_path, capsys):

@@ -8,10 +8,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
+from contactfpga.console import picture_style as style
+from contactfpga.console.picture_style import save
 from contactfpga.cover import elastic, impact, line, medium, motion, point
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.hertz import Ball
@@ -20,105 +22,118 @@ from contactfpga.cover.solve import Floats
 from contactfpga.cover.switch import Switch
 from contactfpga.cover.task import Task
 
-COLOURS = {"halfspace": "#2b6f9e", "bonded": "#d1495b", "frictionless": "#8a6fb0"}
-SETTINGS: dict[str, Any] = {
-    "svg.hashsalt": "contactfpga",
-    "svg.fonttype": "none",
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-}
+COLORS = {"halfspace": style.BLUE, "bonded": style.VERMILLION, "frictionless": style.GREEN}
+LIMIT: dict[str, Any] = {"color": style.SOFT, "linewidth": 1.0, "linestyle": style.DASHES[2]}
+FITS = "#cfe3d4"
 
 
 def draw(folder: Path, suffix: str, task: Task = FIRST_DESIGN, data: tuple[Floats, Floats] | None = None) -> list[Path]:
     """Every picture into ``folder`` as ``png`` or ``svg``; Fig. 9 only with ``data``: forces (N), deformations (m)."""
-    with matplotlib.rc_context(SETTINGS):
+    with matplotlib.rc_context(style.SETTINGS):
         figures = {"cover-force": force(task.switch), "cover-impact": course(task), "cover-map": design_map(task)}
         if data:
             figures["cover-line"] = deformation(*data)
         return [save(figure, folder / f"{name}.{suffix}") for name, figure in figures.items()]
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write a picture without the time at which it was drawn."""
-    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    figure.savefig(path, dpi=150, bbox_inches="tight", metadata=metadata)
-    return path
-
-
 def force(switch: Switch) -> Figure:
     """The two curves of the paper's Fig. 8, over three media: force over offset, 5 mm thick, and over thickness."""
-    figure = Figure(figsize=(8, 3.2))
-    left, right = figure.subplots(1, 2)
+    figure = style.new(3.5)
+    left, right = figure.subplots(1, 2, sharey=True)
     offsets, depths = np.linspace(0, 10e-3, 201), np.linspace(2e-3, 20e-3, 181)
-    for name in medium.MEDIA:
-        look: dict[str, Any] = {"color": COLOURS[name], "label": name}
+    for name, dashes in zip(medium.MEDIA, style.DASHES):
+        look: dict[str, Any] = {"color": COLORS[name], "label": name, "linestyle": dashes}
         left.plot(1e3 * offsets, _closing(switch, offsets, np.full(201, 5e-3), name), **look)
         right.plot(1e3 * depths, _closing(switch, np.full(181, WORST_M), depths, name), **look)
-    for place in (left, right):
-        place.set_ylim(0, 200)
-        place.set_ylabel("force that closes the switch, N")
-    left.axvline(1e3 * WORST_M, color="#999", lw=0.8, ls=":")
-    left.set_xlabel("distance from the switch, mm (cover 5 mm)")
-    right.set_xlabel("thickness, mm (7.07 mm from the switch)")
-    right.plot(1e3 * point.best_thickness_m(WORST_M), point.least_force_n(switch, WORST_M), "o", ms=4, color="#333")
-    left.legend()
+    left.axvline(1e3 * WORST_M, **LIMIT)
+    left.set(ylabel="force that closes the switch, N", ylim=(0, 200), xlim=(0, 10))
+    left.set_xlabel("distance from the switch, mm")
+    right.set(xlabel="thickness of the cover, mm", xlim=(0, 20))
+    left.set_title("cover 5 mm thick", loc="left")
+    right.set_title(f"{1e3 * WORST_M:.2f} mm from the switch", loc="left")
+    least_n = point.least_force_n(switch, WORST_M)
+    right.plot(1e3 * point.best_thickness_m(WORST_M), least_n, "o", ms=5, color=style.INK)
+    lines = [*left.get_lines()[:3], Line2D([], [], **LIMIT), right.get_lines()[-1]]
+    names = [*medium.MEDIA, f"farthest place, {1e3 * WORST_M:.2f} mm", f"least by halfspace: {least_n:.0f} N"]
+    figure.legend(lines, names, loc="outside lower center", ncols=5)
     return figure
 
 
 def course(task: Task) -> Figure:
     """Indentation, speed and force over time for the task's foams."""
-    figure = Figure(figsize=(8, 3.0))
+    figure = style.new(3.3)
     places = figure.subplots(1, 3)
-    for foam in task.foams[:6]:
+    for number, foam in enumerate(task.foams[:6]):
         stiffness = elastic.stiffness(Ball(task.radius_m, elastic.effective_modulus_pa(foam.modulus_pa, task.poisson)))
         hit = impact.strike(task.arm, task.speed_m_s, stiffness)
         if isinstance(hit, NoSolution):
             continue
         over = motion.course(task.arm, task.speed_m_s, stiffness, hit.compression_m)
+        look: dict[str, Any] = {"color": style.PALETTE[number], "linestyle": style.DASHES[number % len(style.DASHES)]}
         for place, values in zip(places, (1e3 * over.indentation_m, over.speed_m_s, over.force_n)):
-            place.plot(1e3 * over.time_s, values, label=foam.name)
+            place.plot(1e3 * over.time_s, values, label=foam.name, **look)
     for place, name in zip(places, ("pressed in, mm", "speed, m/s", "force, N")):
-        place.axvline(1e3 * task.latency_s, color="#999", lw=0.8, ls=":")
+        place.axhline(0, color=style.SOFT, linewidth=0.8)
+        place.axvline(1e3 * task.latency_s, label=f"the arm reacts, {1e3 * task.latency_s:g} ms", **LIMIT)
         place.set_xlabel("time since the touch, ms")
         place.set_ylabel(name)
-    places[0].legend()
-    figure.tight_layout()
+        place.set_xlim(left=0)
+    figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
 def design_map(task: Task) -> Figure:
     """The force felt everywhere over thickness and pitch, by the half-space and by the bonded layer, and the limits."""
-    figure = Figure(figsize=(8, 3.4))
+    figure = style.new(4.2)
     places = figure.subplots(1, 2, sharey=True)
     thickness = np.linspace(1e-3, 2 * task.thickness_m, 120)
     pitch = np.linspace(1e-3, 2 * task.pitch_m, 120)
-    levels = [2, 5, 10, 20, 50, 100, 200, 500]
+    levels = [5, 10, 20, 50, 100, 200, 500]
+    named = []
     for place, name in zip(places, ("halfspace", "bonded")):
         forces = _closing(task.switch, pitch[:, None] / math.sqrt(2), thickness[None, :], name)
-        lines = place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=levels, colors=COLOURS[name], linewidths=0.8)
-        place.clabel(lines, fmt="%g N")
-        place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=[task.force_n], colors="#333", linewidths=2)
         fits = (forces <= task.force_n) & (pitch[:, None] <= task.pitch_m) & (thickness <= task.thickness_m)
-        place.contourf(1e3 * thickness, 1e3 * pitch, fits.astype(float), levels=[0.5, 1.5], colors=["#e6efe0"])
-        place.axvline(1e3 * task.thickness_m, color="#999", lw=0.8, ls=":")
-        place.axhline(1e3 * task.pitch_m, color="#999", lw=0.8, ls=":")
-        place.set_title(f"{name}, limit {task.force_n:g} N")
+        place.contourf(1e3 * thickness, 1e3 * pitch, fits.astype(float), levels=[0.5, 1.5], colors=[FITS])
+        lines = place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=levels, colors=COLORS[name], linewidths=0.8)
+        tops = [_top(1e3 * thickness, 1e3 * pitch, forces <= level) for level in levels if (forces <= level).any()]
+        named.append((place, lines, tops))
+        place.contour(1e3 * thickness, 1e3 * pitch, forces, levels=[task.force_n], colors=style.INK, linewidths=2)
+        place.axvline(1e3 * task.thickness_m, **LIMIT)
+        place.axhline(1e3 * task.pitch_m, **LIMIT)
+        place.set_title(name, loc="left")
         place.set_xlabel("thickness, mm")
+        place.set(xlim=(0, 2e3 * task.thickness_m), ylim=(0, 2e3 * task.pitch_m))
     places[0].set_ylabel("pitch, mm")
+    keys = {
+        f"closes everywhere at {task.force_n:g} N": Line2D([], [], color=style.INK, linewidth=2),
+        f"at most {1e3 * task.thickness_m:g} mm thick, pitch {1e3 * task.pitch_m:g} mm": Line2D([], [], **LIMIT),
+        "within all limits": Patch(facecolor=FITS),
+    }
+    figure.legend(list(keys.values()), list(keys), loc="outside lower center", ncols=3)
+    figure.draw_without_rendering()  # the names turn with the lines, and need to know how these will lie
+    for place, lines, tops in named:
+        for text in place.clabel(lines, fmt="%g N", fontsize=style.SMALL, colors=style.INK, manual=tops):
+            if float(text.get_text().removesuffix(" N")) > task.force_n:  # on the card, where a limit may cross it
+                text.set_bbox({"facecolor": style.CARD, "edgecolor": "none", "pad": 0.5})
     return figure
+
+
+def _top(thickness: Floats, pitch: Floats, inside: np.ndarray) -> tuple[float, float]:
+    """Where a contour has room for its name: its highest place, or where it leaves the picture."""
+    high = np.where(inside.any(axis=0), pitch[len(pitch) - 1 - inside[::-1].argmax(axis=0)], 0.0)
+    column = int(np.argmax(np.minimum(high, 0.85 * pitch[-1])))
+    return float(thickness[column]), float(high[column])
 
 
 def deformation(force_n: Floats, deformation_m: Floats) -> Figure:
     """Measured points and their line, as the paper's Fig. 9."""
     fitted = line.fit(force_n, deformation_m)
-    figure = Figure(figsize=(4, 3.2))
+    figure = style.new(4.0)
     place = figure.subplots()
-    place.plot(force_n, 1e3 * deformation_m, "o", ms=3, color="#2b6f9e")
+    place.plot(force_n, 1e3 * deformation_m, "o", ms=4, color=style.BLUE)
     ends = np.array([min(0.0, force_n.min()), force_n.max()])
-    place.plot(ends, 1e3 * (fitted.offset_m + ends / fitted.stiffness_n_m), color="#333", lw=1)
-    place.set_title(f"{fitted.stiffness_n_m / 1e3:.4g} N/mm, correlation {fitted.correlation:.4f}")
+    place.plot(ends, 1e3 * (fitted.offset_m + ends / fitted.stiffness_n_m), color=style.INK, lw=1)
+    place.set_title(f"{fitted.stiffness_n_m / 1e3:.4g} N/mm, correlation {fitted.correlation:.4f}", loc="left")
     place.set_xlabel("force, N")
     place.set_ylabel("deformation, mm")
     return figure
@@ -131,64 +146,3 @@ def _closing(switch: Switch, offset_m: Floats, thickness_m: Floats, within: str)
     limit = medium.first_zero(within)
     pressed = spread > 0 if limit is None else ratio < limit
     return np.where(pressed, switch.closing_pa * thickness_m**2 / np.where(pressed, spread, 1.0), np.nan)
-
-
-def study(path: Path) -> Path:
-    """Error against time of the rules for the compression time, and of the models of sensitivity."""
-    with matplotlib.rc_context(SETTINGS):
-        figure = Figure(figsize=(8.5, 3.8))
-        left, right = figure.subplots(1, 2)
-        _rules(left)
-        _models(right)
-        for place in (left, right):
-            place.set_xscale("log")
-            place.set_yscale("log")
-            place.set_xlabel("time, µs")
-        figure.tight_layout()
-        return save(figure, path)
-
-
-def _rules(place: Any) -> None:
-    from contactfpga.cover import formula_study as measured
-
-    found = []
-    for rules, colour in ((measured.RULES, COLOURS["halfspace"]), (measured.FAILING, COLOURS["bonded"])):
-        for name, rule in rules.items():
-            error = abs(measured.relative_errors(rule)[0])
-            if math.isfinite(error):
-                takes = 1e6 * measured.seconds(lambda rule=rule: rule(measured.BLOWS[0]))  # type: ignore[misc]
-                found.append((max(error, 1e-15), takes, name.replace("*", ""), colour))
-    below = math.inf
-    for error, takes, name, colour in sorted(found, reverse=True):
-        below = min(error, below / 5)  # labels of rules that are alike go below each other
-        place.plot(takes, error, "o", ms=4, color=colour)
-        place.annotate(
-            name,
-            (takes, error),
-            xytext=(max(2.2 * takes, 60), below),
-            fontsize=6,
-            color=colour,
-            va="center",
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": colour},
-        )
-    place.set_xlim(0.3, 2e5)
-    place.set_ylim(1e-18, 1)
-    place.set_ylabel("error of the compression time")
-
-
-def _models(place: Any) -> None:
-    from contactfpga.cover import formula_study as measured
-
-    for number, model in enumerate(measured.LADDER):
-        for ball, mark in zip(measured.BALLS.values(), ("o", "x")):
-            sheet = measured.Sheet(measured.SWITCH, measured.THICKNESS_M, ball)
-            takes = 1e6 * measured.seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore
-            errors = [max(abs(one), 1e-4) for one in measured.sense_errors(model, ball) if math.isfinite(one)]
-            place.plot([takes] * len(errors), errors, mark, ms=4, color=COLOURS[model.within])
-            if mark == "o":
-                height = 20 if number % 2 else 9
-                place.annotate(str(model), (takes, height), fontsize=6, ha="center", color=COLOURS[model.within])
-    place.axhline(0.05, color="#999", lw=0.8, ls=":")
-    place.set_xlim(1, 5e3)
-    place.set_ylim(5e-5, 40)
-    place.set_ylabel("error of the closing force, ρ/h from 0 to 1.414")

@@ -330,11 +330,11 @@ def main() -> int:
     parser.add_argument("page", type=Path)
     parser.add_argument("folder", type=Path)
     args = parser.parse_args()
-    from contactfpga.cover import drawing
+    from contactfpga.cover import drawing, study_drawing  # matplotlib, which only drawing needs
 
     args.page.write_text(update(args.page.read_text(encoding="utf-8")), encoding="utf-8")
     print(f"wrote {args.page}")
-    for file in (*drawing.draw(args.folder, "svg"), drawing.study(args.folder / "cover-study.svg")):
+    for file in (*drawing.draw(args.folder, "svg"), study_drawing.study(args.folder / "cover-study.svg")):
         print(f"drew {file}")
     return 0
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.console import interrupt
+from contactfpga.console import picture_style as style
 from contactfpga.cover import Cover, Ellipse, Part
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import contacts
@@ -23,10 +24,12 @@ from contactfpga_sim.scenes.families import placements
 from contactfpga_sim.scenes.scene import Scene, sheet
 
 ACROSS = 4
-PANEL, MARGIN, HEAD = 200, 16, 42
-"""Size of a panel, space around it and room for its title, in pixels."""
+PANEL, MARGIN, LINE, FOOT = 160, 16, 16, 24
+"""Size of a panel, space around it, height of a line of its title and room for its scale, in pixels."""
 
-SHEET, PRESSED, OUTLINE = "#eef0f3", "#8fbcd4", "#d1495b"
+HEAD = 4 * LINE
+OUTLINE = style.VERMILLION
+SCALES_MM = (10, 20, 50, 100)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,7 @@ class Panel:
     """A scene at the time 0 on a sheet, under a cover."""
 
     title: str
+    detail: str
     scene: Scene
     skin: Skin
     cover: Cover
@@ -43,13 +47,13 @@ def panels() -> list[Panel]:
     """A scene of some families where what is covered is pressed; and two fingers under every kind of cover."""
     hand, foot = (_square(size, pitch) for size, pitch in ((32, 5.0), (64, 5.0)))
     drawn = [
-        Panel(f"{name}, pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
+        Panel(name, f"pitch {skin.pitch_x_mm:g} mm", placements(name, 1, seed, skin)[0], skin, Cover())
         for name, skin, seed in (("fingers", hand, 6), ("palm", hand, 0), ("sole", foot, 3), ("edge", hand, 4))
     ]
     close = _square(18, 2.5)
     pair = Scene(contacts.pair(7.0, 6.0, 21.0, 21.5, 30.0, force_n=20.0))
     names = {"patch": "patch", "point": "point force", "hertz": "patch's pressure", "bonded": "bonded layer"}
-    return drawn + [Panel(f"{text}, 20 N each", pair, close, Cover(model)) for model, text in names.items()]
+    return drawn + [Panel(text, "20 N each, pitch 2.5 mm", pair, close, Cover(model)) for model, text in names.items()]
 
 
 def _square(size: int, pitch_mm: float) -> Skin:
@@ -58,16 +62,16 @@ def _square(size: int, pitch_mm: float) -> Skin:
 
 def svg(drawn: Sequence[Panel]) -> str:
     """All panels as one SVG file."""
-    down = -(-len(drawn) // ACROSS)
-    width, height = ACROSS * (PANEL + MARGIN) + MARGIN, down * (PANEL + MARGIN + HEAD) + MARGIN
+    down, step = -(-len(drawn) // ACROSS), HEAD + PANEL + FOOT + MARGIN
+    width, height = style.WIDTH_PX, down * step + MARGIN
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
-        'font-family="system-ui,sans-serif" font-size="12">',
-        f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
+        f'font-family="system-ui,sans-serif" font-size="12" fill="{style.INK}">',
+        f'<rect width="{width}" height="{height}" rx="8" fill="{style.CARD}"/>',
     ]
     for index, panel in enumerate(drawn):
         x = MARGIN + index % ACROSS * (PANEL + MARGIN)
-        y = MARGIN + HEAD + index // ACROSS * (PANEL + MARGIN + HEAD)
+        y = MARGIN + HEAD + index // ACROSS * step
         lines += [f'<g transform="translate({x} {y})">', *_panel(panel), "</g>"]
     return "\n".join([*lines, "</svg>"]) + "\n"
 
@@ -78,7 +82,7 @@ def _panel(panel: Panel) -> list[str]:
     left, right, top, bottom = (end / contacts.M for end in sheet(panel.skin))
     scale = PANEL / max(right - left, bottom - top)
     noun = "contact" if truth.count == 1 else "contacts"
-    told = f"{truth.count} {noun}, {truth.area_mm2:.0f} mm2; {int(cells.sum())} switches closed"
+    told = (panel.detail, f"{truth.count} {noun}, {truth.area_mm2:,.0f} mm²", f"{int(cells.sum())} switches closed")
     clip = f'<svg width="{PANEL}" height="{PANEL}" viewBox="0 0 {PANEL} {PANEL}">'
     wide, high = panel.skin.pitch_x_mm * scale, panel.skin.pitch_y_mm * scale
     gap = 0.08 * min(wide, high)
@@ -94,14 +98,25 @@ def _panel(panel: Panel) -> list[str]:
     ]
     parts = [part for load in panel.scene.loads(0.0) for part in load.parts]
     return [
-        f'<text y="-24" font-weight="600">{html.escape(panel.title)}</text>',
-        f'<text y="-8" fill="#555b63">{told}</text>',
+        f'<text y="{LINE - 6 - HEAD}" font-weight="600">{html.escape(panel.title)}</text>',
+        *(f'<text y="{(number + 2) * LINE - 6 - HEAD}">{line}</text>' for number, line in enumerate(told)),
         clip,
-        f'<rect width="{(right - left) * scale:.2f}" height="{(bottom - top) * scale:.2f}" fill="{SHEET}"/>',
-        f'<path d="{squares}" fill="{PRESSED}"/>',
+        f'<rect width="{(right - left) * scale:.2f}" height="{(bottom - top) * scale:.2f}" fill="{style.SHEET}"/>',
+        f'<path d="{squares}" fill="{style.PRESSED}"/>',
         *(_outline(part, left, top, scale) for part in parts),
         *crosses,
         "</svg>",
+        *_scale(right - left, scale),
+    ]
+
+
+def _scale(sheet_mm: float, scale: float) -> list[str]:
+    """A bar below the sheet, at most 0.4 of it long."""
+    long_mm = max((one for one in SCALES_MM if one <= 0.4 * sheet_mm), default=SCALES_MM[0])
+    wide = long_mm * scale
+    return [
+        f'<rect y="{PANEL + 8}" width="{wide:.2f}" height="3" fill="{style.SOFT}"/>',
+        f'<text x="{wide + 8:.2f}" y="{PANEL + 14}">{long_mm} mm</text>',
     ]
 
 

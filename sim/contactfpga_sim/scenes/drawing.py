@@ -10,11 +10,15 @@ import numpy as np
 from rich.columns import Columns
 from rich.text import Text
 
+from contactfpga.console import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.golden.zones import flood
 
-COLOURS = ("#d1495b", "#00798c", "#edae49", "#66a182", "#8d6a9f", "#c97b3a", "#2e4057", "#7fb069")
+COLORS = style.PALETTE[:6]
+"""Of the zones: those that show on dark terminals, too."""
+
+ACROSS = 4
 
 
 class Drawn(Protocol):
@@ -38,8 +42,8 @@ def _sheet(out: Drawn, unicode: bool) -> Text:
     count = out.frame.zones if out.frame else 0
     text = Text(f"{out.scene}: {count} zone{'' if count == 1 else 's'}\n")
     for pieces in _halves(labels) if unicode else _ascii(labels):
-        for character, style in pieces:
-            text.append(character, style=style)
+        for character, look in pieces:
+            text.append(character, style=look)
         text.append("\n")
     return text
 
@@ -67,22 +71,25 @@ def _style(above: int, below: int) -> str:
     """Both halves of a full block are of one zone, or, where two zones meet, the lower one is the background."""
     if not above and not below:
         return "dim"
-    colours = [COLOURS[(number - 1) % len(COLOURS)] for number in (above, below) if number]
-    return colours[0] if len(set(colours)) == 1 else f"{colours[0]} on {colours[1]}"
+    colors = [COLORS[(number - 1) % len(COLORS)] for number in (above, below) if number]
+    return colors[0] if len(set(colors)) == 1 else f"{colors[0]} on {colors[1]}"
 
 
 def to_file(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
-    """A panel a scene: its cells in the colours of their zones, and the barycenters that came over the wire."""
+    """A panel a scene: its cells in the colors of their zones, and the barycenters that came over the wire."""
     import matplotlib
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    with matplotlib.rc_context(style.SETTINGS):
+        _save(outcomes, skin, path)
+
+
+def _save(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
     from matplotlib.colors import to_rgb
 
-    palette = np.array([to_rgb("#e6e9ed"), *(to_rgb(colour) for colour in COLOURS)])
-    across = 5
-    down = -(-len(outcomes) // across)
-    figure, panels = pyplot.subplots(down, across, figsize=(2.6 * across, 2.8 * down), squeeze=False)
+    palette = np.array([to_rgb(color) for color in (style.SHEET, *COLORS)])
+    down = -(-len(outcomes) // ACROSS)
+    figure = style.new(2.0 * down + 0.5)
+    panels = figure.subplots(down, ACROSS, squeeze=False)
     for panel in panels.flat:
         panel.axis("off")
     half_x, half_y = skin.pitch_x_mm / 2, skin.pitch_y_mm / 2
@@ -92,15 +99,13 @@ def to_file(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
     )
     for panel, out in zip(panels.flat, outcomes):
         labels, _ = flood(out.cells, skin.connectivity)
-        shown = np.where(labels > 0, (labels - 1) % len(COLOURS) + 1, 0)
+        shown = np.where(labels > 0, (labels - 1) % len(COLORS) + 1, 0)
         panel.imshow(palette[shown], extent=extent, interpolation="nearest")
         if out.frame is not None and len(out.frame.moments):
             area, sum_x, sum_y = out.frame.moments.T
             x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
             panel.plot(x_mm, y_mm, "k+", markersize=7, markeredgewidth=1.4)
-        panel.set_title(out.scene, fontsize=9)
-    figure.suptitle("Contact zones and their barycenters (+), as they came over the wire", fontsize=11)
-    figure.tight_layout()
+        panel.set_title(out.scene, fontsize=style.SMALL)
+    figure.suptitle("Contact zones and their barycenters (+), as they came over the wire", fontsize=style.LARGE)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    style.save(figure, path)

@@ -11,13 +11,12 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-
-matplotlib.use("Agg")
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from contactfpga.console import outputs
+from contactfpga.console import picture_style as style
 from contactfpga.console.interrupt import Interrupted
-from contactfpga.cover.drawing import SETTINGS, save
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.arm import sweep
 from contactfpga_sim.studies.arm.case import Case, CaseError
@@ -31,7 +30,9 @@ THICK_SPEEDS_M_S = (0.1, 0.23, 0.4)
 LIMITS_N = np.linspace(4, 40, 145)
 INSTANTS = 8
 """Touch instants by which the gateware's own runs differ, a controller period apart."""
-COLOURS = {"6 ms": "#333333", "UART": "#d1495b", "pin": "#2b6f9e", "limit": "#e0a030", "bound": "#66a182"}
+COLORS = {"6 ms": style.BLACK, "UART": style.VERMILLION, "pin": style.BLUE, "last byte": style.GREEN}
+BOUND: dict[str, Any] = {"linewidth": 1.2, "linestyle": style.DASHES[2]}
+TICKS_MS = (0.01, 0.1, 1, 10)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,53 +110,55 @@ def draw(
     case: Case, tasks: Plan, found: dict[Task, Point], folder: Path, suffixes: Sequence[str] = ("png", "svg")
 ) -> list[Path]:
     """The three charts in each format."""
-    with matplotlib.rc_context(SETTINGS):
+    with matplotlib.rc_context(style.SETTINGS):
         figures = {
             "arm-force": _force(case, tasks, found),
             "arm-speed": _speed(case, tasks, found),
             "arm-thickness": _thickness(case, tasks, found),
         }
-        return [save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
+        return [style.save(figure, folder / f"{name}.{end}") for name, figure in figures.items() for end in suffixes]
 
 
 def _axes(x: str, y: str) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(6.4, 4))
+    figure = style.new(4.8)
     place = figure.subplots()
     place.set_xlabel(x)
     place.set_ylabel(y)
-    place.grid(alpha=0.2)
+    place.grid()
     return figure, place
+
+
+def _latencies(place: Any, case: Case) -> None:
+    """The axis of latencies, with the bound of each way and zero at the bottom."""
+    for name, bound in sweep.bounds_s(case, Skin()).items():
+        place.axvline(1e3 * bound, color=COLORS[name], label=f"bound, {name}", **BOUND)
+    place.set_xscale("log")
+    least, most = place.get_xlim()
+    ticks = [ms for ms in TICKS_MS if least <= ms <= most]
+    place.set_xticks(ticks, map("{:g}".format, ticks))
+    place.xaxis.set_minor_locator(NullLocator())
+    place.set_ylim(bottom=0)
 
 
 def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "force, N")
     late = [1e3 * task.latency_s for task in tasks.force]
-    for group, colour, name in (
-        (tasks.force, "#333333", "the sheet"),
-        (tasks.limited, COLOURS["limit"], "with 3 Nm limit"),
-    ):
+    free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GREY, "lw": 3})
+    held: tuple[dict[str, Any], ...] = ({"color": style.BLACK, "ls": "--"}, {"color": style.BLACK, "ls": ":"})
+    for group, name, looks in ((tasks.force, "no torque limit", free), (tasks.limited, "3 Nm limit", held)):
         points = [found[task] for task in group]
-        place.plot(late, [point.peak_force_n for point in points], color=colour, label=f"peak, {name}")
-        place.plot(
-            late, [point.force_before_n for point in points], "--", color=colour, label=f"at the reaction, {name}"
-        )
+        for field, what, look in zip(("peak_force_n", "force_before_n"), ("peak", "at the reaction"), looks):
+            place.plot(late, [getattr(point, field) for point in points], label=f"{what}, {name}", **look)
     for way, name in (("uart", "UART"), ("pin", "pin")):
         points = [found[task] for task in tasks.sheet[way]]
-        place.plot(
-            [1e3 * point.takes_s for point in points],
-            [point.peak_force_n for point in points],
-            "o",
-            ms=4,
-            color=COLOURS[name],
-            label=f"gateware, {name}, {len(points)} touches",
-        )
-    for name, bound in sweep.bounds_s(case, Skin()).items():
-        place.axvline(1e3 * bound, color=COLOURS.get(name, COLOURS["bound"]), lw=0.8, ls=":", label=f"bound, {name}")
+        takes, forces = [1e3 * point.takes_s for point in points], [point.peak_force_n for point in points]
+        label = f"peak, gateware by {name}, {len(points)} touches"
+        place.plot(takes, forces, "o", ms=5, color=COLORS[name], label=label, zorder=3)
     at = found[next(task for task in tasks.force if task.latency_s == PAPER_S)]
-    place.plot(1e3 * PAPER_S, at.peak_force_n, "s", color="black", ms=7, fillstyle="none", label="the set at 6 ms")
-    place.plot(1e3 * PAPER_S, 12, "*", color="black", ms=9, label="paper, 12 N")
-    place.set_xscale("log")
-    place.legend(fontsize=7)
+    place.plot(1e3 * PAPER_S, at.peak_force_n, "s", color=style.INK, ms=8, fillstyle="none", label="the set at 6 ms")
+    place.plot(1e3 * PAPER_S, 12, "*", color=style.INK, ms=10, label="paper, 12 N")
+    _latencies(place, case)
+    figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
@@ -163,30 +166,27 @@ def _speed(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     figure, place = _axes("force limit, N", "speed, m/s")
     for name, group in tasks.speed.items():
         speeds = np.array([task.case.link.speed_m_s for task in group])
-        for field, style, what in (("peak_force_n", "-", "peak"), ("force_before_n", "--", "at the reaction")):
+        for field, line, what in (("peak_force_n", "-", "peak"), ("force_before_n", "--", "at the reaction")):
             forces = np.array([getattr(found[task], field) for task in group])
             safe = [sweep.safe_speed(speeds, forces, limit) for limit in LIMITS_N]
-            place.plot(LIMITS_N, safe, style, color=COLOURS[name], lw=1.2, label=f"{what}, {name}")
+            place.plot(LIMITS_N, safe, line, color=COLORS[name], label=f"{what}, {name}")
     naive = [sweep.naive_speed(case, limit, PAPER_S) for limit in LIMITS_N]
-    place.plot(LIMITS_N, naive, ":", color=COLOURS["bound"], label="(δ(limit) - δ(closing)) / 6 ms")
-    place.plot(15, 0.4, "*", color="black", ms=9, label="paper: 15 N, designed for 0.4 m/s")
-    place.plot(15, 0.23, "s", color="black", ms=6, fillstyle="none", label="the set's speed at 15 N")
-    place.set_ylim(0, 0.6)
-    place.legend(fontsize=7)
+    place.plot(LIMITS_N, naive, ":", color=style.GREEN, lw=2, label="(δ(limit) - δ(closing)) / 6 ms")
+    place.plot(15, 0.4, "*", color=style.INK, ms=10, label="paper: 15 N, designed for 0.4 m/s")
+    place.plot(15, 0.23, "s", color=style.INK, ms=7, fillstyle="none", label="the set's speed at 15 N")
+    place.set(xlim=(0, LIMITS_N[-1]), ylim=(0, 0.6))
+    figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
 def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "thinnest foam that is not pressed flat, mm")
-    for colour, (speed, group) in zip(("#2b6f9e", "#333333", "#d1495b"), tasks.thick.items()):
+    for color, (speed, group) in zip((style.SKY, style.BLACK, style.ORANGE), tasks.thick.items()):
         thick = [1e3 * found[task].thickness_m for task in group]
-        place.plot([1e3 * task.latency_s for task in group], thick, "o-", ms=3, color=colour, label=f"{speed:g} m/s")
-    for name, bound in sweep.bounds_s(case, Skin()).items():
-        place.axvline(1e3 * bound, color=COLOURS.get(name, COLOURS["bound"]), lw=0.8, ls=":", label=f"bound, {name}")
-    place.plot(1e3 * PAPER_S, 1e3 * case.foam.thickness_m, "*", color="black", ms=9, label="paper: 6 ms, 5 mm")
-    place.set_xscale("log")
-    place.set_ylim(bottom=0)
-    place.legend(fontsize=7)
+        place.plot([1e3 * task.latency_s for task in group], thick, "o-", ms=4, color=color, label=f"{speed:g} m/s")
+    place.plot(1e3 * PAPER_S, 1e3 * case.foam.thickness_m, "*", color=style.INK, ms=10, label="paper: 6 ms, 5 mm")
+    _latencies(place, case)
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 

@@ -1,118 +1,180 @@
-"""The chart as a picture."""
+"""The chart as small multiples: a row of panels for each family of scenes, a column for each error."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullLocator
 
+from contactfpga.choices import labellers, scans
+from contactfpga.console import picture_style as style
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.chart.methods import METHODS
 from contactfpga_sim.studies.chart.study import Point, front
 
-AXES = {
-    "miscounted": "scenes miscounted, share",
-    "missed": "contacts missed, share",
-    "barycenter_mm": "barycenter error, mm",
-    "area": "area error, share of the area",
-}
-FLOOR = {"miscounted": 3e-4, "missed": 3e-4, "barycenter_mm": 1e-2, "area": 1e-2}
-"""Errors below are drawn here, as there is no 0 on an axis of powers of ten."""
+MARKERS = "so^Dvp"
+"""By pitch, the finest first."""
 
-COLOURS = {
-    "adaptive": "#2e4057",
-    "run": "#00798c",
-    "serial": "#d1495b",
-    "projection": "#edae49",
-    "single": "#66a182",
-    "cells": "#8d6a9f",
-    "barycenter": "#5c4033",
-}
-MARKERS = {5.0: "s", 10.0: "o", 20.0: "^"}
+LINEAR = 0.01
+"""Shares below are drawn on a linear scale, so that 0 has its place; those above in powers of ten."""
+
+
+class Metric(NamedTuple):
+    """An error, and how its axis looks."""
+
+    name: str
+    label: str
+    scale: dict[str, Any]
+    ticks: tuple[float, ...]
+    ends: tuple[float, float]
+    """Of the axis, unless a point lies beyond."""
+    show: Callable[[float], str]
+
+
+LENGTHS_MM = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200)
+TIMES_US = (20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000)
+"""Ticks, as far as an axis reaches."""
+
+ENDS_US = (85, 1200)
+METRICS = (
+    Metric("barycenter_mm", "barycenter error, mm", {"value": "log"}, LENGTHS_MM, (0.3, 40), "{:g}".format),
+    Metric(
+        "miscounted",
+        "scenes miscounted",
+        {"value": "symlog", "linthresh": LINEAR, "linscale": 0.5},
+        (0, 0.01, 0.1, 1),
+        (-0.002, 1.6),
+        lambda share: f"{100 * share:g} %",
+    ),
+)
 
 
 def save(points: Sequence[Point], folder: Path) -> None:
     """``chart.png`` and ``chart.svg`` in a folder; the same points give the same files."""
-    with matplotlib.rc_context({"svg.hashsalt": "contactfpga", "svg.fonttype": "none"}):
+    with matplotlib.rc_context(style.SETTINGS):
         figure = picture(points)
-        figure.savefig(folder / "chart.png", dpi=130)
-        figure.savefig(folder / "chart.svg", metadata={"Date": None})
+        for suffix in ("png", "svg"):
+            style.save(figure, folder / f"chart.{suffix}")
 
 
-def picture(points: Sequence[Point], metrics: Sequence[str] = ("miscounted", "barycenter_mm")) -> Figure:
-    """A row of panels for each family of scenes, a column for each metric; both axes in powers of ten."""
+def picture(points: Sequence[Point]) -> Figure:
+    """All points, with the fronts of each panel."""
     families = list(dict.fromkeys(point.task.family for point in points))
-    figure = Figure(figsize=(6.5 * len(metrics), 4.2 * len(families) + 1), layout="constrained")
-    panels = figure.subplots(len(families), len(metrics), squeeze=False)
+    figure = style.new(1.85 * len(families) + 1.2)
+    panels = figure.subplots(len(families), len(METRICS), sharex=True, sharey="col", squeeze=False)
     for row, family in zip(panels, families, strict=True):
         some = [point for point in points if point.task.family == family]
-        for panel, metric in zip(row, metrics, strict=True):
+        for panel, metric in zip(row, METRICS, strict=True):
+            _axes(panel, points, metric)
             _panel(panel, some, metric)
-            panel.set_title(f"{family}: {AXES[metric]}", fontsize=10)
-    figure.legend(*_legend(points), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
+            panel.set_ylabel(metric.label)
+            panel.set_title(family, loc="left", fontweight="bold")
+    for panel in panels[-1]:
+        panel.set_xlabel("from touch to host, µs (median)")
+    others = dict.fromkeys(filter(None, map(setting, points)))
+    title = f"hollow: another setting ({', '.join(others)})" if others else None
+    figure.legend(*_legend(points), loc="outside lower center", ncols=4, title=title, title_fontsize=style.SMALL)
     return figure
 
 
-def _panel(panel, points: Sequence[Point], metric: str) -> None:
-    panel.set(xscale="log", yscale="log", xlabel="touch to the zones at the host, us (median; line to the worst)")
-    panel.grid(alpha=0.2, which="both")
-    places = [
-        (point.speed.median_us + point.host_us, max(point.errors["total"][metric].mean, FLOOR[metric]))
-        for point in points
-    ]
-    best = front(places)
-    corners = np.array([places[index] for index in best]).reshape(-1, 2)
-    panel.step(*corners.T, where="post", color="black", linewidth=0.7)
-    panel.axhline(FLOOR[metric], color="grey", linewidth=0.5, linestyle=":")
-    for index, (point, (x, y)) in enumerate(zip(points, places, strict=True)):
-        found, colour = point.errors["total"][metric], _colour(point)
-        low, high = (max(end, FLOOR[metric]) for end in (found.low, found.high))
-        panel.plot([x, point.speed.worst_us + point.host_us], [y, y], color=colour, alpha=0.25, linewidth=1)
-        panel.plot([x, x], [low, high], color=colour, alpha=0.35, linewidth=1)
-        panel.plot(point.speed.bound_us, y, marker="|", color=colour, alpha=0.6)
-        marker, edge = MARKERS[point.task.skin.pitch_x_mm], "black" if index in best else "white"
-        panel.plot(x, y, marker, color=colour, markersize=8, markeredgecolor=edge, zorder=3 + (index in best))
-    for index in best:
-        x, y = places[index]
-        alike = [point for point, place in zip(points, places, strict=True) if _alike(place, (x, y))]
-        text = "\n".join(map(_label, alike))
-        panel.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4), fontsize=6)
-    panel.margins(0.12, 0.2)
+def reached_us(point: Point) -> float:
+    """Median from the touch to the zones at the host, labelled there if need be."""
+    return point.speed.median_us + point.host_us
 
 
-def _place(point: Point, metric: str) -> tuple[float, float]:
-    return point.speed.median_us + point.host_us, max(point.errors["total"][metric].mean, FLOOR[metric])
+def error(point: Point, name: str) -> float:
+    """Mean of the method's zones against the contacts."""
+    return point.errors["total"][name].mean
 
 
-def _alike(place: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Too close to be told apart in the picture."""
-    return abs(math.log(place[0] / other[0])) < 0.02 and abs(math.log(place[1] / other[1])) < 0.05
+def ends(values: Iterable[float], usual: tuple[float, float]) -> tuple[float, float]:
+    """An axis' usual ends, or such that all values lie between them."""
+    finite = [value for value in values if math.isfinite(value)]
+    least, most = min(finite, default=usual[0]), max(finite, default=usual[1])
+    return min(usual[0], 0.8 * least) if least else usual[0], max(usual[1], 1.25 * most)
 
 
-def _label(point: Point) -> str:
-    return point.task.method + (f" ({point.luts:,} LUT4)" if point.luts else "")
-
-
-def _colour(point: Point) -> str:
-    skin = point.task.skin
+def kind(skin: Skin) -> str:
+    """What a color stands for: the report that is no zone, else the scan that is no raster, else the labeller."""
     if skin.report != "moments":
-        return COLOURS[skin.report]
-    kind = "adaptive" if skin.scan == "adaptive" else str(skin.labeller)
-    return COLOURS[kind]
+        return skin.report
+    chosen = labellers.find(skin.labeller) if skin.scan == "raster" else scans.find(skin.scan)
+    return chosen.title
 
 
-def _legend(points: Sequence[Point]):
-    from matplotlib.lines import Line2D
+def setting(point: Point) -> str:
+    """What sets a method apart from the one of the same kind and pitch, such as `24 MHz`."""
+    return point.task.method.partition(" mm, ")[2]
 
-    used = list(dict.fromkeys(_colour(point) for point in points))
-    names = {colour: name for name, colour in COLOURS.items()}
-    lines = [Line2D([], [], color=colour, marker="o", linestyle="") for colour in used]
-    labels = [names[colour] for colour in used]
-    for pitch in sorted({point.task.skin.pitch_x_mm for point in points}):
-        lines.append(Line2D([], [], color="grey", marker=MARKERS[pitch], linestyle=""))
-        labels.append(f"{pitch:g} mm")
-    lines += [Line2D([], [], color="grey", marker="o", linestyle="", markeredgecolor="black", markeredgewidth=1.5)]
-    lines += [Line2D([], [], color="grey", marker="|", linestyle="")]
-    return lines, [*labels, "Pareto front", "bound of the time"]
+
+def colors(points: Sequence[Point]) -> dict[str, str]:
+    """By kind: those of the built-in methods in their order, then whatever else there is."""
+    kinds = dict.fromkeys(map(kind, (*METHODS.values(), *(point.task.skin for point in points))))
+    return {name: style.PALETTE[index % len(style.PALETTE)] for index, name in enumerate(kinds)}
+
+
+def markers(points: Sequence[Point]) -> dict[float, str]:
+    """By pitch in mm."""
+    pitches = {skin.pitch_x_mm for skin in (*METHODS.values(), *(point.task.skin for point in points))}
+    return {pitch: MARKERS[index % len(MARKERS)] for index, pitch in enumerate(sorted(pitches))}
+
+
+def _axes(panel: Any, points: Sequence[Point], metric: Metric) -> None:
+    """Alike for all families."""
+    panel.set_xscale("log")
+    panel.set_yscale(**metric.scale)
+    panel.set_xticks(TIMES_US, map(str, TIMES_US))
+    panel.set_yticks(metric.ticks)
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: metric.show(value)))
+    panel.xaxis.set_minor_locator(NullLocator())
+    panel.yaxis.set_minor_locator(NullLocator())
+    panel.set_xlim(*ends(map(reached_us, points), ENDS_US))
+    panel.set_ylim(*ends((error(point, metric.name) for point in points), metric.ends))
+    panel.tick_params(labelbottom=True)
+    panel.grid()
+    if metric.ticks[0] == 0:
+        panel.axhline(0, color=style.SOFT, linewidth=0.8)
+
+
+def _panel(panel: Any, points: Sequence[Point], metric: Metric) -> None:
+    places = [(reached_us(point), error(point, metric.name)) for point in points]
+    best = front(places)
+    panel.step(*np.array([places[index] for index in best]).reshape(-1, 2).T, where="post", color=style.INK, lw=0.8)
+    _marks(panel, points, places)
+
+
+def _marks(panel: Any, points: Sequence[Point], places: Sequence[tuple[float, float]]) -> None:
+    """Methods that come out alike lie on one another: each kind is smaller than the one below it."""
+    color, marker = colors(points), markers(points)
+    sizes = {name: 8.5 - 5.0 * index / len(color) for index, name in enumerate(color)}
+    for point, place in zip(points, places, strict=True):
+        name = kind(point.task.skin)
+        panel.plot(
+            *place,
+            marker[point.task.skin.pitch_x_mm],
+            markersize=sizes[name],
+            markerfacecolor=style.CARD if setting(point) else color[name],
+            markeredgecolor=color[name] if setting(point) else style.CARD,
+            markeredgewidth=1.4 if setting(point) else 0.5,
+            zorder=3 + list(color).index(name) / len(color),
+            clip_on=False,
+        )
+
+
+def _legend(points: Sequence[Point]) -> tuple[list[Line2D], list[str]]:
+    used = {kind(point.task.skin) for point in points}
+    pitches = {point.task.skin.pitch_x_mm for point in points}
+    mark: dict[str, Any] = {"linestyle": "", "markersize": 7, "markeredgecolor": style.CARD}
+    lines = {name: Line2D([], [], color=color, marker="o", **mark) for name, color in colors(points).items()}
+    shapes = {pitch: Line2D([], [], color=style.GREY, marker=shape, **mark) for pitch, shape in markers(points).items()}
+    shown = {name: line for name, line in lines.items() if name in used}
+    shown |= {f"pitch {pitch:g} mm": line for pitch, line in shapes.items() if pitch in pitches}
+    shown["nothing is better in both"] = Line2D([], [], color=style.INK, linewidth=0.8)
+    return list(shown.values()), list(shown)

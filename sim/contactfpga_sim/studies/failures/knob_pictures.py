@@ -6,50 +6,65 @@ Written by hand rather than by a plotting library, so that the same numbers alwa
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from contactfpga.console import picture_style as style
+from contactfpga_sim.studies.failures.axes import Span, placed, rounded_up, shown
 from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
 from contactfpga_sim.studies.failures.rig import plural
 
-COLOURS = {"right": "#4f9d69", "warned": "#a9cf6b", "told": "#edae49", "silent": "#d1495b"}
+COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
+TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}
+"""Height of a bar, which says the same as its color."""
+
 LEGEND = {
-    "right": "right",
-    "warned": "right, with a warning",
-    "told": "wrong, and the system says so",
-    "silent": "wrong, not noticed",
+    "right": (52, "right"),
+    "warned": (118, "right, with a warning"),
+    "told": (284, "wrong, and the system says so"),
+    "silent": (502, "wrong, not noticed"),
 }
-LINES = ("#2e4057", "#00798c", "#8d6a9f", "#a05a2c")
-SHEET, PRESSED, CROSS, GREY = "#eef0f3", "#8fbcd4", "#2e4057", "#555b63"
+"""Where each word stands."""
 
-LEFT, WIDE, HIGH = 50, 400, 110
-"""Where the chart begins, and its size, in pixels."""
+LINES = ((style.SKY, 7.0), (style.PURPLE, 5.0), (style.BLUE, 3.0), (style.BLACK, 1.2))
+"""Color and width, the last ones for few methods: where lines lie on one another, each is seen beneath the next."""
 
-STRIP = 18
-SIDE = 120
-"""Size of a sheet."""
+LEFT, TOP, HIGH = 52, 62, 110
+"""Where the chart begins, and its height, in pixels."""
+
+BESIDE, ALONE = 380, 640
+"""Width of the chart beside two sheets, and without."""
+
+STRIP = 36
+"""Height of a method's name and bars."""
+
+SIDE, SHEETS = 104, 470
+"""Size of a sheet, and where the first one begins."""
 
 
 def svg(study: Study, methods: Mapping[str, Turned]) -> str:
     """The whole picture."""
     method, sheets = _sheets(study, methods)
-    width = LEFT + WIDE + 60 + max(50, len(sheets) * (SIDE + 20))
-    height = 40 + HIGH + 2 * STRIP + 2 * STRIP * len(methods) + 34
-    top = 36
+    spans, scale = placed(study.values, LEFT, BESIDE if sheets else ALONE)
+    bottom = TOP + HIGH + 22 + STRIP * len(methods)
+    height = max(bottom + 64, TOP + SIDE + 80)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="system-ui,sans-serif" '
-        'font-size="11">',
-        f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
-        _text(10, 18, study.title, 'font-size="13" font-weight="600"'),
-        *_chart(study, methods, top),
-        *_strips(study, methods, top + HIGH + 14),
-        _text(LEFT, height - 26, f"turned: {study.knob}", f'fill="{GREY}"'),
-        *_legend(height - 8),
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {style.WIDTH_PX} {height}" '
+        f'font-family="system-ui,sans-serif" font-size="12" fill="{style.INK}">',
+        f'<rect width="{style.WIDTH_PX}" height="{height}" rx="8" fill="{style.CARD}"/>',
+        _text(16, 24, study.title, 'font-size="14" font-weight="600"'),
+        *_chart(study, methods, spans),
+        *_strips(methods, spans, TOP + HIGH + 18),
+        *_ticks(study, spans, bottom + 8),
+        _text(LEFT, bottom + 26, f"{study.knob}{scale}"),
+        *_legend(height - 14),
     ]
-    parts.append(_text(LEFT + WIDE + 30, top - 4, method))
+    for number, line in enumerate(textwrap.wrap(method, 34)):
+        parts.append(_text(SHEETS, TOP - 10 + 15 * number, line))
     for number, (caption, outcome) in enumerate(sheets):
-        parts += _sheet(LEFT + WIDE + 30 + number * (SIDE + 20), top + 14, caption, outcome)
+        parts += _sheet(SHEETS + number * (SIDE + 20), TOP + 40, f"at {caption}", outcome)
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
@@ -57,54 +72,55 @@ def _text(x: float, y: float, words: str, style: str = "") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" {style}>{html.escape(words.replace("`", ""))}</text>'
 
 
-def _x(study: Study, index: float) -> float:
-    """Values stand side by side, whatever lies between them."""
-    return LEFT + WIDE * (index + 0.5) / len(study.values)
-
-
-def _chart(study: Study, methods: Mapping[str, Turned], top: float) -> list[str]:
-    amounts = [outcome.amount for turned in methods.values() for outcome in turned.outcomes]
-    high = max(*amounts, 1e-9)
-    parts = [
-        f'<rect x="{LEFT}" y="{top}" width="{WIDE}" height="{HIGH}" fill="none" stroke="#c9ced6"/>',
-        _text(LEFT + 4, top + 12, study.amount, f'fill="{GREY}"'),
-        _text(LEFT - 4, top + 8, f"{high:,.4g}", f'fill="{GREY}" text-anchor="end"'),
-        _text(LEFT - 4, top + HIGH, "0", f'fill="{GREY}" text-anchor="end"'),
-    ]
-    for colour, turned in zip(LINES, methods.values(), strict=False):
-        points = [
-            (_x(study, index), top + HIGH - (HIGH - 18) * outcome.amount / high)
-            for index, outcome in enumerate(turned.outcomes)
-        ]
-        joined = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        parts.append(f'<polyline points="{joined}" fill="none" stroke="{colour}" stroke-width="1.2"/>')
+def _chart(study: Study, methods: Mapping[str, Turned], spans: Sequence[Span]) -> list[str]:
+    """The outcomes' amounts; 0 is the frame's bottom."""
+    ticks = rounded_up([outcome.amount for turned in methods.values() for outcome in turned.outcomes])
+    left, right = spans[0].start, spans[-1].end
+    parts = [_text(LEFT, TOP - 10, study.amount)]
+    for tick in ticks:
+        y = TOP + HIGH - HIGH * tick / ticks[-1]
+        color = style.GRID if tick else style.SOFT
+        parts.append(f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{color}"/>')
+        parts.append(_text(LEFT - 6, y + 4, f"{tick:,g}", 'text-anchor="end"'))
+    for (color, width), turned in zip(LINES[-len(methods) :], methods.values(), strict=True):
+        joined = " ".join(
+            f"{span.middle:.1f},{TOP + HIGH - HIGH * outcome.amount / ticks[-1]:.1f}"
+            for span, outcome in zip(spans, turned.outcomes, strict=True)
+        )
+        parts.append(
+            f'<polyline points="{joined}" fill="none" stroke="{color}" stroke-width="{width}" stroke-linejoin="round"/>'
+        )
     return parts
 
 
-def _strips(study: Study, methods: Mapping[str, Turned], top: float) -> list[str]:
-    """A bar for each method: green, yellow, red."""
+def _strips(methods: Mapping[str, Turned], spans: Sequence[Span], top: float) -> list[str]:
+    """A bar for each method and value."""
     parts = []
-    step = WIDE / len(study.values)
-    for number, (colour, (method, turned)) in enumerate(zip(LINES, methods.items(), strict=False)):
-        y = top + number * 2 * STRIP
-        parts.append(_text(LEFT, y + 8, method, f'fill="{colour}"'))
-        for index, kind in enumerate(map(_kind, turned.outcomes)):
+    for number, ((color, width), (method, turned)) in enumerate(
+        zip(LINES[-len(methods) :], methods.items(), strict=True)
+    ):
+        y = top + number * STRIP
+        parts.append(f'<path d="M{LEFT} {y + 6:.1f}h20" stroke="{color}" stroke-width="{width}"/>')
+        parts.append(_text(LEFT + 26, y + 10, method))
+        for span, kind in zip(spans, map(_kind, turned.outcomes), strict=True):
+            tall, wide = TALL[kind], max(1.0, span.end - span.start - 1)
             parts.append(
-                f'<rect class="{kind}" x="{LEFT + index * step:.1f}" y="{y + 12}" width="{max(1.0, step - 1):.1f}" '
-                f'height="{STRIP - 8}" fill="{COLOURS[kind]}"/>'
+                f'<rect class="{kind}" x="{span.start:.1f}" y="{y + 30 - tall:.1f}" width="{wide:.1f}" '
+                f'height="{tall}" fill="{COLORS[kind]}"/>'
             )
-    y = top + len(methods) * 2 * STRIP
-    every = max(1, -(-len(study.values) // 9))
-    for index in range(0, len(study.values), every):
-        words = study.format.format(study.values[index])
-        parts.append(_text(_x(study, index), y + 6, words, f'fill="{GREY}" text-anchor="middle"'))
     return parts
+
+
+def _ticks(study: Study, spans: Sequence[Span], y: float) -> list[str]:
+    words = [study.format.format(value) for value in study.values]
+    return [_text(spans[index].middle, y, words[index], 'text-anchor="middle"') for index in shown(words, spans)]
 
 
 def _legend(y: float) -> list[str]:
     parts = []
-    for x, (kind, words) in zip((LEFT, LEFT + 55, LEFT + 190, LEFT + 370), LEGEND.items(), strict=True):
-        parts += [f'<rect x="{x}" y="{y - 9}" width="10" height="10" fill="{COLOURS[kind]}"/>', _text(x + 14, y, words)]
+    for kind, (x, words) in LEGEND.items():
+        parts.append(f'<rect x="{x}" y="{y - TALL[kind]}" width="12" height="{TALL[kind]}" fill="{COLORS[kind]}"/>')
+        parts.append(_text(x + 18, y, words))
     return parts
 
 
@@ -134,12 +150,12 @@ def _sheet(left: float, top: float, caption: str, outcome: Outcome) -> list[str]
         f"M{left + (x + 0.5) * cell - 4:.1f} {top + (y + 0.5) * cell:.1f}h8m-4-4v8" for x, y in outcome.zones
     )
     return [
-        _text(left, top - 4, caption),
-        f'<rect x="{left}" y="{top}" width="{columns * cell:.1f}" height="{rows * cell:.1f}" fill="{SHEET}"/>',
-        f'<path d="{squares}" fill="{PRESSED}"/>',
-        f'<path d="{crosses}" stroke="{CROSS}" stroke-width="1.6" fill="none"/>',
-        f'<circle cx="{left + 5}" cy="{top + SIDE + 12}" r="4" fill="{COLOURS[_kind(outcome)]}"/>',
-        _text(left + 13, top + SIDE + 16, _found(outcome)),
+        _text(left, top - 6, caption),
+        f'<rect x="{left}" y="{top}" width="{columns * cell:.1f}" height="{rows * cell:.1f}" fill="{style.SHEET}"/>',
+        f'<path d="{squares}" fill="{style.PRESSED}"/>',
+        f'<path d="{crosses}" stroke="{style.INK}" stroke-width="1.6" fill="none"/>',
+        f'<circle cx="{left + 5}" cy="{top + SIDE + 14}" r="4.5" fill="{COLORS[_kind(outcome)]}"/>',
+        _text(left + 15, top + SIDE + 18, _found(outcome)),
     ]
 
 

@@ -1,0 +1,89 @@
+"""How every picture looks: on one card, in one palette, with letters that can be read on a page 720 pixels wide.
+
+matplotlib is imported only where something is drawn with it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CARD = "#f6f7f9"
+"""What everything is drawn on: nearly white on a white page, and without a rim on a dark one."""
+
+INK, SOFT, GRID = "#1d232b", "#545d68", "#d5d9df"
+"""Words and axes; words that come second; lines that help to read a value."""
+
+SHEET, PRESSED = "#e3e6eb", "#8fbcd4"
+"""A sheet of switches, and what is pressed of it."""
+
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY = PALETTE = (
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c8c8c"),
+)
+"""Colors that the color-blind tell apart, after Okabe and Ito: without their yellow, which a light card swallows."""
+
+DASHES: tuple[Any, ...] = ("solid", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+"""For lines that may lie on one another: what is under a dashed line shows in its gaps."""
+
+WIDTH_PX = 720
+"""Of a picture, and of the page that it is made for."""
+
+WIDTH_IN = WIDTH_PX / 96
+"""The same for matplotlib, whose SVG has 72 points an inch where a browser sees 96 pixels."""
+
+SMALL, NORMAL, LARGE = 8.5, 9.0, 10.0
+"""Sizes of letters in points; small ones are 11 pixels high on the page."""
+
+SETTINGS: dict[str, Any] = {
+    "svg.hashsalt": "contactfpga",
+    "svg.fonttype": "none",
+    "font.size": NORMAL,
+    "axes.titlesize": LARGE,
+    "axes.labelsize": NORMAL,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": SOFT,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "legend.frameon": False,
+}
+"""matplotlib's, under which a picture is made and saved; the same input gives the same file."""
+
+
+def new(height_in: float) -> Figure:
+    """A figure of the page's width whose parts make room for one another, on a card."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.patches import FancyBboxPatch
+
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.1))
+    rounded = f"round,pad=0,rounding_size={8 / 96}"
+    card = FancyBboxPatch(
+        (0, 0), WIDTH_IN, height_in, boxstyle=rounded, transform=figure.dpi_scale_trans, fc=CARD, ec="none", zorder=-10
+    )
+    card.set_in_layout(False)
+    figure.add_artist(card)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a picture without the time at which it was drawn."""
+    drawn_with = {".svg": {"Date": None}, ".png": {"Software": None}}
+    figure.savefig(path, dpi=2 * 96, metadata=drawn_with.get(path.suffix))
+    return path

@@ -1,0 +1,58 @@
+"""Every picture of the pages can be read: on a page 720 pixels wide, on a light one and on a dark one."""
+
+import re
+from pathlib import Path
+
+import pytest
+import svg_texts
+
+from contactfpga.console import picture_style
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PICTURES = sorted(DOCS.rglob("*.svg"))
+LEAST_PX = 11
+"""That a letter's size is on the page."""
+
+every_picture = pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.stem)
+
+
+@every_picture
+def test_words_are_large_enough(path):
+    picture = svg_texts.read(path)
+    page = picture_style.WIDTH_PX / picture.width
+    assert not {one.text: one.pixels * page for one in picture.words if one.pixels * page < LEAST_PX - 0.01}
+
+
+@every_picture
+def test_words_are_whole(path):
+    picture = svg_texts.read(path)
+    for one in picture.words:
+        assert one.corners.min() >= 0, one.text
+        assert (one.corners.max(axis=0) <= (picture.width, picture.height)).all(), one.text
+
+
+@every_picture
+def test_no_words_lie_on_others(path):
+    assert not svg_texts.overlapping(svg_texts.read(path))
+
+
+@every_picture
+def test_what_is_drawn_lies_on_the_card(path):
+    first = re.search(r'<(?:rect|path)[^>]*?fill(?:="|: )(#\w+)', path.read_text(encoding="utf-8"))
+    assert first[1] == picture_style.CARD
+
+
+def test_words_that_lie_on_others_are_seen(tmp_path):
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 200 100" font-size="10">'
+    (tmp_path / "one.svg").write_text(
+        f'{head}<text x="10" y="20">first</text><text x="25" y="22">second</text>'
+        '<g transform="translate(100 0)"><text x="10" y="20">third</text></g>'
+        '<text x="10" y="60" transform="rotate(-90 10 60)">along</text></svg>'
+    )
+    first, second, third, along = svg_texts.read(tmp_path / "one.svg").words
+    assert svg_texts.overlap(first, second)
+    assert svg_texts.overlapping(svg_texts.read(tmp_path / "one.svg")) == [("first", "second")]
+    assert not svg_texts.overlap(first, third)
+    assert not svg_texts.overlap(first, along)
+    assert third.corners.min(axis=0)[0] == pytest.approx(110, abs=1)
+    assert along.corners.max(axis=0)[1] == pytest.approx(60, abs=1)
