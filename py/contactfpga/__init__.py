@@ -18,11 +18,16 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zone, Zones
+
+# The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
+# source tree that was never installed, and out of date in an editable install made before the last release.
+__version__ = "0.2.0"
 
 __all__ = [
     "Batch",
@@ -47,6 +52,8 @@ __all__ = [
     "VersionMismatch",
     "Zone",
     "Zones",
+    "__version__",
+    "examples",
     "open",
     "read_zones",
 ]

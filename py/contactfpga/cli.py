@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import os
 import sys
 from collections.abc import Sequence
 
+from contactfpga import __version__
 from contactfpga.commands import cover_flags, fit_flags
 from contactfpga.console import interrupt, numbers, terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra
@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Contact zones of a switch-matrix skin.",
         epilog="Without a board: contactfpga zones sim://",
     )
-    parser.add_argument("--version", action="version", version=importlib.metadata.version("contactfpga"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     _zones(commands.add_parser("zones", help="show the contact zones, live"))
     _wire(commands.add_parser("wire", help="show the pressed cells, live, to check the wiring"))

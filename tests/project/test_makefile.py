@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -72,8 +73,22 @@ def test_names_of_files_reach_the_command_as_they_are(tmp_path, goal, option, na
     variable = option.removeprefix("--").upper()
     done = make(clone(tmp_path / "clone"), "-n", goal, "BOARD=icestick", f"{variable}={name}")
     printed = done.stdout.replace("\\\n", " ").splitlines()
-    (command,) = (line for line in printed if re.match(r"\S*(contactfpga build|python -m contactfpga_sim.bits)", line))
+    (command,) = (line for line in printed if re.match(r"\S*(contactfpga build|python -m contactfpga_sim.netlist.replay)", line))
     words = shlex.split(command)
     assert words[words.index(option) + 1] == name
     assert "icestick" in words
     assert not list(tmp_path.rglob("owned"))
+
+
+def test_the_python_that_is_named_may_have_spaces_in_its_path(tmp_path):
+    named = tmp_path / "my  own" / "python $x"
+    named.parent.mkdir()
+    named.symlink_to(sys.executable)
+    done = make(clone(tmp_path / "clone"), "check", f"PYTHON={str(named).replace('$', '$$')}")
+    assert f": {named}\n" in done.stdout
+
+
+def test_a_python_that_does_not_exist_is_reported(tmp_path):
+    done = make(clone(tmp_path / "clone"), "check", "PYTHON=/no such/python")
+    assert done.returncode == 2
+    assert "    /no such/python: not found\n" in done.stderr

@@ -19,7 +19,7 @@ PACKAGES = {
     "contactfpga_hdl": ROOT / "hdl" / "contactfpga_hdl",
     "contactfpga_sim": ROOT / "sim" / "contactfpga_sim",
 }
-SHARED_WITH_GATEWARE = {"contactfpga.skin", "contactfpga.skin.derived", "contactfpga.wire.protocol"}
+SHARED_WITH_GATEWARE = {"contactfpga.skin", "contactfpga.wire.protocol", "contactfpga.errors"}
 
 
 class Import(NamedTuple):
@@ -180,7 +180,7 @@ def test_golden_model_computes_its_own_widths():
         (gateware_faults, "contactfpga_hdl.a", "import contactfpga", True),
         (gateware_faults, "contactfpga_hdl.a", "from contactfpga.driver.driver import open", True),
         (gateware_faults, "contactfpga_hdl.a", "def f():\n  import contactfpga_sim.golden", True),
-        (gateware_faults, "contactfpga_hdl.a", "from contactfpga import skin, protocol", False),
+        (gateware_faults, "contactfpga_hdl.a", "from contactfpga.wire import protocol", False),
         (gateware_faults, "contactfpga_hdl.a", "from contactfpga.skin import Skin", False),
         (gateware_faults, "contactfpga_hdl.a", "from . import stack\nfrom .contactfpga import x", False),
         (golden_faults, "contactfpga_sim.golden", "def f():\n  from amaranth.sim import Simulator", True),

@@ -413,7 +413,7 @@ def skins(draw):
 @settings(max_examples=200, deadline=None)
 def test_a_file_gives_the_same_skin_back(tmp_path_factory, skin):
     path = tmp_path_factory.mktemp("skin") / "skin.toml"
-    path.write_text(skin.to_toml())
+    path.write_text(skin.to_toml(), encoding="utf-8")
     loaded = Skin.load(path)
     assert loaded == skin
     assert loaded.fingerprint == skin.fingerprint

@@ -1,0 +1,128 @@
+"""What contributors meet first: the guides, the forms, the hooks, the citation and the public workflow."""
+
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+WORKFLOW = ROOT / ".github" / "workflows" / "ci.yml"
+GUIDES = ["CONTRIBUTING.md", "SECURITY.md", ".github/PULL_REQUEST_TEMPLATE.md"]
+FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
+PLANNED = {"docs/architecture.md", "docs/extend.md"}  # named before they are written
+
+
+def text(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def workflow():
+    return yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))
+
+
+def targets():
+    return set(re.findall(r"^([a-z-]+):", text("Makefile"), re.MULTILINE))
+
+
+def asked_of_make(source):
+    return set(re.findall(r"(?:`|run: |^    )make ([a-z-]+)", source, re.MULTILINE))
+
+
+@pytest.mark.parametrize("guide", [*GUIDES, ".github/workflows/ci.yml"])
+def test_make_has_every_target_that_is_named(guide):
+    assert asked_of_make(text(guide)) - targets() == set()
+
+
+def test_the_guides_and_the_workflow_name_targets():
+    assert asked_of_make(text("CONTRIBUTING.md")) >= {"sim", "test", "lint", "docs"}
+    assert asked_of_make(text(".github/workflows/ci.yml")) >= {"test", "lint", "docs"}
+
+
+@pytest.mark.parametrize("guide", GUIDES)
+def test_links_lead_to_files(guide):
+    links = {link for link in re.findall(r"\]\(([^)#]+)", text(guide)) if "://" not in link}
+    assert {link for link in links if not (ROOT / link).exists()} - PLANNED == set()
+
+
+def test_what_is_planned_is_not_there_yet():
+    assert [page for page in sorted(PLANNED) if (ROOT / page).exists()] == []
+
+
+def test_the_workflow_runs_the_pythons_that_the_package_names():
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    named = [line.rpartition(" ")[2] for line in project["classifiers"] if re.search(r":: 3\.\d+$", line)]
+    assert workflow()["jobs"]["test"]["strategy"]["matrix"]["python"] == named
+    assert project["requires-python"] == f">={named[0]}"
+
+
+def test_the_workflow_covers_three_systems():
+    jobs = workflow()["jobs"]
+    systems = {job["runs-on"] for job in jobs.values()} | set(jobs["host"]["strategy"]["matrix"]["os"])
+    assert systems >= {"ubuntu-latest", "macos-latest", "windows-latest"}
+
+
+def test_the_workflow_may_only_read_and_ends_in_time():
+    found = workflow()
+    assert found["permissions"] == {"contents": "read"}
+    assert found["concurrency"]["group"]
+    for name, job in found["jobs"].items():
+        assert job["timeout-minutes"] <= 60, name
+        assert "permissions" not in job, name
+        for step in job["steps"]:
+            assert re.fullmatch(r"actions/[a-z-]+@v\d+", step.get("uses", "actions/checkout@v1")), (name, step)
+
+
+@pytest.mark.skipif(not shutil.which("actionlint"), reason="actionlint is not installed; a pre-commit hook runs it")
+def test_actionlint_finds_no_fault():
+    done = subprocess.run(["actionlint", WORKFLOW], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_hooks_format_as_make_lint_does():
+    hooks = yaml.safe_load(text(".pre-commit-config.yaml"))["repos"]
+    (ruff,) = (hook["rev"] for hook in hooks if hook["repo"].endswith("/ruff-pre-commit"))
+    assert f"ruff=={ruff.removeprefix('v')}" in text("pip-constraints.txt").splitlines()
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.stem)
+def test_a_form_asks_something(form):
+    found = yaml.safe_load(form.read_text(encoding="utf-8"))
+    assert {"name", "description", "body"} <= set(found)
+    fields = [field for field in found["body"] if field["type"] != "markdown"]
+    assert len({field["id"] for field in fields}) == len(fields)
+    assert any(field.get("validations", {}).get("required") for field in fields)
+
+
+def test_forms_exist():
+    assert {form.stem for form in FORMS} == {"bug", "feature", "hardware"}
+
+
+def test_the_citation_names_the_software_and_the_paper():
+    found = yaml.safe_load(text("CITATION.cff"))
+    assert {"cff-version", "message", "title", "authors"} <= set(found)
+    project = tomllib.loads(text("pyproject.toml"))["project"]
+    assert (found["title"], found["license"], found["abstract"]) == tuple(
+        project[key] for key in ("name", "license", "description")
+    )
+    (paper,) = found["references"]
+    assert paper["title"] in " ".join(text("README.md").split())
+    assert [author["family-names"] for author in paper["authors"]] == [
+        "Battaglia",
+        "Blanchet",
+        "Kheddar",
+        "Kajita",
+        "Yokoi",
+    ]
+
+
+def test_the_listed_host_tests_need_no_unix_and_no_gateware():
+    command = [sys.executable, "-m", "pytest", "-p", "host_only", "--collect-only", "-q", "@tests/host.txt"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    files = {line.partition("::")[0] for line in done.stdout.splitlines() if "::" in line}
+    assert files == set(text("tests/host.txt").split())
