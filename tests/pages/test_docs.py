@@ -1,7 +1,7 @@
 """The examples in the pages run and print what they say."""
 
 import doctest
-import importlib
+import importlib.util
 import re
 from pathlib import Path
 
@@ -10,11 +10,8 @@ import pytest
 import contactfpga
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted(
-    str(page.relative_to(ROOT))
-    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
-    if ">>>" in page.read_text()
-)
+ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if ">>>" in page.read_text(encoding="utf-8"))
 
 
 def test_the_pages_have_examples():
@@ -63,3 +60,45 @@ def test_links_lead_to_files(page):
         r"\]\(([^)#\s]+)[^)]*\)", re.sub(r"<!--.*?-->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     )
     assert {link for link in links if "://" not in link and not (page.parent / link).exists()} == set()
+
+
+def words(page: Path) -> str:
+    """A page without comments and without what commands write into it."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"<!-- (?:figures|pins): \w+ -->.*?<!-- end -->", "", text, flags=re.DOTALL)
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_files_that_are_named_exist(page):
+    named = re.findall(r"`((?:py|hdl|sim|tests|examples|scripts|constraints)/[\w./-]*)`", words(page))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_modules_that_are_named_exist(page):
+    named = re.findall(r"\b(contactfpga(?:_hdl|_sim)\.[\w.]*\w|(?<=python -m )contactfpga[\w.]*\w)", words(page))
+    assert [name for name in named if not there(name)] == []
+
+
+def there(name: str) -> bool:
+    """Whether this is a module, or something in one."""
+    module, _, last = name.rpartition(".")
+    try:
+        return importlib.util.find_spec(name) is not None or hasattr(importlib.import_module(module), last)
+    except ModuleNotFoundError:
+        return bool(module) and hasattr(importlib.import_module(module), last)
+
+
+def test_a_name_that_is_not_there_is_seen():
+    assert there("contactfpga_sim.board.virtual.VirtualBoard")
+    assert there("contactfpga_sim.board.virtual")
+    assert not there("contactfpga_sim.board.VirtualBoard")
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_one_word_for_a_thing(page):
+    """Zones have barycenters; spelling is American."""
+    wrong = r"centroid|centre|colour|neighbour|(?:synthes|optim|motor|organ)ised?\b|\bbehind\b|\banew\b|towards|licence"
+    if page.name != "verification.md":  # written from tests/claims.toml
+        assert re.findall(wrong, words(page), flags=re.IGNORECASE) == []
