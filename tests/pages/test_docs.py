@@ -52,13 +52,9 @@ def test_each_page_is_in_a_group_of_the_index(page):
     assert f"\n{page.removesuffix('.md')}\n" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    "page", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))], ids=lambda path: path.name
-)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
 def test_links_lead_to_files(page):
-    links = re.findall(
-        r"\]\(([^)#\s]+)[^)]*\)", re.sub(r"<!--.*?-->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    )
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", words(page))
     assert {link for link in links if "://" not in link and not (page.parent / link).exists()} == set()
 
 
