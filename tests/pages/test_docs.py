@@ -97,3 +97,20 @@ def test_one_word_for_a_thing(page):
     """Zones have barycenters; spelling is American."""
     wrong = r"centroid|centre|colour|neighbour|(?:synthes|optim|motor|organ)ised?\b|\bbehind\b|\banew\b|towards|licence"
     assert re.findall(wrong, words(page), flags=re.IGNORECASE) == []
+
+
+ROOMS = sorted(
+    path.parent.relative_to(ROOT)
+    for package in ("hdl/contactfpga_hdl", "sim/contactfpga_sim", "py/contactfpga")
+    for path in (ROOT / package).glob("*/__init__.py")
+)
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=str)
+def test_each_room_is_in_the_readme_the_architecture_and_its_picture(room):
+    package = f"`{room.parent}"
+    (readme,) = [line for line in words(ROOT / "README.md").splitlines() if line.startswith(f"| {package}")]
+    assert f"`{room.name}`" in readme
+    section = words(ROOT / "docs/architecture.md").partition(f"{package}`\n")[2].partition("\n## ")[0]
+    assert re.search(rf"^\| (`\w+`, )?`{room.name}`", section, re.MULTILINE)
+    assert f">{room.name}</text>" in (ROOT / "docs/images/rooms.svg").read_text(encoding="utf-8")
