@@ -74,13 +74,13 @@ constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/
 	$(PY) -m contactfpga_hdl.board.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
-	$(PY) -m contactfpga_sim.pages.figures README.md docs/use.md
+	$(PY) -m contactfpga_sim.pages.figures docs/performance.md
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
-	$(PY) -m contactfpga_sim.pages.size_page README.md docs/boards.md
+	$(PY) -m contactfpga_sim.pages.size_page docs/performance.md docs/boards.md
 
 rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
-	$(PY) scripts/measure_rivals.py --page README.md docs/rivals.md $(ARGS)
+	$(PY) scripts/measure_rivals.py --page docs/performance.md docs/rivals.md $(ARGS)
 
 chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
 	$(VENV)/bin/contactfpga chart $(ARGS)

@@ -1,16 +1,17 @@
 """The examples in the pages run and print what they say."""
 
 import doctest
+import importlib.util
+import re
 from pathlib import Path
 
 import pytest
 
+import contactfpga
+
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted(
-    str(page.relative_to(ROOT))
-    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
-    if ">>>" in page.read_text()
-)
+ALL_PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = sorted(str(page.relative_to(ROOT)) for page in ALL_PAGES if ">>>" in page.read_text(encoding="utf-8"))
 
 
 def test_the_pages_have_examples():
@@ -22,3 +23,94 @@ def test_examples_print_what_they_say(page):
     results = doctest.testfile(str(ROOT / page), module_relative=False)
     assert results.attempted > 0
     assert results.failed == 0
+
+
+def documented(page: str) -> set[str]:
+    """Names that the directives of the interface's page take: one by one, or all of a module that are its own."""
+    found = set(re.findall(r"^\.\. auto(?:class|function):: (\S+)$", page, re.MULTILINE))
+    for module in re.findall(r"^\.\. automodule:: (\S+)\n   :members:$", page, re.MULTILINE):
+        values = vars(importlib.import_module(module)).items()
+        found |= {f"contactfpga.{name}" for name, value in values if getattr(value, "__module__", None) == module}
+    return found
+
+
+def test_the_interface_page_has_every_public_name():
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    names = {f"contactfpga.{name}" for name in contactfpga.__all__}
+    assert names - documented(page) == {"contactfpga.__version__"}
+    assert "contactfpga.__version__" in page
+
+
+def test_each_documented_module_has_its_heading():
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    for module in re.findall(r"^\.\. automodule:: (\S+)$", page, re.MULTILINE):
+        assert re.search(rf"^#+ {re.escape(module)}$", page, re.MULTILINE), module
+
+
+@pytest.mark.parametrize("page", sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name != "index.md"))
+def test_each_page_is_in_a_group_of_the_index(page):
+    assert f"\n{page.removesuffix('.md')}\n" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_links_lead_to_files(page):
+    links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", words(page))
+    assert {link for link in links if "://" not in link and not (page.parent / link).exists()} == set()
+
+
+def words(page: Path) -> str:
+    """A page without comments and without what commands write into it."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"<!-- (?:figures|pins): \w+ -->.*?<!-- end -->", "", text, flags=re.DOTALL)
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_files_that_are_named_exist(page):
+    named = re.findall(r"`((?:py|hdl|sim|tests|examples|scripts|constraints)/[\w./-]*)`", words(page))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_modules_that_are_named_exist(page):
+    named = re.findall(r"\b(contactfpga(?:_hdl|_sim)\.[\w.]*\w|(?<=python -m )contactfpga[\w.]*\w)", words(page))
+    assert [name for name in named if not there(name)] == []
+
+
+def there(name: str) -> bool:
+    """Whether this is a module, or something in one."""
+    module, _, last = name.rpartition(".")
+    try:
+        return importlib.util.find_spec(name) is not None or hasattr(importlib.import_module(module), last)
+    except ModuleNotFoundError:
+        return bool(module) and hasattr(importlib.import_module(module), last)
+
+
+def test_a_name_that_is_not_there_is_seen():
+    assert there("contactfpga_sim.board.virtual.VirtualBoard")
+    assert there("contactfpga_sim.board.virtual")
+    assert not there("contactfpga_sim.board.VirtualBoard")
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_one_word_for_a_thing(page):
+    """Zones have barycenters; spelling is American."""
+    wrong = r"centroid|centre|colour|neighbour|(?:synthes|optim|motor|organ)ised?\b|\bbehind\b|\banew\b|towards|licence"
+    assert re.findall(wrong, words(page), flags=re.IGNORECASE) == []
+
+
+ROOMS = sorted(
+    path.parent.relative_to(ROOT)
+    for package in ("hdl/contactfpga_hdl", "sim/contactfpga_sim", "py/contactfpga")
+    for path in (ROOT / package).glob("*/__init__.py")
+)
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=str)
+def test_each_room_is_in_the_readme_the_architecture_and_its_picture(room):
+    package = f"`{room.parent}"
+    (readme,) = [line for line in words(ROOT / "README.md").splitlines() if line.startswith(f"| {package}")]
+    assert f"`{room.name}`" in readme
+    section = words(ROOT / "docs/architecture.md").partition(f"{package}`\n")[2].partition("\n## ")[0]
+    assert re.search(rf"^\| (`\w+`, )?`{room.name}`", section, re.MULTILINE)
+    assert f">{room.name}</text>" in (ROOT / "docs/images/rooms.svg").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Measures what the README and the pages state, in clock cycles of the gateware, and writes it there.
+"""Measures what the pages state, in clock cycles of the gateware, and writes it there.
 
 `make figures` runs it. Everything here is exact and repeatable; a test compares the tables in the files with a new run.
 """

@@ -1,4 +1,4 @@
-"""Measures by place and route what README and boards page state of size and clock, and writes it there.
+"""Measures by place and route what the performance and boards pages state of size and clock, and writes it there.
 
 `make sizes` runs it: some 160 runs of place and route, an hour and more of one core unless they are kept from before.
 """
