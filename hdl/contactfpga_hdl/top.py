@@ -9,12 +9,14 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.debounce.even import Debounce
 from contactfpga_hdl.debounce.timed import TimedDebounce
 from contactfpga_hdl.label import LABELLERS
-from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.link import Link, offset_bits
+from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver, Transmitter
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
-from contactfpga_hdl.report.divide import Divide
+from contactfpga_hdl.report.backlog import Backlog
+from contactfpga_hdl.report.divide import Divider
 from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.pins import column_pins, connect_pins, row_pins
 from contactfpga_hdl.scan.raster import Scanner
@@ -63,17 +65,17 @@ class Top(wiring.Component):
         m = Module()
         bit_clocks = Derived(self.skin).bit_clocks
         m.submodules.scan = scan = Scanner(self.skin) if self.skin.scan == "raster" else AdaptiveScanner(self.skin)
+        rows = self._debounced(m, scan)
+        items, summary = self._bitmap(m, rows) if self.skin.report == "cells" else self._zones(m, rows)
+        m.submodules.packer = packer = Packer(self.skin, offset_bits(self.skin))
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
         m.submodules.request = request = RequestReader()
-        wiring.connect(m, receiver.bits, request.bits)
-        rows = self._debounced(m, scan)
-        if self.skin.report == "cells":
-            self._cells(m, rows, scan, link)
-        else:
-            self._zones(m, rows, scan, link)
+        wiring.connect(m, items, packer.items)
+        wiring.connect(m, packer.frames, link.frames)
         wiring.connect(m, link.bytes, transmitter.bytes)
+        wiring.connect(m, receiver.bits, request.bits)
         connect_pins(m, scan.pins, self)
         m.d.comb += [
             self.contact.eq(scan.contact),
@@ -81,7 +83,10 @@ class Top(wiring.Component):
             receiver.pin.eq(self.rx),
             scan.request.eq(request.received),
             scan.heard.eq(request.heard),
+            packer.tag.eq(scan.tag),
+            packer.summary.eq(summary),
             link.tag.eq(scan.tag),
+            link.summary.eq(summary),
             link.epoch.eq(scan.epoch),
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
@@ -92,6 +97,7 @@ class Top(wiring.Component):
         return m
 
     def _debounced(self, m, scan):
+        """The scanner's rows without bounce."""
         if self.skin.debounce == "none":
             return scan.rows
         adaptive = self.skin.scan == "adaptive"
@@ -101,40 +107,39 @@ class Top(wiring.Component):
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
-    def _zones(self, m, rows, scan, link):
+    def _zones(self, m, rows):
+        """Items of a frame's zones, and its summary."""
         m.submodules.label = label = LABELLERS[self.skin.labeller](self.skin)
         m.submodules.audit = audit = Audit(self.skin)
+        m.submodules.backlog = backlog = Backlog(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)
-        if self.skin.report == "barycenter":
-            self._divided(m, audit, link)
-        else:
-            wiring.connect(m, audit.items, link.items)
-        m.d.comb += [
-            audit.taken.eq(rows.valid & rows.ready),
-            audit.row.eq(rows.payload),
-            link.summary.eq(audit.summary),
-        ]
+        wiring.connect(m, audit.items, backlog.passed)
+        m.d.comb += [audit.taken.eq(rows.valid & rows.ready), audit.row.eq(rows.payload)]
         if self.probes:
             record = label.records.payload
             self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+        items = self._divided(m, backlog) if self.skin.report == "barycenter" else backlog.waiting
+        return items, audit.summary
 
-    def _divided(self, m, audit, link):
-        m.submodules.divide = divide = Divide(self.skin)
-        wiring.connect(m, audit.items, divide.records)
-        wiring.connect(m, divide.items, link.items)
+    def _divided(self, m, backlog):
+        m.submodules.divide = divide = Divider(self.skin)
+        wiring.connect(m, backlog.waiting, divide.records)
         if self.probes:
             item = divide.items.payload
             self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
+        return divide.items
 
-    def _cells(self, m, rows, scan, link):
+    def _bitmap(self, m, rows):
+        """Items of a frame's rows as they are, and its summary."""
         m.submodules.bitmap = bitmap = Bitmap(self.skin)
+        m.submodules.backlog = backlog = Backlog(self.skin)
         wiring.connect(m, rows, bitmap.rows)
-        wiring.connect(m, bitmap.items, link.items)
-        m.d.comb += link.summary.eq(bitmap.summary)
+        wiring.connect(m, bitmap.items, backlog.passed)
         if self.probes:
             item = bitmap.items.payload
             self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
+        return backlog.waiting, bitmap.summary
 
     def _probe(self, m, name, boundary, **fields):
         m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)

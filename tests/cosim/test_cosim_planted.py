@@ -18,7 +18,7 @@ CYCLES = 4 * 72 * 8
 STAGES = {
     "rows": ("Scanner", "rows"),
     "records": ("labeller", "records"),
-    "items": ("Divide", "items"),
+    "items": ("Divider", "items"),
     "bytes": ("Link", "bytes"),
     "line": ("Transmitter", "pin"),
 }

@@ -11,47 +11,11 @@ One divider for x and y in turn takes 18 LUT4 less on an iCE40UP5K with 16x16 ce
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import barycenter_layout, item_layout, record_layout
-
-
-class Divide(wiring.Component):
-    """Records of exact moments in, items of area and barycenter out, in the same order.
-
-    Records wait in a queue, from which one can be taken two clocks after it came; ``records`` is always ready, as the
-    queue has room for what can wait. See :class:`Divider` for the clocks from there on.
-    """
-
-    def __init__(self, skin: Skin):
-        self.skin = skin
-        self.derived = Derived(skin)
-        super().__init__(
-            {
-                "records": In(stream.Signature(record_layout(self.derived))),
-                "items": Out(stream.Signature(item_layout(self.derived))),
-            }
-        )
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.queue = queue = SyncFIFOBuffered(
-            width=record_layout(self.derived).size, depth=self.derived.backlog
-        )
-        m.submodules.divider = divider = Divider(self.skin)
-        m.d.comb += [
-            queue.w_data.eq(self.records.payload),
-            queue.w_en.eq(self.records.valid),
-            self.records.ready.eq(queue.w_rdy),
-            divider.records.payload.eq(queue.r_data),
-            divider.records.valid.eq(queue.r_rdy),
-            queue.r_en.eq(divider.records.ready),
-        ]
-        wiring.connect(m, divider.items, wiring.flipped(self.items))
-        return m
 
 
 class Divider(wiring.Component):
