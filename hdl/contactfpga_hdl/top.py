@@ -1,7 +1,9 @@
 """The whole chain for one Skin; wiring only."""
 
-from amaranth.hdl import Module, Mux
-from amaranth.lib import wiring
+from typing import Any
+
+from amaranth.hdl import Module, Mux, Value
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
@@ -23,11 +25,12 @@ from contactfpga_hdl.scan.raster import Scanner
 
 
 class Top(wiring.Component):
-    """Row and column pins, UART and ``contact`` pin.
+    """A Skin's gateware between the pins of the sheet and those of the host.
 
-    The pins at the sheet are ``rows`` and ``columns``, or those of the shift registers in their place, one data pin a
-    chain: ``row_data``, ``row_clock``, ``row_latch``, ``row_enable_n``; ``column_load_n``, ``column_clock``,
-    ``column_data``.
+    rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
+    :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
+    tx (out), rx (in): the UART.
+    contact (out): high while something touches the sheet.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
@@ -96,7 +99,7 @@ class Top(wiring.Component):
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
-    def _debounced(self, m, scan):
+    def _debounced(self, m: Module, scan: Scanner | AdaptiveScanner) -> stream.Interface:
         """The scanner's rows without bounce."""
         if self.skin.debounce == "none":
             return scan.rows
@@ -107,8 +110,9 @@ class Top(wiring.Component):
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
-    def _zones(self, m, rows):
+    def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's zones, and its summary."""
+        label: Any  # any labeller
         m.submodules.label = label = LABELLERS[self.skin.labeller](self.skin)
         m.submodules.audit = audit = Audit(self.skin)
         m.submodules.backlog = backlog = Backlog(self.skin)
@@ -122,7 +126,7 @@ class Top(wiring.Component):
         items = self._divided(m, backlog) if self.skin.report == "barycenter" else backlog.waiting
         return items, audit.summary
 
-    def _divided(self, m, backlog):
+    def _divided(self, m: Module, backlog: Backlog) -> stream.Interface:
         m.submodules.divide = divide = Divider(self.skin)
         wiring.connect(m, backlog.waiting, divide.records)
         if self.probes:
@@ -130,7 +134,7 @@ class Top(wiring.Component):
             self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
         return divide.items
 
-    def _bitmap(self, m, rows):
+    def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's rows as they are, and its summary."""
         m.submodules.bitmap = bitmap = Bitmap(self.skin)
         m.submodules.backlog = backlog = Backlog(self.skin)
@@ -141,7 +145,7 @@ class Top(wiring.Component):
             self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
         return backlog.waiting, bitmap.summary
 
-    def _probe(self, m, name, boundary, **fields):
+    def _probe(self, m: Module, name: str, boundary: stream.Interface, **fields: Value) -> None:
         m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
         for field, value in fields.items():
             m.d.comb += getattr(self, f"{name}_{field}").eq(value)

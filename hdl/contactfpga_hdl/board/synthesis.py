@@ -1,4 +1,4 @@
-"""What yosys and nextpnr are told: the same for bitstreams, for simulated netlists and for the figures."""
+"""What yosys and nextpnr do: the same for bitstreams, for simulated netlists and for the figures."""
 
 import dataclasses
 
@@ -49,7 +49,7 @@ def overrides(fpga: str) -> dict[str, str]:
 
 
 def script(fpga: str, top: str) -> str:
-    """Yosys commands that synthesise what was read as RTLIL."""
+    """Yosys commands that synthesize what was read as RTLIL."""
     family = _family(fpga)
     return "; ".join((*family.before, f"{family.command} {family.options} -top {top}"))
 

@@ -2,7 +2,7 @@
 
 import math
 
-from amaranth.hdl import Array, Module, Mux, Signal
+from amaranth.hdl import Array, Module, Mux, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -83,7 +83,7 @@ class Join(wiring.Component):
             m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(decided)]
         return m
 
-    def _brackets(self, m, works, known):
+    def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value]:
         """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before?
 
         Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
@@ -108,7 +108,7 @@ class Join(wiring.Component):
                 ]
         return old_after[0], old_before[0]
 
-    def _take_in(self, m, current, pop, waiting):
+    def _take_in(self, m: Module, current: data.View, pop: Value, waiting: data.View) -> data.View:
         """The current group, with the group that waited on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
@@ -122,7 +122,7 @@ class Join(wiring.Component):
             ]
         return joined
 
-    def _add_run(self, m, joined, number):
+    def _add_run(self, m: Module, joined: data.View, number: Value) -> data.View:
         group = Signal(self._group_layout)
         m.d.comb += group.eq(joined)
         with m.If(self.step.has_run):
@@ -134,12 +134,14 @@ class Join(wiring.Component):
             ]
         return group
 
-    def _mark(self, m, known, current, pop, waiting, joined):
+    def _mark(
+        self, m: Module, known: _Brackets, current: data.View, pop: Value, waiting: data.View, joined: data.View
+    ) -> None:
         """Set the brackets of runs of the new row that are now known to be of one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
 
-        def bit(condition, number):
+        def bit(condition: Value, number: Value) -> Value:
             return Mux(condition, 1 << number, 0)
 
         m.d.comb += [
@@ -147,7 +149,7 @@ class Join(wiring.Component):
             known.new_after.eq(known.after | bit(over, current.first) | bit(onto, known.number)),
         ]
 
-    def _decide(self, m, group, pop, begun):
+    def _decide(self, m: Module, group: data.View, pop: Value, begun: Value) -> data.View:
         step = self.step
         closed = step.closes & (group.open == 0)
         decided = Signal(self.join.shape())
@@ -165,7 +167,7 @@ class Join(wiring.Component):
             m.d.comb += self._run_moments(m, decided.run)
         return decided
 
-    def _run_moments(self, m, run):
+    def _run_moments(self, m: Module, run: data.View) -> list:
         """Moments of the new run; the columns' sum is a difference of triangular numbers."""
         start, stop = self.step.start, self.step.stop
         columns = self.derived.skin.columns

@@ -6,7 +6,7 @@ touch come out as one, and a ring comes out with what lies inside it. A contact 
 split, and the moments of what is taken as a zone are exact.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -21,11 +21,14 @@ def _step_layout() -> data.StructLayout:
 
 
 class ProjectionLabeller(wiring.Component):
-    """Rows in, zone records out; a column a clock.
+    """Rows in, zone records out; one column per clock.
 
-    A row of C columns takes C + 1 clocks, an empty one outside a band one. A band closes with the empty row behind it
+    A row of C columns takes C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it
     or with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock
     h + x + 3.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -46,14 +49,14 @@ class ProjectionLabeller(wiring.Component):
         self._let_out(m, enable, added, total)
         return m
 
-    def _walk_columns(self, m, enable):
+    def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
         """Steps through the columns of a row; returns the step, its column and its row."""
         step = Signal(_step_layout())
         column = Signal(range(max(2, self.derived.skin.columns)))
         y = Signal(range(max(2, self.derived.skin.rows)))
         columns = self.derived.skin.columns
         row = self.rows.payload
-        cells, shadow = Signal(columns), Signal(columns)  # both are turned by a column a clock
+        cells, shadow = Signal(columns), Signal(columns)  # both move on by one column per clock
         walks, closes, last = Signal(), Signal(), Signal()
         y_next = Signal.like(y)
         in_band = Signal()
@@ -91,7 +94,9 @@ class ProjectionLabeller(wiring.Component):
             ]
         return step, column, y
 
-    def _add_cells(self, m, enable, step, column, y):
+    def _add_cells(
+        self, m: Module, enable: Value, step: data.View, column: Value, y: Value
+    ) -> tuple[data.View, data.View]:
         """Each column's moments in the band so far, with the cell of this row; one clock after the walk."""
         layout = moments_layout(self.derived)
         m.submodules.sums = sums = memory.Memory(shape=layout, depth=self.derived.skin.columns, init=[])
@@ -112,7 +117,7 @@ class ProjectionLabeller(wiring.Component):
             m.d.sync += [added.eq(read_step), total.eq(write.data)]
         return added, total
 
-    def _let_out(self, m, enable, step, total):
+    def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
         """In a band that closes the columns of a run are added up; one clock after their own sums."""
         kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes

@@ -6,7 +6,7 @@ adds the moments that its zone brings in: from the table, or from a group that w
 too, each at a place in its cluster and with the place of the one that began to wait before it.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -35,11 +35,11 @@ class _Walk:
         self.place = place_of(derived, self.column)[: (derived.open_zones - 1).bit_length()]
 
     @property
-    def cell(self):
+    def cell(self) -> Value:
         return self.cells[0]
 
     @property
-    def cell_before(self):
+    def cell_before(self) -> Value:
         return self.before[0]
 
 
@@ -124,7 +124,7 @@ class SerialLabeller(wiring.Component):
         self._let_out(m, walk, acts, group)
         return m
 
-    def _walk(self, m, walk, acts):
+    def _walk(self, m: Module, walk: _Walk, acts: _Acts) -> None:
         row = self.rows.payload
         handed = self.rows.valid & ~walk.active & ~walk.tail
         ends = walk.column == self.derived.skin.columns - 1
@@ -147,7 +147,7 @@ class SerialLabeller(wiring.Component):
             with m.If(handed):
                 m.d.sync += [walk.last.eq(row.last), walk.y.eq(Mux(walk.last, 0, walk.y + 1))]
 
-    def _cut(self, m, walk, acts, waits):
+    def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value) -> None:
         """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.
 
         ``waits``: the group waits for the run of the row before if one begins.
@@ -176,7 +176,7 @@ class SerialLabeller(wiring.Component):
             acts.joins.eq(acts.begins & walk.second),
         ]
 
-    def _read_bracket(self, m, walk, acts, read):
+    def _read_bracket(self, m: Module, walk: _Walk, acts: _Acts, read: memory.ReadPort) -> None:
         # With 8-connectivity a place is two columns'. It is read before a run of the new row can begin in either.
         odd = walk.column[0] if self.derived.skin.connectivity == 8 else 1
         m.d.comb += [
@@ -184,7 +184,16 @@ class SerialLabeller(wiring.Component):
             read.addr.eq(place_of(self.derived, walk.next_column)),
         ]
 
-    def _write_brackets(self, m, walk, acts, group, found, earlier_runs, later_runs):
+    def _write_brackets(
+        self,
+        m: Module,
+        walk: _Walk,
+        acts: _Acts,
+        group: _Group,
+        found: data.View,
+        earlier_runs: memory.Memory,
+        later_runs: memory.Memory,
+    ) -> None:
         """A run has later ones until its zone is known to have none; it has earlier ones if its group has."""
         write_earlier = earlier_runs.write_port()
         write_later = later_runs.write_port()
@@ -197,7 +206,7 @@ class SerialLabeller(wiring.Component):
             write_later.data.eq(acts.starts),
         ]
 
-    def _nest(self, m, acts, group, earlier, later, below):
+    def _nest(self, m: Module, acts: _Acts, group: _Group, earlier: Value, later: Value, below: Value) -> None:
         # For each zone with runs of the row before passed and to come, the innermost first, whether its group has no
         # other one further out.
         outermost = Signal(nesting(self.derived))
@@ -215,7 +224,9 @@ class SerialLabeller(wiring.Component):
             with m.Elif(acts.joins & earlier & group.whole):
                 m.d.sync += group.top.eq(below)
 
-    def _read_group(self, m, walk, acts, group, groups, earlier):
+    def _read_group(
+        self, m: Module, walk: _Walk, acts: _Acts, group: _Group, groups: memory.Memory, earlier: Value
+    ) -> data.View:
         """The zone or group that joins this one, wanted in the clock before; 0 if there is none."""
         read = groups.read_port()
         wanted = Signal()
@@ -225,7 +236,7 @@ class SerialLabeller(wiring.Component):
         ]
         return read.data
 
-    def _know_runs(self, m, walk, acts, group, found):
+    def _know_runs(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
         with m.If(acts.enable):
             with m.If(~group.has_run):
                 m.d.sync += group.first.eq(walk.place)
@@ -240,7 +251,7 @@ class SerialLabeller(wiring.Component):
             with m.If(acts.closes | ~walk.active):
                 m.d.sync += group.has_run.eq(0)
 
-    def _sum(self, m, walk, acts, group, found):
+    def _sum(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
         with m.If(acts.enable):
             for name, share in (("area", 1), ("sum_x", walk.column), ("sum_y", walk.y)):
                 more = found.moments[name] | Mux(acts.adds, share, 0)
@@ -248,7 +259,7 @@ class SerialLabeller(wiring.Component):
         with m.If(acts.enable & (acts.closes | ~walk.active)):  # at power-up what the memory reads is not known
             m.d.sync += group.moments.eq(0)
 
-    def _store_group(self, m, acts, group, groups):
+    def _store_group(self, m: Module, acts: _Acts, group: _Group, groups: memory.Memory) -> None:
         write = groups.write_port()
         m.d.comb += [
             write.en.eq(acts.closes & (group.has_run | ~group.whole)),
@@ -260,7 +271,7 @@ class SerialLabeller(wiring.Component):
             write.data.below.eq(group.top),
         ]
 
-    def _let_out(self, m, walk, acts, group):
+    def _let_out(self, m: Module, walk: _Walk, acts: _Acts, group: _Group) -> None:
         mark = Signal()
         leaves = acts.closes & group.whole & (~group.has_run | walk.last)
         m.d.comb += [

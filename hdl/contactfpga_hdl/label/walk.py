@@ -1,6 +1,6 @@
 """Two adjacent rows, cut into steps."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,14 +9,14 @@ from contactfpga_hdl.label.steps import step_layout
 from contactfpga_hdl.payloads import row_layout
 
 
-def _split(m, bits):
+def _split(m: Module, bits: Value) -> tuple[Value, Value]:
     """The lowest bit that is set, alone, and the others."""
     lowest, others = Signal.like(bits), Signal.like(bits)
     m.d.comb += [others.eq(bits & (bits - 1)), lowest.eq(bits & ~others)]
     return lowest, others
 
 
-def _index(one_hot, width):
+def _index(one_hot: Value, width: int) -> Value:
     """Number of the bit that is set."""
     return Cat(
         Cat(one_hot[i] for i in range(len(one_hot)) if i >> bit & 1).any() if len(one_hot) > 1 else Const(0, 1)
@@ -64,7 +64,7 @@ class Walk(wiring.Component):
         self._take_row(m, left)
         return m
 
-    def _walk_clusters(self, m, left):
+    def _walk_clusters(self, m: Module, left: _Left) -> None:
         work = left.inside[0]
         inside = left.inside
         before, befores_left = _split(m, left.befores)
@@ -100,7 +100,7 @@ class Walk(wiring.Component):
             with m.If(closes):
                 self._next_cluster(m, left, left.ends)
 
-    def _take_row(self, m, left):
+    def _take_row(self, m: Module, left: _Left) -> None:
         row = self.rows.payload
         before = Signal.like(row.cells)  # the row last taken, empty before a frame
         y_next = Signal.like(left.y)
@@ -127,7 +127,7 @@ class Walk(wiring.Component):
             m.d.comb += row_ends.eq((row.cells | before) & ~joined)
             self._next_cluster(m, left, row_ends)
 
-    def _next_cluster(self, m, left, ends):
+    def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
         """Of the clusters that end there, the first one is next."""
         upto, others = Signal.like(left.ends), Signal.like(left.ends)
         m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]

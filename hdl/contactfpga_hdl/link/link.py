@@ -1,6 +1,6 @@
 """Whole frames from the packer to the wire, newest first, and hellos between them."""
 
-from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import crc, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -83,7 +83,7 @@ class Link(wiring.Component):
         self._send(m, wire, regions, hello_due, byte)
         return m
 
-    def _place_frames(self, m, wire, regions):
+    def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
         with m.If(wire.take_frame):
             m.d.sync += [
                 regions.waits.eq(0),
@@ -100,7 +100,7 @@ class Link(wiring.Component):
                 regions.filling.eq(regions.waiting),
             ]
 
-    def _decide(self, m, wire, regions):
+    def _decide(self, m: Module, wire: _Wire, regions: _Regions) -> Value:
         """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known.
 
         Returns how many frames were sent, in the digits that are not the odometer's.
@@ -122,7 +122,7 @@ class Link(wiring.Component):
                 m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
         return frames_sent
 
-    def _time_hello(self, m, wire, hello_due):
+    def _time_hello(self, m: Module, wire: _Wire, hello_due: Value) -> None:
         period = self.derived.hello_frames
         since = Signal(range(max(2, period)))
         waited, due = self._wait(since, period)
@@ -135,14 +135,14 @@ class Link(wiring.Component):
         with m.If(self.asked):
             m.d.sync += hello_due.eq(1)
 
-    def _wait(self, waited, limit):
+    def _wait(self, waited: Value, limit: int) -> tuple[Value, Value]:
         """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
         if self.skin.scan == "raster":
             return waited + 1, waited == limit - 1
         longer = waited + self.tag.slots
         return longer, longer >= limit
 
-    def _read_byte(self, m, wire, regions, digit):
+    def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
         """The byte on offer, from the memory or in a hello's state from the counters."""
         init = [0] * hello_words(self.skin).start + list(stored_hello(self.skin))
         m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
@@ -156,7 +156,7 @@ class Link(wiring.Component):
         in_state = wire.is_hello & (wire.offset >> STATE_PLACE_BITS == protocol.STATE_OFFSET >> STATE_PLACE_BITS)
         return Mux(in_state, Cat(digit, Const(1, 1)), read.data)
 
-    def _send(self, m, wire, regions, hello_due, byte):
+    def _send(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value) -> None:
         end = Signal.like(wire.offset)
         seeds = Signal()  # one clock after a frame was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
@@ -204,7 +204,7 @@ class Link(wiring.Component):
                     with m.If(tail == CHECK_BYTES):
                         m.next = "IDLE"
 
-    def _state_digit(self, m, wire, frames_sent):
+    def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
         """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
         m.submodules.odometer = odometer = Odometer()
         place = wire.offset[:STATE_PLACE_BITS]

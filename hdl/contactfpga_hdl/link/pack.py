@@ -1,6 +1,6 @@
 """Items to the bytes of a frame: items and trailer, stuffed with COBS as they are written."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -56,7 +56,7 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 
 
 class Packer(wiring.Component):
-    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; a byte a clock.
+    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; one byte per clock.
 
     An item is taken with its last byte.
 
@@ -89,7 +89,7 @@ class Packer(wiring.Component):
         self._stuff(m, plain, restart)
         return m
 
-    def _sequence_bytes(self, m, plain, restart):
+    def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
         """Items as they come, each taken with its last byte, then the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
         decide, send = self.frames.decide, self.frames.verdict.send
@@ -125,7 +125,7 @@ class Packer(wiring.Component):
         with m.If(free):
             m.d.sync += plain.payload.eq(Mux(from_trailer, trailer.word_select(index, 8), item.word_select(index, 8)))
 
-    def _trailer(self, m):
+    def _trailer(self, m: Module) -> Value:
         trailer = Signal(_trailer_layout(self.derived))
         m.d.comb += [
             trailer.time.eq(self.tag.time),
@@ -141,7 +141,7 @@ class Packer(wiring.Component):
         ]
         return trailer.as_value()
 
-    def _stuff(self, m, plain, restart):
+    def _stuff(self, m: Module, plain: stream.Interface, restart: Value) -> None:
         """COBS: ``code`` is the place of the open block's length, ``length`` that length so far."""
         write, commit = self.frames.write, self.frames.commit
         code = Signal.like(write.offset)

@@ -9,7 +9,7 @@ One divider for x and y in turn takes 18 LUT4 less on an iCE40UP5K with 16x16 ce
 22 with 64x64 (91, not 113), and twice the clocks, in which a dense frame's zones would not be done before the next.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -19,11 +19,14 @@ from contactfpga_hdl.payloads import barycenter_layout, item_layout, record_layo
 
 
 class Divider(wiring.Component):
-    """One zone at a time, a bit a clock: offered in clock t, its item is offered from ``t + Q + 1`` on, with Q =
+    """One zone at a time, one bit per clock: offered in clock t, its item is offered from ``t + Q + 1`` on, with Q =
     ``Derived.quotient_bits``, and the next zone can begin in that clock.
 
     While an item waits, the next zone is divided up to its last bit. A zone is taken with that bit; an end mark passes
     without delay when no item is before it.
+
+    records (in): zones and end marks.
+    items (out): area and barycenter of each, in the same order.
     """
 
     def __init__(self, skin: Skin):
@@ -68,7 +71,7 @@ class Divider(wiring.Component):
         ]
         return m
 
-    def _divide(self, m, name, total, area, begins, steps):
+    def _divide(self, m: Module, name: str, total: Value, area: Value, begins: Value, steps: Value) -> Value:
         """Registers of one axis; returns the quotient's bits, the last of them worked out in this clock."""
         whole = self.derived.cell_bits
         # Kept inverted, so that adding the area subtracts it and no carry is left where it fits.
@@ -85,7 +88,7 @@ class Divider(wiring.Component):
             m.d.sync += [remainder.eq(Mux(fits, less, shifted)), bits.eq(Cat(fits, bits))]
         return Cat(fits, bits)
 
-    def _rounded(self, m, quotients):
+    def _rounded(self, m: Module, quotients: data.View) -> Value:
         """The bits of x and y on the wire."""
         layout = barycenter_layout(self.derived)
         return Cat(((quotients[name] + 1) >> 1)[: layout[name].width] for name in ("x", "y"))

@@ -1,6 +1,6 @@
 """Drives rows together where nothing is touched, one by one where something is."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -86,7 +86,7 @@ class AdaptiveScanner(wiring.Component):
         ]
         return m
 
-    def _read_columns(self, m, levels, seek, sample):
+    def _read_columns(self, m: Module, levels: Value, seek: Seek, sample: _Sample) -> None:
         m.d.comb += [
             sample.read.eq(~levels if self.skin.selects_low else levels),
             sample.pressed.eq(sample.read),
@@ -97,7 +97,7 @@ class AdaptiveScanner(wiring.Component):
             with m.If(seek.pattern[row]):
                 m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
-    def _time_slots(self, m, driver, seek, sample):
+    def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Sample) -> None:
         """As in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it is the
         slot's strobe, and the release begins after it."""
         derived = self.derived
@@ -137,7 +137,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(wakes):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
-    def _offer_rows(self, m, seek, sample):
+    def _offer_rows(self, m: Module, seek: Seek, sample: _Sample) -> None:
         """Rows that are known, in order; at most one that was driven alone waits."""
         rows = self.rows
         place = Signal(self.skin.rows, init=1)  # of the next row to go, one-hot
@@ -159,7 +159,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(seek.strobe & seek.alone):
             m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
-    def _keep_listed(self, m, seek):
+    def _keep_listed(self, m: Module, seek: Seek) -> None:
         """A row stays on the list if it was pressed, or a switch in it counted so, after its sample before."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
@@ -169,7 +169,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(seek.strobe & seek.alone):
             m.d.sync += before.eq(before & ~seek.pattern | Mux(seek.hit, seek.pattern, 0))
 
-    def _watch_contact(self, m, seek, sample):
+    def _watch_contact(self, m: Module, seek: Seek, sample: _Sample) -> None:
         """In a probe a column counts if none of its switches is masked."""
         clean = sum(1 << column for column in range(self.skin.columns) if all(column != c for _, c in self.skin.mask))
         row, seen = Signal(), Signal()
@@ -181,7 +181,7 @@ class AdaptiveScanner(wiring.Component):
         with m.Elif(seek.ends & ~seen):
             m.d.sync += self.contact.eq(0)
 
-    def _tag_frame(self, m, seek):
+    def _tag_frame(self, m: Module, seek: Seek) -> None:
         """Time and request at the first strobe, and how many slots there were up to the last."""
         per_us = self.derived.clocks_per_us
         prescaler = Signal(range(max(2, per_us)))

@@ -1,6 +1,6 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -23,7 +23,7 @@ class _Slots:
         self.following = Signal(derived.skin.rows, init=1 << begun % derived.skin.rows)  # row of the next one, one-hot
 
     @property
-    def is_last(self):
+    def is_last(self) -> Value:
         return self.following[0] & self.scans
 
 
@@ -95,7 +95,7 @@ class Scanner(wiring.Component):
         ]
         return m
 
-    def _drive_rows(self, m, slots, driver):
+    def _drive_rows(self, m: Module, slots: _Slots, driver: DirectRows | RowChain) -> None:
         derived = self.derived
         slot, shifting = derived.row_clocks, derived.row_shift_clocks
         ends = slots.clock == slot - 1
@@ -109,7 +109,7 @@ class Scanner(wiring.Component):
             driver.release.eq(slots.clock == derived.settle_clocks - 1),
         ]
 
-    def _sample_columns(self, m, slots, reader, sample):
+    def _sample_columns(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> None:
         """A slot has two samples: in the last clock its row is driven, and in the last one that no row is."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
@@ -126,7 +126,7 @@ class Scanner(wiring.Component):
         with m.If(sample.of_row):
             m.d.sync += sample.row.eq(Mux(sample.is_last, 0, sample.row + 1))
 
-    def _mask_row(self, m, levels, sample):
+    def _mask_row(self, m: Module, levels: Value, sample: _Sample) -> None:
         m.d.comb += [
             sample.read.eq(~levels if self.skin.selects_low else levels),
             sample.pressed.eq(sample.read),
@@ -136,7 +136,7 @@ class Scanner(wiring.Component):
                 with m.Case(row):
                     m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
-    def _offer_row(self, m, sample):
+    def _offer_row(self, m: Module, sample: _Sample) -> None:
         with m.If(sample.of_row):
             m.d.sync += [
                 self.rows.valid.eq(1),
@@ -146,7 +146,7 @@ class Scanner(wiring.Component):
         with m.Elif(self.rows.ready):
             m.d.sync += self.rows.valid.eq(0)
 
-    def _watch_contact(self, m, sample):
+    def _watch_contact(self, m: Module, sample: _Sample) -> None:
         seen = Signal()  # in this scan's rows so far
         with m.If(sample.of_row):
             now = sample.pressed.any()
@@ -155,7 +155,7 @@ class Scanner(wiring.Component):
                 self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
             ]
 
-    def _tag_frame(self, m, slots, sample):
+    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> None:
         """Time and request at the first row's sample; the tag takes them over with the last row's strobe."""
         per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
         # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of the

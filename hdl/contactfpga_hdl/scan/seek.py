@@ -89,7 +89,7 @@ class Seek(wiring.Component):
                 self._start(m, plan)
         return m
 
-    def _keep_list(self, m, plan):
+    def _keep_list(self, m: Module, plan: _Plan) -> None:
         """Rows to be driven alone in the next frame, and how many."""
         with m.If(self.strobe & self.alone):
             was = (plan.on_list & self.pattern).any()
@@ -103,7 +103,7 @@ class Seek(wiring.Component):
             with m.If(~stays & was):
                 m.d.sync += plan.listed.eq(plan.listed - 1)
 
-    def _learn(self, m, plan):
+    def _learn(self, m: Module, plan: _Plan) -> None:
         pattern = self.pattern
         m.d.sync += [plan.suspected.eq(0), self.idle.eq(0)]
         with m.If(self.alone | ~self.hit):
@@ -139,7 +139,7 @@ class Seek(wiring.Component):
         with m.Else():
             m.next = "PICK"
 
-    def _search(self, m, plan):
+    def _search(self, m: Module, plan: _Plan) -> None:
         """Halve the suspects by a bit of their number. Rows that differ in the lowest alone are driven alone."""
         rows, levels = self.skin.rows, self.derived.row_levels
         lower = Array(Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels))
@@ -157,7 +157,7 @@ class Seek(wiring.Component):
         with m.Else():
             m.d.sync += plan.level.eq(plan.level - 1)
 
-    def _pick(self, m, plan):
+    def _pick(self, m: Module, plan: _Plan) -> None:
         rest = plan.suspected & (plan.suspects == 0) & plan.open.any()
         with m.If(rest & (plan.spare == 0)):
             m.d.sync += [plan.todo.eq(plan.todo | plan.open), plan.suspected.eq(0)]
@@ -171,7 +171,7 @@ class Seek(wiring.Component):
             m.next = "START"
             m.d.comb += self.ends.eq(1)
 
-    def _start(self, m, plan):
+    def _start(self, m: Module, plan: _Plan) -> None:
         rows = self.skin.rows
         m.d.sync += [
             self.first.eq(1),

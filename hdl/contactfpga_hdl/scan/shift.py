@@ -44,7 +44,7 @@ class RowChain(wiring.Component):
                 m.d.sync += self.pins.row_data[chain].eq(Cat(Const(0, 1), part).bit_select(left, 1))
         with m.Else():
             m.d.sync += self.pins.row_latch.eq(0)
-        if self.skin.scan == "adaptive":  # a pattern that was shifted anew, for idle rows, may not be in when they hit
+        if self.skin.scan == "adaptive":  # a pattern that was shifted again, for idle rows, may not be in when they hit
             with m.If(self.release):
                 m.d.sync += [busy.eq(0), left.eq(lines), clock.eq(0)]
         with m.If(self.drive):
@@ -74,7 +74,7 @@ class ColumnChain(wiring.Component):
         clock = Signal(range(clocks))
         ends = Signal()
         last = bit == lines
-        # The pins lag this count by their register, what comes back by that and the synchroniser's two stages.
+        # The pins lag this count by their register, what comes back by that and the synchronizer's two stages.
         taken, done = Signal(3), Signal(3)
         m.d.sync += [taken.eq(Cat(ends & (bit != 0), taken)), done.eq(Cat(ends & last, done))]
         m.d.comb += self.done.eq(done[-1])

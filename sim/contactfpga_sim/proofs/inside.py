@@ -1,11 +1,14 @@
 """What is in an elaborated component: its parts, and the signals that are driven there."""
 
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 from amaranth.hdl import Cat, Const, Format, Fragment, Shape, Signal, Value
 from amaranth.hdl._ast import SignalSet
 from amaranth.hdl._mem import MemoryInstance
 from amaranth.utils import ceil_log2
+
+_Found = TypeVar("_Found")
 
 
 class Inside:
@@ -18,12 +21,14 @@ class Inside:
         self._fragment = fragment
 
     def __getitem__(self, path: str) -> Value:
-        """The signal that is driven under this name, such as ``level``, ``join.stack.level`` or a field of one."""
+        """The signal that is driven under this name, such as ``level``, ``join.stack.level`` or a field of one; else
+        one that only is read, as it keeps its initial value.
+        """
         names = path.split(".")
         fragment = self._fragment
         while len(names) > 1 and (sub := _sub(fragment, names[0])) is not None:
             fragment, names = sub, names[1:]
-        _, signal = Inside(fragment).driven(names[0])
+        signal = Inside(fragment)._signal(names[0])
         if len(names) == 1:
             return signal
         start, stop = fields_of(signal, names[1:])
@@ -36,16 +41,7 @@ class Inside:
 
     def driven(self, name: str) -> tuple[str, Signal]:
         """The signal of that name that is driven in the component itself, and its domain."""
-        found = [
-            (domain, signal)
-            for domain in self._fragment.statements
-            for signal in _driven(self._fragment, domain)
-            if signal.name == name
-        ]
-        if len(found) != 1:
-            count = len(found) or "no"
-            raise LookupError(f"{type(self.component).__name__} drives {count} signals that are called {name!r}")
-        return found[0]
+        return self._only(self._all_driven(name), "drives", name)
 
     def part(self, path: str):
         """The component of that path."""
@@ -68,6 +64,26 @@ class Inside:
         """All signals of the component and what is in it that change with the clock."""
         for fragment in fragments(self._fragment):
             yield from _driven(fragment, "sync")
+
+    def _signal(self, name: str) -> Signal:
+        driven = self._all_driven(name)
+        if driven:
+            return self._only(driven, "drives", name)[1]
+        read = SignalSet()
+        for domain in self._fragment.statements:
+            for statement in self._fragment.statements[domain]:
+                read.update(signal for signal in statement._rhs_signals() if signal.name == name)
+        return self._only(list(read), "drives or reads", name)
+
+    def _all_driven(self, name: str) -> list[tuple[str, Signal]]:
+        domains = self._fragment.statements
+        return [(domain, one) for domain in domains for one in _driven(self._fragment, domain) if one.name == name]
+
+    def _only(self, found: list[_Found], does: str, name: str) -> _Found:
+        if len(found) != 1:
+            owner = type(self.component).__name__
+            raise LookupError(f"{owner} {does} {len(found) or 'no'} signals that are called {name!r}, not one")
+        return found[0]
 
     def _part(self, path: str) -> Fragment:
         fragment = self._fragment
