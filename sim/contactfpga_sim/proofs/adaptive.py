@@ -64,7 +64,7 @@ def _seek_lemmas(proof: Proof, inside: Inside) -> None:
 
 
 def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since) -> None:
-    """When in a slot rows are chosen: behind its strobe, or where idle rows hit, from the release on."""
+    """When in a slot rows are chosen: after its strobe, or where idle rows hit, from the release on."""
     clock, state = inside["clock"], inside["seek.choice_state"]
     pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["watches"]
     todo, due = inside["seek.todo"], inside["row_due"]

@@ -1,4 +1,4 @@
-"""The labeller: nothing runs over or empty, nothing is left behind, and no stall changes what it does."""
+"""The labeller: nothing runs over or empty, nothing is left over, and no stall changes what it does."""
 
 from functools import partial
 
@@ -38,7 +38,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     is no restriction.
 
     Claimed: the stacks neither overflow nor run empty; no place of the table is written while an open zone lies there,
-    or read while none does or in the clock in which it is written; behind a frame's last row no zone is open, in the
+    or read while none does or in the clock in which it is written; after a frame's last row no zone is open, in the
     table or on a stack.
     """
     m = proof.m
@@ -55,7 +55,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     with m.If(works & stack.push & ~stack.pop):
         proof.claim(stack.level < nesting(derived))
 
-    # Which places of the table hold an open zone; all of it is a clock behind the stack of `join`.
+    # Which places of the table hold an open zone; all of it comes one clock after the stack of `join`.
     summing = join.join_valid & ~joined.end
     load_place = proof.before(place_of(derived, step.before))
     live, taken, stored = (Signal(derived.open_zones, name=name) for name in ("live", "taken", "stored"))

@@ -1,4 +1,4 @@
-"""The labeller that takes a cell a clock: its records are the zones, and its memories neither overflow nor collide."""
+"""The labeller that takes one cell per clock: its records are the zones, its memories neither overflow nor collide."""
 
 from functools import partial
 
@@ -25,7 +25,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
     """Free and assumed: as below.
 
     Claimed: what is wanted of the memory is there, nothing is written to a place in use or outside the table, no word
-    is used that was read while it was written, the brackets nest no deeper than there is room, and behind a frame no
+    is used that was read while it was written, the brackets nest no deeper than there is room, and after a frame no
     place is in use.
     """
     dut, inside, open_row = _labeller(proof, columns, connectivity, rows, proof.lemma)
@@ -65,7 +65,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come.
 
-    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and behind a last row
+    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and after a last row
     one end mark; that is so after C + e + 2 clocks at most.
     """
     _labeller(proof, columns, connectivity, rows, proof.claim)

@@ -1,4 +1,4 @@
-"""The link behind the packer: which frame is sent, and that its bytes are those that were packed."""
+"""The link after the packer: which frame is sent, and that its bytes are those that were packed."""
 
 from functools import partial
 from unittest import mock
@@ -186,7 +186,7 @@ def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> 
     carries = state != 0
     proof.lemma((state <= 2) & (~carries | (at >= LIVE_DIGITS) & (at <= 10)))
     with m.If((fetch | byte) & wire.is_hello):
-        passed = Cat(byte, wire.index)  # at least so many clocks since it was taken
+        passed = Cat(byte, wire.index)  # at least this many clocks since it was taken
         proof.lemma(~carries | (Cat(state == 2, at) >= passed + 2 * LIVE_DIGITS))
         with m.If(byte & (wire.index >= protocol.STATE_OFFSET)):
             place = inside["link.offset"][: len(at)]
@@ -226,7 +226,7 @@ _BUGS = (
     Bug("a loss is not counted", Link, "overwritten", lambda _, inside: inside["overwritten"]),
 )  # fmt: skip
 _HELLO = protocol.encode_hello(_SKIN)
-_SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames behind it
+_SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames after it
 CASES = (
     Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3),
     Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,

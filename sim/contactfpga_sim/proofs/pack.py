@@ -22,7 +22,7 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
     ``commit`` the tag stays as it is, and from the clock after ``decide`` on the summary and the verdict's numbers.
 
     Claimed: when a frame closes, that place was written and holds what COBS puts there for the bytes of all items,
-    lowest first, and of the trailer; the frame ends behind its last byte; nothing is written outside of it. An item is
+    lowest first, and of the trailer; the frame ends after its last byte; nothing is written outside of it. An item is
     taken with its last byte. The frame closes as soon as its bytes are written, and one that is not sent leaves
     nothing.
     """

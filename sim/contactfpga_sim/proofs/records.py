@@ -21,8 +21,8 @@ from contactfpga_sim.proofs.zones import OpenRow, RowStep, flood_fill, next_row,
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come.
 
-    Claimed: what comes from the second clock behind a row to the second clock behind the next one are the zones that
-    end with it, each once, and behind a last row one end mark.
+    Claimed: what comes from the second clock after a row to the second clock after the next one are the zones that
+    end with it, each once, and after a last row one end mark.
     """
     m = proof.m
     dut = RunLabeller(skin_of(rows, columns, connectivity))
@@ -101,7 +101,7 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
 
 
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
-    """In the clock behind the one in which a row was handed over the walk has it all before it."""
+    """In the clock after the one in which a row was handed over the walk has it all before it."""
     walk = inside.part("walk")
     proof.lemma(inside["walk.befores"] == (before & ~(before << 1)))
     proof.lemma((inside["walk.last"] == last) & (inside["walk.y"] == y))

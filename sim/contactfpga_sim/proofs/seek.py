@@ -16,11 +16,11 @@ WAIT, PICK, SEARCH, START = range(4)  # in the order in which the source names t
 
 
 def frames(proof: Proof, rows: int) -> None:
-    """Free: whether a slot hits, and whether its row is busy, each time anew; when a strobe comes once rows are chosen.
+    """Free: whether a slot hits, and whether its row is busy, each time; when a strobe comes once rows are chosen.
 
     Assumed: a frame's rows are handed on before the next one's first strobe, as the Skin's limits see to.
 
-    Claimed: each slot drives rows that are not known yet, one if alone; these come in ascending order; behind the last
+    Claimed: each slot drives rows that are not known yet, one if alone; these come in ascending order; after the last
     slot of a frame every row is known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
     """
     m = proof.m

@@ -1,4 +1,4 @@
-"""The solver inside Yosys: by induction, for ever, or by search through all inputs from power-up, so many clocks."""
+"""The solver inside Yosys: by induction, for ever, or by search through all inputs for some clocks from power-up."""
 
 import dataclasses
 import re

@@ -102,7 +102,7 @@ def audit(proof: Proof, capacity: int = 2) -> None:
 def bitmap(proof: Proof) -> None:
     """Free: rows at any time, and when items are taken.
 
-    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks behind a last one an end mark is
+    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks after a last one an end mark is
     offered, once, and no row is taken before that is.
     """
     m = proof.m
@@ -110,28 +110,28 @@ def bitmap(proof: Proof) -> None:
     inside = proof.put(dut)
     feed(proof, dut.rows, "rows")
     drain(proof, dut.items, "items")
-    behind = Signal(2)  # clocks since a last row whose end mark is to come, 3 at most; 0: none is
+    since_last = Signal(2)  # clocks since a last row whose end mark is to come, 3 at most; 0: none is
     row, item = dut.rows.payload, dut.items.payload
-    with m.If(behind == 0):
-        m.d.sync += behind.eq(dut.rows.valid & dut.rows.ready & row.last)
+    with m.If(since_last == 0):
+        m.d.sync += since_last.eq(dut.rows.valid & dut.rows.ready & row.last)
         proof.claim(dut.items.valid == dut.rows.valid)
         proof.claim(dut.rows.ready == dut.items.ready)
         proof.claim(~dut.items.valid | (item.data == row.cells) & ~item.end)
     with m.Else():
-        with m.If(behind != 3):
-            m.d.sync += behind.eq(behind + 1)
+        with m.If(since_last != 3):
+            m.d.sync += since_last.eq(since_last + 1)
         with m.Elif(dut.items.ready):
-            m.d.sync += behind.eq(0)
+            m.d.sync += since_last.eq(0)
         proof.claim(~dut.rows.ready)
-        proof.claim(dut.items.valid == (behind == 3))
+        proof.claim(dut.items.valid == (since_last == 3))
         proof.claim(~dut.items.valid | item.end)
-    proof.lemma(inside["countdown"] == Mux(behind == 0, 0, 4 - behind))
+    proof.lemma(inside["countdown"] == Mux(since_last == 0, 0, 4 - since_last))
 
 
 def backlog(proof: Proof, depth: int) -> None:
     """The FIFO in front of the packer. Free: items at any time, when they are taken, and one item that is followed.
 
-    Claimed: the item comes out as it was, behind those that were in before it and no others; an item that is inside for
+    Claimed: the item comes out as it was, after those that were in before it and no others; an item that is inside for
     two clocks is offered; no room is wanting before all but one place are taken.
     """
     m = proof.m
@@ -184,7 +184,7 @@ _AUDIT_BUGS = (
         lambda valid, inside: valid | inside.component.records.valid & (inside["zones"] == 2)),
     Bug("the end mark is dropped", Audit, "items__valid", lambda valid, inside: valid & (inside["zones"] < 2)),
     Bug("taken without being passed on", Audit, "records__ready", lambda *_: 1),
-    Bug("not counted anew", Audit, "zones", lambda zones, inside: Mux(zones == 0, inside["zones"], zones)),
+    Bug("not counted from 0 again", Audit, "zones", lambda zones, inside: Mux(zones == 0, inside["zones"], zones)),
 )  # fmt: skip
 _BITMAP_BUGS = (
     Bug("the mark comes again", Bitmap, "countdown",
