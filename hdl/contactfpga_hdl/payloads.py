@@ -6,7 +6,7 @@ from contactfpga.skin.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: one bit a column, and whether it is the frame's last."""
+    """A sampled row: one bit per column, and whether it is the frame's last."""
     return data.StructLayout({"cells": derived.skin.columns, "last": 1})
 
 
@@ -16,7 +16,7 @@ def moments_layout(derived: Derived) -> data.StructLayout:
 
 
 def record_layout(derived: Derived) -> data.StructLayout:
-    """A zone, or with ``end`` the mark behind a frame's last one."""
+    """A zone, or with ``end`` the mark after a frame's last one."""
     return data.StructLayout({"zone": moments_layout(derived), "end": 1})
 
 
@@ -32,7 +32,7 @@ def passed_layout(derived: Derived) -> data.StructLayout:
 
 
 def item_layout(derived: Derived) -> data.StructLayout:
-    """A part of a frame that is packed as it comes: a zone record or a bitmap row, or the mark behind the last."""
+    """A part of a frame that is packed as it comes: a zone record or a bitmap row, or the mark after the last."""
     return data.StructLayout({"data": 8 * derived.item_bytes, "end": 1})
 
 

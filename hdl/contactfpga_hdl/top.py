@@ -1,27 +1,32 @@
 """The whole chain for one Skin; wiring only."""
 
-from amaranth.hdl import Module, Mux
-from amaranth.lib import wiring
+from typing import Any
+
+from amaranth.hdl import Module, Mux, Value
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.link import Link, offset_bits
+from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver, Transmitter
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
-from contactfpga_hdl.report.divide import Divide
+from contactfpga_hdl.report.backlog import Backlog
+from contactfpga_hdl.report.divide import Divider
 from contactfpga_hdl.scan.pins import column_pins, connect_pins, row_pins
 
 
 class Top(wiring.Component):
-    """Row and column pins, UART and ``contact`` pin.
+    """A Skin's gateware between the pins of the sheet and those of the host.
 
-    The pins at the sheet are ``rows`` and ``columns``, or those of the shift registers in their place, one data pin a
-    chain: ``row_data``, ``row_clock``, ``row_latch``, ``row_enable_n``; ``column_load_n``, ``column_clock``,
-    ``column_data``.
+    rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
+    :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
+    tx (out), rx (in): the UART.
+    contact (out): high while something touches the sheet.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
@@ -59,17 +64,17 @@ class Top(wiring.Component):
         m = Module()
         bit_clocks = self.derived.bit_clocks
         m.submodules.scan = scan = self.derived.scan.load_gateware()(self.skin)
+        rows = self._debounced(m, scan)
+        items, summary = self._zones(m, rows) if self.derived.report.zones else self._bitmap(m, rows)
+        m.submodules.packer = packer = Packer(self.skin, offset_bits(self.skin))
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         m.submodules.receiver = receiver = Receiver(bit_clocks)
         m.submodules.request = request = RequestReader()
-        wiring.connect(m, receiver.bits, request.bits)
-        rows = self._debounced(m, scan)
-        if self.skin.report == "cells":
-            self._cells(m, rows, scan, link)
-        else:
-            self._zones(m, rows, scan, link)
+        wiring.connect(m, items, packer.items)
+        wiring.connect(m, packer.frames, link.frames)
         wiring.connect(m, link.bytes, transmitter.bytes)
+        wiring.connect(m, receiver.bits, request.bits)
         connect_pins(m, scan.pins, self)
         m.d.comb += [
             self.contact.eq(scan.contact),
@@ -77,7 +82,10 @@ class Top(wiring.Component):
             receiver.pin.eq(self.rx),
             scan.request.eq(request.received),
             scan.heard.eq(request.heard),
+            packer.tag.eq(scan.tag),
+            packer.summary.eq(summary),
             link.tag.eq(scan.tag),
+            link.summary.eq(summary),
             link.epoch.eq(scan.epoch),
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
@@ -87,7 +95,8 @@ class Top(wiring.Component):
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
-    def _debounced(self, m, scan):
+    def _debounced(self, m: Module, scan: Any) -> stream.Interface:
+        """The scanner's rows without bounce."""
         if not self.derived.debounced:
             return scan.rows
         even = self.derived.scan.even
@@ -99,42 +108,41 @@ class Top(wiring.Component):
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
-    def _zones(self, m, rows, scan, link):
+    def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
+        """Items of a frame's zones, and its summary."""
         m.submodules.label = label = self.derived.labeller.load_gateware()(self.skin)
         m.submodules.audit = audit = Audit(self.skin)
+        m.submodules.backlog = backlog = Backlog(self.skin)
         wiring.connect(m, rows, label.rows)
         wiring.connect(m, label.records, audit.records)
-        if self.skin.report == "barycenter":
-            self._divided(m, audit, link)
-        else:
-            wiring.connect(m, audit.items, link.items)
-        m.d.comb += [
-            audit.taken.eq(rows.valid & rows.ready),
-            audit.row.eq(rows.payload),
-            link.summary.eq(audit.summary),
-        ]
+        wiring.connect(m, audit.items, backlog.passed)
+        m.d.comb += [audit.taken.eq(rows.valid & rows.ready), audit.row.eq(rows.payload)]
         if self.probes:
             record = label.records.payload
             self._probe(m, "record", label.records, data=record.zone.as_value(), end=record.end)
+        items = self._divided(m, backlog) if self.skin.report == "barycenter" else backlog.waiting
+        return items, audit.summary
 
-    def _divided(self, m, audit, link):
-        m.submodules.divide = divide = Divide(self.skin)
-        wiring.connect(m, audit.items, divide.records)
-        wiring.connect(m, divide.items, link.items)
+    def _divided(self, m: Module, backlog: Backlog) -> stream.Interface:
+        m.submodules.divide = divide = Divider(self.skin)
+        wiring.connect(m, backlog.waiting, divide.records)
         if self.probes:
             item = divide.items.payload
             self._probe(m, "item", divide.items, data=Mux(item.end, 0, item.data), end=item.end)
+        return divide.items
 
-    def _cells(self, m, rows, scan, link):
+    def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
+        """Items of a frame's rows as they are, and its summary."""
         m.submodules.bitmap = bitmap = Bitmap(self.skin)
+        m.submodules.backlog = backlog = Backlog(self.skin)
         wiring.connect(m, rows, bitmap.rows)
-        wiring.connect(m, bitmap.items, link.items)
-        m.d.comb += link.summary.eq(bitmap.summary)
+        wiring.connect(m, bitmap.items, backlog.passed)
         if self.probes:
             item = bitmap.items.payload
             self._probe(m, "record", bitmap.items, data=item.data, end=item.end)
+        return backlog.waiting, bitmap.summary
 
-    def _probe(self, m, name, boundary, **fields):
+    def _probe(self, m: Module, name: str, boundary: stream.Interface, **fields: Value) -> None:
         m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
         for field, value in fields.items():
             m.d.comb += getattr(self, f"{name}_{field}").eq(value)

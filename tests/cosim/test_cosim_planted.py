@@ -23,7 +23,7 @@ CHOSEN = {"scan": (raster, "Scanner"), "run": (run, "RunLabeller"), "serial": (s
 STAGES = {
     "rows": ("scan", "rows"),
     "records": ("labeller", "records"),
-    "items": ("Divide", "items"),
+    "items": ("Divider", "items"),
     "bytes": ("Link", "bytes"),
     "line": ("Transmitter", "pin"),
 }

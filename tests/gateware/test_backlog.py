@@ -9,9 +9,11 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.link import offset_bits
+from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.report.audit import Audit, Bitmap
-from contactfpga_hdl.report.divide import Divide
+from contactfpga_hdl.report.backlog import Backlog
+from contactfpga_hdl.report.divide import Divider
 
 SHEETS = {
     "1x64": {"rows": 1, "columns": 64, "connectivity": 4},
@@ -50,11 +52,12 @@ def cases():
 
 
 class Chain(wiring.Component):
-    """Labeller, audit, divider and link as the top joins them, or bitmap and link; the wire takes everything."""
+    """From the labeller to the packer, or from the bitmap to it, as the top joins them; every frame is sent."""
 
     def __init__(self, skin):
-        self.link = Link(skin)
-        self.divide = Divide(skin) if skin.report == "barycenter" else None
+        self.backlog = Backlog(skin)
+        self.divide = Divider(skin) if skin.report == "barycenter" else None
+        self.packer = Packer(skin, offset_bits(skin))
         self.audit = Bitmap(skin) if skin.report == "cells" else Audit(skin)
         self.front = self.audit if skin.report == "cells" else LABELLERS[skin.labeller].load_gateware()(skin)
         super().__init__(
@@ -63,24 +66,25 @@ class Chain(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules += [self.audit, self.link]
+        m.submodules += [self.audit, self.backlog, self.packer]
         wiring.connect(m, wiring.flipped(self.rows), self.front.rows)
         if self.front is not self.audit:
             m.submodules += self.front
             wiring.connect(m, self.front.records, self.audit.records)
             m.d.comb += [self.audit.taken.eq(self.rows.valid & self.rows.ready), self.audit.row.eq(self.rows.payload)]
-        behind = self.link.items
+        wiring.connect(m, self.audit.items, self.backlog.passed)
+        items = self.backlog.waiting
         if self.divide:
             m.submodules += self.divide
-            wiring.connect(m, self.divide.items, self.link.items)
-            behind = self.divide.records
-        wiring.connect(m, self.audit.items, behind)
+            wiring.connect(m, self.backlog.waiting, self.divide.records)
+            items = self.divide.items
+        wiring.connect(m, items, self.packer.items)
         m.d.comb += [
-            self.link.summary.eq(self.audit.summary),
-            self.link.bytes.ready.eq(1),
+            self.packer.summary.eq(self.audit.summary),
+            self.packer.frames.verdict.send.eq(1),
             self.ends.eq(self.audit.items.valid & self.audit.items.ready & self.audit.items.payload.end),
-            self.stalled.eq(~behind.ready),
-            self.packed.eq(self.link.packer.decide),
+            self.stalled.eq(~self.backlog.passed.ready),
+            self.packed.eq(self.packer.frames.decide),
         ]
         return m
 

@@ -6,11 +6,16 @@ import zlib
 from unittest import mock
 
 import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
 
 from contactfpga import Skin
 from contactfpga_hdl.link import link as link_module
 from contactfpga_hdl.link import odometer
-from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.link import Link, offset_bits
+from contactfpga_hdl.link.pack import Packer
+from contactfpga_hdl.report.backlog import Backlog
 
 SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000}  # a scan takes 20.004 ms
 SKINS = {
@@ -33,6 +38,29 @@ class Frame:
     items: list
     facts: dict
     not_before: list = dataclasses.field(default_factory=list)  # of the items and the end mark
+
+
+class PackerAndLink(wiring.Component):
+    """Backlog, packer and link as the top joins them."""
+
+    def __init__(self, skin):
+        self.skin = skin
+        self.backlog, self.packer, self.link = Backlog(skin), Packer(skin, offset_bits(skin)), Link(skin)
+        members = self.link.signature.members
+        outside = {name: members[name] for name in ("tag", "summary", "asked", "epoch", "number", "bytes")}
+        super().__init__({"items": In(self.backlog.passed.signature.flip()), **outside})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules += [self.backlog, self.packer, self.link]
+        wiring.connect(m, wiring.flipped(self.items), self.backlog.passed)
+        wiring.connect(m, self.backlog.waiting, self.packer.items)
+        wiring.connect(m, self.packer.frames, self.link.frames)
+        wiring.connect(m, self.link.bytes, wiring.flipped(self.bytes))
+        for part in (self.packer, self.link):
+            m.d.comb += [part.tag.eq(self.tag), part.summary.eq(self.summary)]
+        m.d.comb += [getattr(self.link, name).eq(getattr(self, name)) for name in ("asked", "epoch", "number")]
+        return m
 
 
 def skin_of(name):
@@ -229,7 +257,7 @@ def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(be
     def number(cycle):
         return numbers[cycle // 64]
 
-    dut = Link(skin)
+    dut = PackerAndLink(skin)
     sim = bench(dut)
     stuck = sim.watch(dut.tag.stuck)
     sink = run((dut, sim), skin, frames, lambda cycle: ready[cycle], asked, number)
@@ -248,7 +276,7 @@ def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(be
 
 @pytest.fixture(scope="module")
 def link(bench):
-    dut = Link(skin_of("always"))
+    dut = PackerAndLink(skin_of("always"))
     return dut, bench(dut)
 
 
@@ -293,7 +321,7 @@ def test_a_hello_goes_out_at_start_every_half_second_and_when_asked_for(link, rn
 def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
     """The carry into the odometer's digits, and its own carries: 2^14 frames are too many to simulate, so the counters
     begin just before."""
-    dut = Link(skin_of("cells"))
+    dut = PackerAndLink(skin_of("cells"))
     with mock.patch.object(link_module, "LIVE_DIGITS", 1), mock.patch.object(odometer, "LIVE_DIGITS", 1):
         sim = bench(dut)
         frames = [Frame([], dict.fromkeys(TAG | SUMMARY, 0), [40 * index + 1]) for index in range(300)]
@@ -311,7 +339,7 @@ def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
 
 
 def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
-    dut = Link(skin_of("cells"))
+    dut = PackerAndLink(skin_of("cells"))
     sim = bench(dut)
     sim.drive(dut.epoch, lambda cycle: int(cycle in epochs))
     asked = {100, 400, 3000, 6000, 6500}

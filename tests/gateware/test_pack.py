@@ -115,8 +115,8 @@ def run(bench, skin, frames, rng, gap=0.0):
             frame, in_trailer = frame_now()
             return verdicts[frame][name] if in_trailer else rng.randrange(1 << width)
 
-        sim.drive(dut.verdict[name], decided)
-    sim.drive(dut.verdict.send, lambda cycle: int(frames[frame_now()[0]].send))
+        sim.drive(dut.frames.verdict[name], decided)
+    sim.drive(dut.frames.verdict.send, lambda cycle: int(frames[frame_now()[0]].send))
     memory = Memory(sim, dut)
     sent = sum(frame.send for frame in frames)
     sim.run(60 * len(words) * (size + 20), until=lambda: len(memory.follow().frames) == sent and source.done)
@@ -128,8 +128,14 @@ class Memory:
     """What the packer writes."""
 
     def __init__(self, sim, dut):
-        self._watched = [sim.watch(signal) for signal in (dut.write.en, dut.write.offset, dut.write.data)]
-        self._commit, self._end, self._decide = sim.watch(dut.commit), sim.watch(dut.end), sim.watch(dut.decide)
+        self._watched = [
+            sim.watch(signal) for signal in (dut.frames.write.en, dut.frames.write.offset, dut.frames.write.data)
+        ]
+        self._commit, self._end, self._decide = (
+            sim.watch(dut.frames.commit),
+            sim.watch(dut.frames.end),
+            sim.watch(dut.frames.decide),
+        )
         self._bytes, self._seen = {}, 0
         self.frames, self.decided = [], []
 

@@ -2,8 +2,8 @@
 
 import importlib
 
-from amaranth.build import Attrs, Pins, Resource
-from amaranth.hdl import ClockDomain, Elaboratable, Module
+from amaranth.build import Attrs, Pins, Platform, Resource
+from amaranth.hdl import ClockDomain, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
 
@@ -14,7 +14,7 @@ from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.top import Top
 
 
-def platform_for(board: BoardSpec):
+def platform_for(board: BoardSpec) -> Platform:
     """A fresh platform of the board, as amaranth-boards has it."""
     module, _, name = board.platform.partition(":")
     return getattr(importlib.import_module(module), name)()
@@ -55,7 +55,7 @@ class BoardTop(Elaboratable):
             m.d.comb += held_high.o.eq(~0)
         return m
 
-    def _connect_sheet(self, m, platform, core):
+    def _connect_sheet(self, m: Module, platform: Platform, core: Top) -> None:
         for name, member in self._sheet.items():
             if name == "rows" and self.skin.ghosts:
                 self._connect_floating(m, platform.request(name, 0, dir="-"), core.rows)
@@ -64,12 +64,12 @@ class BoardTop(Elaboratable):
             m.submodules[name] = buffer = io.Buffer(direction, platform.request(name, 0, dir="-"))
             m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
 
-    def _connect_floating(self, m, port, rows):
+    def _connect_floating(self, m: Module, port: io.SingleEndedPort, rows: Value) -> None:
         for row in range(self.skin.rows):
             m.submodules[f"row_{row}"] = buffer = io.Buffer("o", port[row])
             m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
-    def _resources(self):
+    def _resources(self) -> list[Resource]:
         board, skin = self.board, self.skin
         attrs = Attrs(**board.standard)
         resources = [Resource("contact", 0, Pins(board.contact, dir="o"), attrs)]

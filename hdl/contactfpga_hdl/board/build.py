@@ -11,6 +11,8 @@ import subprocess
 import sysconfig
 from pathlib import Path
 
+from amaranth.build.run import BuildPlan
+
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import placed, synthesis
 from contactfpga_hdl.board.board_top import BoardTop, platform_for
@@ -62,7 +64,7 @@ def build(skin: Skin, board: BoardSpec, folder: Path, seed: int = 1) -> placed.R
     return found
 
 
-def plan_for(board: BoardSpec, skin: Skin, seed: int = 1):
+def plan_for(board: BoardSpec, skin: Skin, seed: int = 1) -> BuildPlan:
     """Amaranth's build plan: netlist, constraints and the script that runs the tools."""
     board.check(skin)
     top = BoardTop(board, skin)

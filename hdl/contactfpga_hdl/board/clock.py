@@ -1,6 +1,16 @@
 """A clock of another frequency than the board's crystal, from the FPGA's PLL."""
 
-from amaranth.hdl import ClockDomain, ClockSignal, DomainRenamer, Elaboratable, Instance, Module, ResetSignal, Signal
+from amaranth.hdl import (
+    ClockDomain,
+    ClockSignal,
+    DomainRenamer,
+    Elaboratable,
+    Instance,
+    Module,
+    ResetSignal,
+    Signal,
+    Value,
+)
 from amaranth.lib import io, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -67,7 +77,7 @@ class PllClock(Elaboratable):
         ]
         return m
 
-    def _ice40(self, clock, locked, **reference):
+    def _ice40(self, clock: Signal, locked: Signal, **reference: Value) -> Instance:
         return Instance(
             self.board.pll,
             p_FEEDBACK_PATH="SIMPLE",
@@ -79,7 +89,7 @@ class PllClock(Elaboratable):
             **reference,
         )
 
-    def _ecp5(self, clock, locked, **reference):
+    def _ecp5(self, clock: Signal, locked: Signal, **reference: Value) -> Instance:
         return Instance(
             self.board.pll,
             # The loop filter as Project Trellis' calculator sets it for every frequency.

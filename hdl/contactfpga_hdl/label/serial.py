@@ -1,4 +1,4 @@
-"""Contact zones and their moments, one cell a clock, in little more than an adder and three memories.
+"""Contact zones and their moments, one cell per clock, in little more than an adder and three memories.
 
 Rows, clusters and brackets are those of ``docs/labelling.md``, walked a column at a time. A column takes one clock,
 in which its cell is added to the group of the cluster being walked. Where a run of the row before begins, a second one
@@ -6,7 +6,7 @@ adds the moments that its zone brings in: from the table, or from a group that w
 too, each at a place in its cluster and with the place of the one that began to wait before it.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -16,12 +16,74 @@ from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
 
 
-class SerialLabeller(wiring.Component):
-    """Rows in, zone records out; one cell a clock.
+class _Walk:
+    """The new row and the one before move past, a column at a time; between two rows an empty column is walked."""
 
-    A row of C columns takes C + e + 2 clocks, and a zone leaves a clock behind the last column of its last cluster
+    def __init__(self, derived: Derived):
+        columns = derived.skin.columns
+        self.active = Signal()
+        self.cells = Signal(columns)  # of the new row from this column on
+        self.before = Signal(columns + 1)  # of the row before
+        self.last = Signal(init=1)  # no row follows in this frame
+        self.tail = Signal()  # the first clock after the last column
+        self.second = Signal()  # clock of this column
+        self.column = Signal(max(1, (columns - 1).bit_length()))
+        self.next_column = Signal.like(self.column)
+        self.y = Signal(max(1, (derived.skin.rows - 1).bit_length()))
+        self.cell_left = Signal()  # of the column to the left
+        self.before_left = Signal()
+        self.place = place_of(derived, self.column)[: (derived.open_zones - 1).bit_length()]
+
+    @property
+    def cell(self) -> Value:
+        return self.cells[0]
+
+    @property
+    def cell_before(self) -> Value:
+        return self.before[0]
+
+
+class _Acts:
+    """What is done in this clock."""
+
+    def __init__(self) -> None:
+        self.enable = Signal()  # anything at all: no record waits
+        self.advance = Signal()  # it is the last one of the column
+        self.begins = Signal()  # a run of the row before begins
+        self.closes = Signal()  # the cluster ends with the column to the left
+        self.adds = Signal()  # the cell is added
+        self.starts = Signal()  # and it is the first of its run
+        self.joins = Signal()  # the run of the row before joins the group
+
+
+class _Group:
+    """The group of the cluster that is walked."""
+
+    def __init__(self, derived: Derived, place_bits: int):
+        self.whole = Signal(init=1)  # none of its zones has runs of the row before to come
+        self.has_run = Signal()  # in the new row
+        self.first = Signal(place_bits)  # place of the first of them, or of the column to the left
+        self.end = Signal(place_bits)  # place of the last one
+        self.top = Signal(place_bits)  # of the groups that wait, the one to go on next
+        self.moments = Signal(moments_layout(derived))
+
+
+def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
+    """A group that waits, or a zone of the row before; ``below`` is the place of the group that waits next."""
+    return data.StructLayout(
+        {"moments": moments_layout(derived), "has_run": 1, "first": place_bits, "end": place_bits, "below": place_bits}
+    )
+
+
+class SerialLabeller(wiring.Component):
+    """Rows in, zone records out; one cell per clock.
+
+    A row of C columns takes C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
     (docs/timing.md). e is the number of runs in the row before, so at most ceil(C/2), with 8-connectivity; with 4 it
     is at most C.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zones, then an end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -35,213 +97,188 @@ class SerialLabeller(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        self._declare()
-        self._walk(m)
-        self._cut(m)
-        self._read_brackets(m)
-        self._read_group(m)
-        self._nest(m)
-        self._know_runs(m)
-        self._write_brackets(m)
-        self._sum(m)
-        self._let_out(m)
+        walk, acts = _Walk(self.derived), _Acts()
+        group = _Group(self.derived, len(walk.place))
+        # Does the zone of the run of the row before have others in that row?
+        earlier = Signal()
+        later = Signal()
+        m.submodules.earlier = earlier_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
+        m.submodules.later = later_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
+        self._walk(m, walk, acts)
+        self._cut(m, walk, acts, earlier & ~group.whole)
+        read_earlier = earlier_runs.read_port()
+        read_later = later_runs.read_port()
+        self._read_bracket(m, walk, acts, read_earlier)
+        self._read_bracket(m, walk, acts, read_later)
+        m.d.comb += [earlier.eq(read_earlier.data), later.eq(read_later.data)]
+        # The upper half of the memory stays zero: what is read there adds nothing.
+        stored = _stored_layout(self.derived, len(walk.place))
+        m.submodules.groups = groups = memory.Memory(shape=stored, depth=2 << len(walk.place), init=[])
+        found = self._read_group(m, walk, acts, group, groups, earlier)
+        if nesting(self.derived):
+            self._nest(m, acts, group, earlier, later, found.below)
+        self._know_runs(m, walk, acts, group, found)
+        self._write_brackets(m, walk, acts, group, found, earlier_runs, later_runs)
+        self._sum(m, walk, acts, group, found)
+        self._store_group(m, acts, group, groups)
+        self._let_out(m, walk, acts, group)
         return m
 
-    def _declare(self):
-        derived = self.derived
-        columns = derived.skin.columns
-        self._enable = Signal()
-        # The walk: the new row and the one before move past. Between two rows an empty column is walked.
-        self._cells = Signal(columns)
-        self._before = Signal(columns + 1)
-        self._last = Signal(init=1)
-        self._walking = Signal()
-        self._tail = Signal()  # the first clock behind the last column
-        self._second = Signal()  # clock of this column
-        self._advance = Signal()  # the last one
-        self._column = Signal(max(1, (columns - 1).bit_length()))
-        self._next_column = Signal.like(self._column)
-        self._y = Signal(max(1, (derived.skin.rows - 1).bit_length()))
-        # The column, and the one to the left, in the new row and in the row before.
-        self._c, self._b = self._cells[0], self._before[0]
-        self._c_left, self._b_left = Signal(), Signal()
-        self._place = place_of(derived, self._column)[: (derived.open_zones - 1).bit_length()]
-        self._begins = Signal()  # a run of the row before begins
-        self._earlier, self._later = Signal(), Signal()  # and its zone has others in that row
-        # What is done in this clock.
-        self._closes = Signal()  # the cluster ends with the column to the left
-        self._adds = Signal()  # the cell is added
-        self._starts = Signal()  # and it is the first of its run
-        self._joins = Signal()  # the run of the row before joins the group
-        # The group of the cluster.
-        self._whole = Signal(init=1)  # none of its zones has runs of the row before to come
-        self._has_run = Signal()  # in the new row
-        bits = len(self._place)
-        self._first = Signal(bits)  # place of the first of them, or of the column to the left
-        self._end = Signal(bits)  # place of the last one
-        self._top = Signal(bits)  # of the groups that wait, the one to go on next
-        self._group = Signal(moments_layout(derived))
-
-    def _walk(self, m):
+    def _walk(self, m: Module, walk: _Walk, acts: _Acts) -> None:
         row = self.rows.payload
-        handed = self.rows.valid & ~self._walking & ~self._tail
+        handed = self.rows.valid & ~walk.active & ~walk.tail
+        ends = walk.column == self.derived.skin.columns - 1
         m.d.comb += [
-            self.rows.ready.eq(self._enable & ~self._walking & ~self._tail),
-            self._next_column.eq(Mux(self._walking, self._column + 1, 0)),
+            self.rows.ready.eq(acts.enable & ~walk.active & ~walk.tail),
+            walk.next_column.eq(Mux(walk.active, walk.column + 1, 0)),
         ]
-        with m.If(self._enable):
-            m.d.sync += [self._tail.eq(0), self._second.eq(~self._advance)]
-            with m.If(self._advance):
-                m.d.sync += [self._c_left.eq(self._c), self._b_left.eq(self._b)]
-            with m.If(Mux(self._walking, self._advance, handed)):
+        with m.If(acts.enable):
+            m.d.sync += [walk.tail.eq(0), walk.second.eq(~acts.advance)]
+            with m.If(acts.advance):
+                m.d.sync += [walk.cell_left.eq(walk.cell), walk.before_left.eq(walk.cell_before)]
+            with m.If(Mux(walk.active, acts.advance, handed)):
                 m.d.sync += [
-                    self._cells.eq(Mux(self._walking, self._cells >> 1, row.cells)),
-                    self._before.eq(Cat(self._before[1:], self._c & ~self._last)),
-                    self._column.eq(self._next_column),
-                    self._walking.eq(~self._walking | (self._column != self.derived.skin.columns - 1)),
-                    self._tail.eq(self._walking & (self._column == self.derived.skin.columns - 1)),
+                    walk.cells.eq(Mux(walk.active, walk.cells >> 1, row.cells)),
+                    walk.before.eq(Cat(walk.before[1:], walk.cell & ~walk.last)),
+                    walk.column.eq(walk.next_column),
+                    walk.active.eq(~walk.active | ~ends),
+                    walk.tail.eq(walk.active & ends),
                 ]
             with m.If(handed):
-                m.d.sync += [self._last.eq(row.last), self._y.eq(Mux(self._last, 0, self._y + 1))]
+                m.d.sync += [walk.last.eq(row.last), walk.y.eq(Mux(walk.last, 0, walk.y + 1))]
 
-    def _cut(self, m):
-        """Where a cluster ends: with 8-connectivity at an empty column, else where neither row goes on."""
-        inside = self._c_left | self._b_left
-        m.d.comb += self._begins.eq(self._b & ~self._b_left)
+    def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value) -> None:
+        """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.
+
+        ``waits``: the group waits for the run of the row before if one begins.
+        """
+        inside = walk.cell_left | walk.before_left
+        m.d.comb += acts.begins.eq(walk.cell_before & ~walk.before_left)
         if self.derived.skin.connectivity == 8:
-            two = self._begins
+            two = acts.begins
             m.d.comb += [
-                self._closes.eq(inside & ~(self._c | self._b)),
-                self._adds.eq(self._c & ~self._second),
+                acts.closes.eq(inside & ~(walk.cell | walk.cell_before)),
+                acts.adds.eq(walk.cell & ~walk.second),
             ]
         else:
             ends = Signal()
-            m.d.comb += ends.eq(inside & ~(self._c & self._c_left | self._b & self._b_left))
-            two = self._begins | ends & self._c
+            m.d.comb += ends.eq(inside & ~(walk.cell & walk.cell_left | walk.cell_before & walk.before_left))
+            two = acts.begins | ends & walk.cell
             # A run of the row before whose zone the group has waited for goes on with the group.
-            awaited = self._begins & self._earlier & ~self._whole
+            awaited = acts.begins & waits
             m.d.comb += [
-                self._closes.eq(ends & ~awaited & ~self._second),
-                self._adds.eq(self._c & (self._second == ends)),
+                acts.closes.eq(ends & ~awaited & ~walk.second),
+                acts.adds.eq(walk.cell & (walk.second == ends)),
             ]
         m.d.comb += [
-            self._advance.eq(self._second | ~two),
-            self._starts.eq(self._adds & ~self._c_left),
-            self._joins.eq(self._begins & self._second),
+            acts.advance.eq(walk.second | ~two),
+            acts.starts.eq(acts.adds & ~walk.cell_left),
+            acts.joins.eq(acts.begins & walk.second),
         ]
 
-    def _read_brackets(self, m):
-        derived = self.derived
+    def _read_bracket(self, m: Module, walk: _Walk, acts: _Acts, read: memory.ReadPort) -> None:
         # With 8-connectivity a place is two columns'. It is read before a run of the new row can begin in either.
-        odd = self._column[0] if derived.skin.connectivity == 8 else 1
-        ports = []
-        for name, bit in (("earlier", self._earlier), ("later", self._later)):
-            m.submodules[name] = bits = memory.Memory(shape=1, depth=derived.open_zones, init=[])
-            read = bits.read_port()
-            m.d.comb += [
-                read.en.eq(~self._walking | self._advance & odd),
-                read.addr.eq(place_of(derived, self._next_column)),
-                bit.eq(read.data),
-            ]
-            ports.append((read, bits.write_port()))
-        (self._read_earlier, self._write_earlier), (self._read_later, self._write_later) = ports
-
-    def _write_brackets(self, m):
-        """A run has later ones until its zone is known to have none; it has earlier ones if its group has."""
-        earlier, later = self._write_earlier, self._write_later
+        odd = walk.column[0] if self.derived.skin.connectivity == 8 else 1
         m.d.comb += [
-            earlier.en.eq(self._enable & (self._starts | self._found.has_run & self._has_run)),
-            earlier.addr.eq(Mux(self._starts, self._place, self._first)),
-            earlier.data.eq(self._has_run),
-            later.en.eq(self._enable & (self._starts | self._closes & self._whole & self._has_run)),
-            later.addr.eq(Mux(self._starts, self._place, self._end)),
-            later.data.eq(self._starts),
+            read.en.eq(~walk.active | acts.advance & odd),
+            read.addr.eq(place_of(self.derived, walk.next_column)),
         ]
 
-    def _nest(self, m):
-        depth = nesting(self.derived)
-        if depth == 0:
-            return
+    def _write_brackets(
+        self,
+        m: Module,
+        walk: _Walk,
+        acts: _Acts,
+        group: _Group,
+        found: data.View,
+        earlier_runs: memory.Memory,
+        later_runs: memory.Memory,
+    ) -> None:
+        """A run has later ones until its zone is known to have none; it has earlier ones if its group has."""
+        write_earlier = earlier_runs.write_port()
+        write_later = later_runs.write_port()
+        m.d.comb += [
+            write_earlier.en.eq(acts.enable & (acts.starts | found.has_run & group.has_run)),
+            write_earlier.addr.eq(Mux(acts.starts, walk.place, group.first)),
+            write_earlier.data.eq(group.has_run),
+            write_later.en.eq(acts.enable & (acts.starts | acts.closes & group.whole & group.has_run)),
+            write_later.addr.eq(Mux(acts.starts, walk.place, group.end)),
+            write_later.data.eq(acts.starts),
+        ]
+
+    def _nest(self, m: Module, acts: _Acts, group: _Group, earlier: Value, later: Value, below: Value) -> None:
         # For each zone with runs of the row before passed and to come, the innermost first, whether its group has no
         # other one further out.
-        outermost = Signal(depth)
-        with m.If(self._enable):
-            with m.If(self._closes):
-                m.d.sync += self._whole.eq(1)
-            with m.Elif(self._joins & self._later):
-                m.d.sync += self._whole.eq(0)
-            with m.Elif(self._joins & self._earlier):
-                m.d.sync += self._whole.eq(outermost[0])
-            with m.If(self._joins & (self._earlier ^ self._later)):
-                m.d.sync += outermost.eq(Mux(self._later, Cat(self._whole, outermost), outermost >> 1))
-            with m.If(self._closes & ~self._whole):
-                m.d.sync += self._top.eq(self._first)
-            with m.Elif(self._joins & self._earlier & self._whole):
-                m.d.sync += self._top.eq(self._found.below)
+        outermost = Signal(nesting(self.derived))
+        with m.If(acts.enable):
+            with m.If(acts.closes):
+                m.d.sync += group.whole.eq(1)
+            with m.Elif(acts.joins & later):
+                m.d.sync += group.whole.eq(0)
+            with m.Elif(acts.joins & earlier):
+                m.d.sync += group.whole.eq(outermost[0])
+            with m.If(acts.joins & (earlier ^ later)):
+                m.d.sync += outermost.eq(Mux(later, Cat(group.whole, outermost), outermost >> 1))
+            with m.If(acts.closes & ~group.whole):
+                m.d.sync += group.top.eq(group.first)
+            with m.Elif(acts.joins & earlier & group.whole):
+                m.d.sync += group.top.eq(below)
 
-    def _read_group(self, m):
-        """The upper half of the memory stays zero: what is read there adds nothing."""
-        bits = len(self._place)
-        layout = data.StructLayout(
-            {
-                "moments": moments_layout(self.derived),
-                "has_run": 1,
-                "first": bits,
-                "end": bits,
-                "below": bits,
-            }
-        )
-        m.submodules.groups = groups = memory.Memory(shape=layout, depth=2 << bits, init=[])
-        self._read, self._write = groups.read_port(), groups.write_port()
-        self._found = self._read.data
-        self._wanted = Signal()
+    def _read_group(
+        self, m: Module, walk: _Walk, acts: _Acts, group: _Group, groups: memory.Memory, earlier: Value
+    ) -> data.View:
+        """The zone or group that joins this one, wanted in the clock before; 0 if there is none."""
+        read = groups.read_port()
+        wanted = Signal()
         m.d.comb += [
-            self._wanted.eq(self._begins & ~self._second & (~self._earlier | self._whole)),
-            self._read.addr.eq(Cat(Mux(self._earlier, self._top, self._place), ~self._wanted)),
+            wanted.eq(acts.begins & ~walk.second & (~earlier | group.whole)),
+            read.addr.eq(Cat(Mux(earlier, group.top, walk.place), ~wanted)),
+        ]
+        return read.data
+
+    def _know_runs(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
+        with m.If(acts.enable):
+            with m.If(~group.has_run):
+                m.d.sync += group.first.eq(walk.place)
+            with m.If(found.has_run):
+                m.d.sync += group.first.eq(found.first)
+            with m.If(acts.starts):
+                m.d.sync += group.end.eq(walk.place)
+            with m.Elif(~group.has_run):
+                m.d.sync += group.end.eq(found.end)
+            with m.If(acts.starts | found.has_run):
+                m.d.sync += group.has_run.eq(1)
+            with m.If(acts.closes | ~walk.active):
+                m.d.sync += group.has_run.eq(0)
+
+    def _sum(self, m: Module, walk: _Walk, acts: _Acts, group: _Group, found: data.View) -> None:
+        with m.If(acts.enable):
+            for name, share in (("area", 1), ("sum_x", walk.column), ("sum_y", walk.y)):
+                more = found.moments[name] | Mux(acts.adds, share, 0)
+                m.d.sync += group.moments[name].eq(group.moments[name] + more)
+        with m.If(acts.enable & (acts.closes | ~walk.active)):  # at power-up what the memory reads is not known
+            m.d.sync += group.moments.eq(0)
+
+    def _store_group(self, m: Module, acts: _Acts, group: _Group, groups: memory.Memory) -> None:
+        write = groups.write_port()
+        m.d.comb += [
+            write.en.eq(acts.closes & (group.has_run | ~group.whole)),
+            write.addr.eq(group.first),
+            write.data.moments.eq(group.moments),
+            write.data.has_run.eq(group.has_run & ~group.whole),
+            write.data.first.eq(group.first),
+            write.data.end.eq(group.end),
+            write.data.below.eq(group.top),
         ]
 
-    def _know_runs(self, m):
-        with m.If(self._enable):
-            with m.If(~self._has_run):
-                m.d.sync += self._first.eq(self._place)
-            with m.If(self._found.has_run):
-                m.d.sync += self._first.eq(self._found.first)
-            with m.If(self._starts):
-                m.d.sync += self._end.eq(self._place)
-            with m.Elif(~self._has_run):
-                m.d.sync += self._end.eq(self._found.end)
-            with m.If(self._starts | self._found.has_run):
-                m.d.sync += self._has_run.eq(1)
-            with m.If(self._closes | ~self._walking):
-                m.d.sync += self._has_run.eq(0)
-
-    def _sum(self, m):
-        group = self._group
-        cell = {"area": 1, "sum_x": self._column, "sum_y": self._y}
-        with m.If(self._enable):
-            for name, value in cell.items():
-                more = self._found.moments[name] | Mux(self._adds, value, 0)
-                m.d.sync += group[name].eq(group[name] + more)
-        with m.If(self._enable & (self._closes | ~self._walking)):  # at power-up what the memory reads is not known
-            m.d.sync += group.eq(0)
-        m.d.comb += [
-            self._write.en.eq(self._closes & (self._has_run | ~self._whole)),
-            self._write.addr.eq(self._first),
-            self._write.data.moments.eq(group),
-            self._write.data.has_run.eq(self._has_run & ~self._whole),
-            self._write.data.first.eq(self._first),
-            self._write.data.end.eq(self._end),
-            self._write.data.below.eq(self._top),
-        ]
-
-    def _let_out(self, m):
+    def _let_out(self, m: Module, walk: _Walk, acts: _Acts, group: _Group) -> None:
         mark = Signal()
-        leaves = self._closes & self._whole & (~self._has_run | self._last)
+        leaves = acts.closes & group.whole & (~group.has_run | walk.last)
         m.d.comb += [
             self.records.valid.eq(leaves | mark),
-            self.records.payload.zone.eq(self._group),
+            self.records.payload.zone.eq(group.moments),
             self.records.payload.end.eq(mark),
-            self._enable.eq(~self.records.valid | self.records.ready),
+            acts.enable.eq(~self.records.valid | self.records.ready),
         ]
-        with m.If(self._enable):
-            m.d.sync += mark.eq(self._tail & self._last)
+        with m.If(acts.enable):
+            m.d.sync += mark.eq(walk.tail & walk.last)

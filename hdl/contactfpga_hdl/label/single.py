@@ -10,10 +10,13 @@ from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
 
 
 class SingleLabeller(wiring.Component):
-    """Rows in, at most one zone record a frame out; a column a clock.
+    """Rows in, at most one zone record per frame out; one column per clock.
 
     A row of C columns takes C + 2 clocks, an empty one takes one, unless it is the last row of a frame with a pressed
     cell. If that is handed over in clock h, the zone leaves in clock h + C + 2.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zone, if it has one, then an end mark.
     """
 
     def __init__(self, skin: Skin):
@@ -35,7 +38,7 @@ class SingleLabeller(wiring.Component):
         zone = Signal(moments_layout(self.derived))
         walks, last, pressed = Signal(), Signal(), Signal()
         leaves, ends, end = Signal(), Signal(), Signal()
-        final = x == skin.columns  # a clock behind the last column, so that the zone holds while it leaves
+        final = x == skin.columns  # a clock after the last column, so that the zone holds while it leaves
         m.d.comb += self.rows.ready.eq(enable & ~walks)
         with m.If(enable):
             m.d.sync += [leaves.eq(walks & final & last), ends.eq(~walks & last), end.eq(ends)]

@@ -2,6 +2,7 @@
 
 import math
 
+from amaranth.hdl import Value
 from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
@@ -13,7 +14,7 @@ def step_layout(derived: Derived) -> data.StructLayout:
     column = max(1, (derived.skin.columns - 1).bit_length())
     return data.StructLayout(
         {
-            "end": 1,  # no step: the mark behind a frame
+            "end": 1,  # no step: the mark after a frame
             "has_before": 1,
             "before": column,  # start of the run in the row before
             "has_run": 1,
@@ -50,6 +51,6 @@ def nesting(derived: Derived) -> int:
     return math.ceil(derived.skin.columns / 2) // 2
 
 
-def place_of(derived: Derived, column):
+def place_of(derived: Derived, column: Value) -> Value:
     """Where a run that starts at ``column`` keeps its zone's moments."""
     return column >> 1 if derived.skin.connectivity == 8 else column

@@ -11,7 +11,13 @@ from contactfpga_hdl.util.stack import Stack
 
 
 class Sum(wiring.Component):
-    """Adds up the moments of each zone. ``lookup`` is the start of the run before, one clock ahead of ``join``."""
+    """Adds up the moments of each zone.
+
+    enable (in): nothing changes without it.
+    valid, join (in): what a step adds to its zone, and what becomes of it.
+    lookup (in): one clock ahead of ``join``, the start of its run of the row before.
+    records (out): in the clock of the step that closes the zone.
+    """
 
     def __init__(self, derived: Derived):
         self.derived = derived

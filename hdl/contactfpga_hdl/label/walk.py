@@ -1,6 +1,6 @@
 """Two adjacent rows, cut into steps."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -9,14 +9,14 @@ from contactfpga_hdl.label.steps import step_layout
 from contactfpga_hdl.payloads import row_layout
 
 
-def _split(m, bits):
+def _split(m: Module, bits: Value) -> tuple[Value, Value]:
     """The lowest bit that is set, alone, and the others."""
     lowest, others = Signal.like(bits), Signal.like(bits)
     m.d.comb += [others.eq(bits & (bits - 1)), lowest.eq(bits & ~others)]
     return lowest, others
 
 
-def _index(one_hot, width):
+def _index(one_hot: Value, width: int) -> Value:
     """Number of the bit that is set."""
     return Cat(
         Cat(one_hot[i] for i in range(len(one_hot)) if i >> bit & 1).any() if len(one_hot) > 1 else Const(0, 1)
@@ -24,8 +24,26 @@ def _index(one_hot, width):
     )
 
 
+class _Left:
+    """What of two rows is still to be walked."""
+
+    def __init__(self, derived: Derived):
+        columns = derived.skin.columns
+        self.befores = Signal(columns)  # where runs of the row before start
+        self.starts = Signal(columns)  # where runs of the new row start and stop
+        self.stops = Signal(columns)
+        self.inside = Signal(columns)  # all columns up to the end of the first cluster; none: no work
+        self.ends = Signal(columns)  # where the clusters after that one end
+        self.last = Signal()  # the new row is the frame's last one
+        self.y = Signal(step_layout(derived)["y"].shape)
+
+
 class Walk(wiring.Component):
-    """Cuts two adjacent rows into steps, one a clock while ``enable`` is high."""
+    """Cuts two adjacent rows into steps, one per clock while ``enable`` is high.
+
+    rows (in): taken when the one before is cut.
+    step_valid, step (out): one clock after the step is cut.
+    """
 
     def __init__(self, derived: Derived):
         self.derived = derived
@@ -41,27 +59,19 @@ class Walk(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        columns = self.derived.skin.columns
-        # Columns still to be walked: where runs start and stop, and where clusters behind the first one end.
-        self._befores = Signal(columns)
-        self._starts = Signal(columns)
-        self._stops = Signal(columns)
-        self._ends = Signal(columns)
-        self._inside = Signal(columns)  # all columns up to the end of the first cluster; none: no work
-        self._last = Signal()
-        self._y = Signal(self.step.y.shape())
-        self._walk_clusters(m)
-        self._take_row(m)
+        left = _Left(self.derived)
+        self._walk_clusters(m, left)
+        self._take_row(m, left)
         return m
 
-    def _walk_clusters(self, m):
-        work = self._inside[0]
-        inside = self._inside
-        before, befores_left = _split(m, self._befores)
-        start, starts_left = _split(m, self._starts)
-        stop, stops_left = _split(m, self._stops)
-        has_before = (self._befores & inside).any()
-        has_run = (self._starts & inside).any()
+    def _walk_clusters(self, m: Module, left: _Left) -> None:
+        work = left.inside[0]
+        inside = left.inside
+        before, befores_left = _split(m, left.befores)
+        start, starts_left = _split(m, left.starts)
+        stop, stops_left = _split(m, left.stops)
+        has_before = (left.befores & inside).any()
+        has_run = (left.starts & inside).any()
         closes = Signal()
         opens = Signal(init=1)
         step = Signal.like(self.step)
@@ -75,28 +85,28 @@ class Walk(wiring.Component):
             step.stop.eq(_index(stop, len(step.stop))),
             step.opens.eq(opens),
             step.closes.eq(closes),
-            step.row_done.eq(closes & ~self._ends.any()),
-            step.y.eq(self._y),
-            step.final.eq(self._last),
+            step.row_done.eq(closes & ~left.ends.any()),
+            step.y.eq(left.y),
+            step.final.eq(left.last),
         ]
         with m.If(self.enable):
-            m.d.sync += [self.step.eq(step), self.step_valid.eq(work | self._last)]
+            m.d.sync += [self.step.eq(step), self.step_valid.eq(work | left.last)]
         with m.If(self.enable & work):
             m.d.sync += opens.eq(closes)
             with m.If(has_before):
-                m.d.sync += self._befores.eq(befores_left)
+                m.d.sync += left.befores.eq(befores_left)
             with m.If(has_run):
-                m.d.sync += [self._starts.eq(starts_left), self._stops.eq(stops_left)]
+                m.d.sync += [left.starts.eq(starts_left), left.stops.eq(stops_left)]
             with m.If(closes):
-                self._next_cluster(m, self._ends)
+                self._next_cluster(m, left, left.ends)
 
-    def _take_row(self, m):
+    def _take_row(self, m: Module, left: _Left) -> None:
         row = self.rows.payload
         before = Signal.like(row.cells)  # the row last taken, empty before a frame
-        y_next = Signal.like(self._y)
-        work = self._inside[0]
+        y_next = Signal.like(left.y)
+        work = left.inside[0]
         with m.If(self.enable & ~work):
-            m.d.sync += self._last.eq(0)  # its end mark is on its way
+            m.d.sync += left.last.eq(0)  # its end mark is on its way
         m.d.comb += self.rows.ready.eq(self.enable & ~work)
         with m.If(self.rows.valid & self.rows.ready):
             right_row, right_before = row.cells >> 1, before >> 1
@@ -105,20 +115,20 @@ class Walk(wiring.Component):
             else:
                 joined = row.cells & right_row | before & right_before
             m.d.sync += [
-                self._befores.eq(before & ~(before << 1)),
-                self._starts.eq(row.cells & ~(row.cells << 1)),
-                self._stops.eq(row.cells & ~right_row),
-                self._last.eq(row.last),
-                self._y.eq(y_next),
+                left.befores.eq(before & ~(before << 1)),
+                left.starts.eq(row.cells & ~(row.cells << 1)),
+                left.stops.eq(row.cells & ~right_row),
+                left.last.eq(row.last),
+                left.y.eq(y_next),
                 before.eq(Mux(row.last, 0, row.cells)),
                 y_next.eq(Mux(row.last, 0, y_next + 1)),
             ]
-            ends = Signal(len(joined))
-            m.d.comb += ends.eq((row.cells | before) & ~joined)
-            self._next_cluster(m, ends)
+            row_ends = Signal(len(joined))
+            m.d.comb += row_ends.eq((row.cells | before) & ~joined)
+            self._next_cluster(m, left, row_ends)
 
-    def _next_cluster(self, m, ends):
+    def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
         """Of the clusters that end there, the first one is next."""
-        upto, others = Signal.like(self._ends), Signal.like(self._ends)
+        upto, others = Signal.like(left.ends), Signal.like(left.ends)
         m.d.comb += [others.eq(ends & (ends - 1)), upto.eq(Mux(ends.any(), ends ^ (ends - 1), 0))]
-        m.d.sync += [self._ends.eq(others), self._inside.eq(upto)]
+        m.d.sync += [left.ends.eq(others), left.inside.eq(upto)]

@@ -1,45 +1,68 @@
 """Whole frames from the packer to the wire, newest first, and hellos between them."""
 
-from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import crc, memory, stream, wiring
-from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, Derived
 from contactfpga.wire import protocol
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
-from contactfpga_hdl.link.pack import Packer
-from contactfpga_hdl.payloads import item_layout, summary_layout, tag_layout
+from contactfpga_hdl.link.pack import frames_signature
+from contactfpga_hdl.payloads import summary_layout, tag_layout
 
-_HELLO_REGION = 3
+HELLO_REGION = 3
 """The others hold frames."""
 
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
+class _Wire:
+    """The packet on the wire, and the choice of the next one."""
+
+    def __init__(self, skin: Skin):
+        self.idle = Signal()  # there is none
+        self.take_frame = Signal()  # the frame that waits is next
+        self.take_hello = Signal()
+        self.is_hello = Signal()
+        self.offset = Signal(offset_bits(skin))  # of the byte on offer, in its region
+        self.fetches = Signal()  # that byte is read
+
+
+class _Regions:
+    """Which region of the memory belongs to the frame that is written, that waits, that is on the wire."""
+
+    def __init__(self, skin: Skin):
+        self.filling = Signal(2, init=0)
+        self.waiting = Signal(2, init=1)
+        self.sending = Signal(2, init=2)
+        self.waits = Signal()  # a complete frame does
+        self.waiting_end = Signal(offset_bits(skin))
+
+
 class Link(wiring.Component):
     """Keeps one frame on the wire, the newest complete one waiting, and one being written.
 
-    Items wait in front of the packer, where one can be packed two clocks after it came; barycenters wait before they
-    are divided and come here one by one. Three regions of one memory
-    change places between the three frames; a fourth holds the hello. A new frame drops the one that waits, counted, in
-    the clock its end mark is packed, and waits in its place when it is complete. Nothing in here can hold up
-    the stages before.
+    Three regions of one memory change places between the three frames; a fourth holds the hello. A new frame drops the
+    one that waits, counted, in the clock its end mark is packed, and waits in its place when it is complete. Nothing in
+    here can hold up the stages before.
 
     The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
-    ``asked`` is high for a clock when a hello is wanted, ``epoch`` when another 2^22 us are over.
+
+    frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
+    tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
+    asked (in): high for a clock when a hello is wanted.
+    epoch (in): high for a clock when another 2^22 us are over.
+    number (in): of the last request.
+    bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        self._hello = _stored_hello(skin)
-        self._offset_bits = _offset_bits(skin)
-        self.packer = Packer(skin, self._offset_bits)
         super().__init__(
             {
-                "items": In(stream.Signature(item_layout(self.derived))),
+                "frames": In(frames_signature(self.derived, offset_bits(skin))),
                 "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
                 "asked": In(1),
@@ -51,144 +74,125 @@ class Link(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.packer = packer = self.packer
-        if self.skin.report == "barycenter":
-            wiring.connect(m, wiring.flipped(self.items), packer.items)
-        else:
-            self._queue(m)
-        m.d.comb += [packer.tag.eq(self.tag), packer.summary.eq(self.summary)]
-        self._take_frame = Signal()  # the wire takes the waiting frame
-        self._waits = Signal()  # a complete frame waits
-        self._place_frames(m)
-        self._decide(m)
-        self._time_hello(m)
-        self._send(m)
-        self._say_state(m)
+        wire, regions = _Wire(self.skin), _Regions(self.skin)
+        hello_due = Signal(init=1)
+        self._place_frames(m, wire, regions)
+        frames_sent = self._decide(m, wire, regions)
+        self._time_hello(m, wire, hello_due)
+        byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
+        self._send(m, wire, regions, hello_due, byte)
         return m
 
-    def _queue(self, m):
-        m.submodules.backlog = backlog = SyncFIFOBuffered(
-            width=len(self.items.payload.as_value()), depth=self.derived.backlog
-        )
-        m.d.comb += [
-            backlog.w_data.eq(self.items.payload),
-            backlog.w_en.eq(self.items.valid),
-            self.items.ready.eq(backlog.w_rdy),
-            self.packer.items.payload.eq(backlog.r_data),
-            self.packer.items.valid.eq(backlog.r_rdy),
-            backlog.r_en.eq(self.packer.items.ready),
-        ]
-
-    def _place_frames(self, m):
-        """Which region is written, waits, or is on the wire."""
-        self._filling = Signal(2, init=0)
-        waiting = Signal(2, init=1)
-        self._sending = Signal(2, init=2)
-        self._waiting_end = Signal(self._offset_bits)
-        with m.If(self._take_frame):
-            m.d.sync += [self._waits.eq(0), self._sending.eq(waiting), waiting.eq(self._sending)]
-        with m.If(self.packer.decide & self.packer.verdict.send):
-            m.d.sync += self._waits.eq(0)
-        with m.If(self.packer.commit):
+    def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
+        with m.If(wire.take_frame):
             m.d.sync += [
-                self._waits.eq(1),
-                self._waiting_end.eq(self.packer.end),
-                waiting.eq(self._filling),
-                self._filling.eq(waiting),
+                regions.waits.eq(0),
+                regions.sending.eq(regions.waiting),
+                regions.waiting.eq(regions.sending),
+            ]
+        with m.If(self.frames.decide & self.frames.verdict.send):
+            m.d.sync += regions.waits.eq(0)
+        with m.If(self.frames.commit):
+            m.d.sync += [
+                regions.waits.eq(1),
+                regions.waiting_end.eq(self.frames.end),
+                regions.waiting.eq(regions.filling),
+                regions.filling.eq(regions.waiting),
             ]
 
-    def _decide(self, m):
-        """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known."""
-        verdict = self.packer.verdict
-        self._sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
+    def _decide(self, m: Module, wire: _Wire, regions: _Regions) -> Value:
+        """Whether a frame is sent, and its numbers. It goes next, so its sequence number is already known.
+
+        Returns how many frames were sent, in the digits that are not the odometer's.
+        """
+        verdict, decide = self.frames.verdict, self.frames.decide
+        frames_sent = Signal(LIVE_DIGITS * protocol.DIGIT_BITS)
         overwritten = Signal(self.derived.overwritten_bits)
-        drops = self._waits & ~self._take_frame
-        m.d.comb += [verdict.sequence.eq(self._sent), verdict.overwritten.eq(overwritten), verdict.send.eq(1)]
-        m.d.sync += self._sent.eq(self._sent + self._take_frame)
-        with m.If(self.packer.decide & verdict.send):
+        drops = regions.waits & ~wire.take_frame
+        m.d.comb += [verdict.sequence.eq(frames_sent), verdict.overwritten.eq(overwritten), verdict.send.eq(1)]
+        m.d.sync += frames_sent.eq(frames_sent + wire.take_frame)
+        with m.If(decide & verdict.send):
             m.d.sync += overwritten.eq(overwritten + drops)
         if self.skin.send == "on_change":
             keep_alive = self.derived.keep_alive_frames
             idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
             waited, due = self._wait(idle, keep_alive)
             m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | due)
-            with m.If(self.packer.decide):
+            with m.If(decide):
                 m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
+        return frames_sent
 
-    def _time_hello(self, m):
-        self._hello_due = Signal(init=1)
-        self._take_hello = Signal()
+    def _time_hello(self, m: Module, wire: _Wire, hello_due: Value) -> None:
         period = self.derived.hello_frames
         since = Signal(range(max(2, period)))
         waited, due = self._wait(since, period)
-        with m.If(self._take_hello):
-            m.d.sync += self._hello_due.eq(0)
-        with m.If(self.packer.decide):
+        with m.If(wire.take_hello):
+            m.d.sync += hello_due.eq(0)
+        with m.If(self.frames.decide):
             m.d.sync += since.eq(waited)
             with m.If(due):
-                m.d.sync += [since.eq(0), self._hello_due.eq(1)]
+                m.d.sync += [since.eq(0), hello_due.eq(1)]
         with m.If(self.asked):
-            m.d.sync += self._hello_due.eq(1)
+            m.d.sync += hello_due.eq(1)
 
-    def _wait(self, waited, limit):
+    def _wait(self, waited: Value, limit: int) -> tuple[Value, Value]:
         """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
         if self.derived.scan.even:
             return waited + 1, waited == limit - 1
         longer = waited + self.tag.slots
         return longer, longer >= limit
 
-    def _send(self, m):
-        init = [0] * hello_words(self.skin).start + list(self._hello)
+    def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
+        """The byte on offer, from the memory or in a hello's state from the counters."""
+        init = [0] * hello_words(self.skin).start + list(stored_hello(self.skin))
         m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = store.read_port(), store.write_port()
-        self._offset = Signal(self._offset_bits)
-        self._sends_hello = Signal()
-        end = Signal(self._offset_bits)
-        seeds = Signal()  # one clock after a frame was taken
-        self._idle, self._fetches = Signal(), Signal()
-        self._digit = Signal(protocol.DIGIT_BITS)
-        in_state = self._sends_hello & (self._offset >> STATE_PLACE_BITS == protocol.STATE_OFFSET >> STATE_PLACE_BITS)
-        byte = Mux(in_state, Cat(self._digit, Const(1, 1)), read.data)
         m.d.comb += [
-            write.en.eq(self.packer.write.en),
-            write.addr.eq(Cat(self.packer.write.offset, self._filling)),
-            write.data.eq(self.packer.write.data),
-            read.addr.eq(Cat(self._offset, Mux(self._sends_hello, _HELLO_REGION, self._sending))),
+            write.en.eq(self.frames.write.en),
+            write.addr.eq(Cat(self.frames.write.offset, regions.filling)),
+            write.data.eq(self.frames.write.data),
+            read.addr.eq(Cat(wire.offset, Mux(wire.is_hello, HELLO_REGION, regions.sending))),
         ]
+        in_state = wire.is_hello & (wire.offset >> STATE_PLACE_BITS == protocol.STATE_OFFSET >> STATE_PLACE_BITS)
+        return Mux(in_state, Cat(digit, Const(1, 1)), read.data)
+
+    def _send(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value) -> None:
+        end = Signal.like(wire.offset)
+        seeds = Signal()  # one clock after a frame was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
         tail = Signal(range(CHECK_BYTES + 1))
-        m.d.sync += seeds.eq(self._take_frame)
-        m.d.comb += [check.data.eq(byte), check.start.eq(self._take_hello | self._take_frame)]
-        with m.If(self._take_frame):
+        m.d.sync += seeds.eq(wire.take_frame)
+        m.d.comb += [check.data.eq(byte), check.start.eq(wire.take_hello | wire.take_frame)]
+        with m.If(wire.take_frame):
             m.d.comb += [check.data.eq(first), check.valid.eq(1)]
         with m.Elif(seeds):
             m.d.comb += [check.data.eq(second), check.valid.eq(1)]
         with m.FSM(name="wire"):
             with m.State("IDLE"):
                 m.d.comb += [
-                    self._idle.eq(1),
-                    self._take_hello.eq(self._hello_due),
-                    self._take_frame.eq(self._waits & ~self._hello_due),
+                    wire.idle.eq(1),
+                    wire.take_hello.eq(hello_due),
+                    wire.take_frame.eq(regions.waits & ~hello_due),
                 ]
                 m.d.sync += [
-                    self._sends_hello.eq(self._hello_due),
-                    end.eq(Mux(self._hello_due, len(self._hello), self._waiting_end)),
-                    self._offset.eq(0),
+                    wire.is_hello.eq(hello_due),
+                    end.eq(Mux(hello_due, len(stored_hello(self.skin)), regions.waiting_end)),
+                    wire.offset.eq(0),
                 ]
-                with m.If(self._hello_due | self._waits):
+                with m.If(hello_due | regions.waits):
                     m.next = "FETCH"
             with m.State("FETCH"):
-                m.d.comb += self._fetches.eq(1)
+                m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"
-                with m.If(self._offset == end):
+                with m.If(wire.offset == end):
                     m.next = "TAIL"
             with m.State("BYTE"):
-                leads = self._sends_hello & (self._offset == 0)  # the delimiter in front
+                leads = wire.is_hello & (wire.offset == 0)  # the delimiter in front
                 m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(byte)]
                 with m.If(self.bytes.ready):
                     m.d.comb += check.valid.eq(~leads)
-                    m.d.sync += [self._offset.eq(self._offset + 1), tail.eq(0)]
+                    m.d.sync += [wire.offset.eq(wire.offset + 1), tail.eq(0)]
                     m.next = "FETCH"
             with m.State("TAIL"):
                 # The CRC in pieces of seven bits, so that none of its bytes is zero.
@@ -200,44 +204,44 @@ class Link(wiring.Component):
                     with m.If(tail == CHECK_BYTES):
                         m.next = "IDLE"
 
-    def _say_state(self, m):
+    def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
         """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
         m.submodules.odometer = odometer = Odometer()
-        place = self._offset[:STATE_PLACE_BITS]
-        high = self._sent[-1]
+        place = wire.offset[:STATE_PLACE_BITS]
+        high = frames_sent[-1]
         before = Signal()
         m.d.sync += before.eq(high)
         m.d.comb += [
             odometer.sent.eq(before & ~high),
             odometer.epoch.eq(self.epoch),
-            odometer.hold.eq(self._sends_hello & ~self._idle),
+            odometer.hold.eq(wire.is_hello & ~wire.idle),
             odometer.place.eq(place),
         ]
         digit = Signal(protocol.DIGIT_BITS)
         live = Signal(protocol.DIGIT_BITS)
         number = [self.number.word_select(index, protocol.DIGIT_BITS) for index in range(protocol.HEARD_DIGITS)]
-        sent = [self._sent.word_select(index, protocol.DIGIT_BITS) for index in range(LIVE_DIGITS)]
+        live_digits = [frames_sent.word_select(index, protocol.DIGIT_BITS) for index in range(LIVE_DIGITS)]
         first_of_number = protocol.SENT_DIGITS + protocol.EPOCH_DIGITS
         with m.Switch(place):
-            for index, value in (*enumerate(sent), *enumerate([*number, self.tag.stuck], first_of_number)):
+            for index, value in (*enumerate(live_digits), *enumerate([*number, self.tag.stuck], first_of_number)):
                 with m.Case(index):
                     m.d.comb += digit.eq(value)
-        with m.If(self._fetches):
+        with m.If(wire.fetches):
             m.d.sync += live.eq(digit)
-        m.d.comb += self._digit.eq(live | odometer.digit)  # of which one is 0
+        return live | odometer.digit  # of which one is 0
 
 
 def hello_words(skin: Skin) -> range:
     """Where the hello lies in the memory."""
-    first = _HELLO_REGION << _offset_bits(skin)
-    return range(first, first + len(_stored_hello(skin)))
+    first = HELLO_REGION << offset_bits(skin)
+    return range(first, first + len(stored_hello(skin)))
 
 
-def _stored_hello(skin: Skin) -> bytes:
+def stored_hello(skin: Skin) -> bytes:
     """The hello from its leading delimiter on, without its check."""
     return protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
 
 
-def _offset_bits(skin: Skin) -> int:
+def offset_bits(skin: Skin) -> int:
     """Of a place in a region of the memory, which holds any frame or the hello."""
-    return max(Derived(skin).max_stored_bytes, len(_stored_hello(skin))).bit_length()
+    return max(Derived(skin).max_stored_bytes, len(stored_hello(skin))).bit_length()

@@ -1,4 +1,4 @@
-"""Counters that go on for years, in the digits in which a hello tells them."""
+"""Counters that go on for years, in the digits in which a hello gives them."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import memory, wiring
@@ -16,9 +16,12 @@ _LAST = (_EPOCH - 1, _EPOCH + EPOCH_DIGITS - 1)
 class Odometer(wiring.Component):
     """The high digits of the frames sent, and all of the epoch, at their places in a hello's state.
 
-    ``sent`` and ``epoch`` are high for a clock for one more; each carry takes two clocks per digit that changes. None
-    begins while ``hold`` is high; one of each kind may wait. ``digit`` is that of the ``place`` a clock before, when no
-    carry is under way, and 0 at places of other counters.
+    Each carry takes two clocks per digit that changes.
+
+    sent, epoch (in): high for a clock for one more. One carry of each kind may wait.
+    hold (in): no carry begins.
+    place (in), digit (out): the digit of the place of the clock before, when no carry is under way; 0 at places of
+    other counters.
     """
 
     def __init__(self):

@@ -1,6 +1,6 @@
 """Items to the bytes of a frame: items and trailer, stuffed with COBS as they are written."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -16,6 +16,26 @@ FULL_BLOCK = 255
 def verdict_layout(derived: Derived) -> data.StructLayout:
     """What the link decides about a frame whose end mark is packed: ``send`` at once, the rest one clock later."""
     return data.StructLayout({"send": 1, "sequence": SEQUENCE_BITS, "overwritten": derived.overwritten_bits})
+
+
+def frames_signature(derived: Derived, offset_bits: int) -> wiring.Signature:
+    """Frames on their way from the packer, which is the initiator, to the link.
+
+    write: a byte and its offset in the region of this frame.
+    decide: high for the clock in which an end mark is taken.
+    verdict (in): in that clock, and its numbers until the ``commit``, what the link decides about this frame.
+    commit: high for the clock in which the frame's last byte is written.
+    end: in that clock the offset after its last byte. What is written from the next clock on belongs to another frame.
+    """
+    return wiring.Signature(
+        {
+            "write": Out(wiring.Signature({"en": Out(1), "offset": Out(offset_bits), "data": Out(8)})),
+            "decide": Out(1),
+            "verdict": In(verdict_layout(derived)),
+            "commit": Out(1),
+            "end": Out(offset_bits),
+        }
+    )
 
 
 def _trailer_layout(derived: Derived) -> data.StructLayout:
@@ -36,12 +56,13 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
 
 
 class Packer(wiring.Component):
-    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; a byte a clock.
+    """Writes each frame, stuffed, into a region of a memory, from offset 0 on; one byte per clock.
 
-    An item is taken with its last byte. ``decide`` is high for the clock in which an end mark is taken; in it
-    ``verdict`` says whether the frame is sent, and until the ``commit`` ``tag`` and ``summary`` describe it.
-    ``commit`` is high for the clock in which the frame's last write is done; ``end`` is then the offset behind its
-    last byte, and what is written from the next clock on belongs to another frame.
+    An item is taken with its last byte.
+
+    items (in): a frame's items and its end mark.
+    tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
+    frames (out): see :func:`frames_signature`.
 
     COBS writes a block's length in front of it. Every zero byte is the place of the next length, so a byte takes one
     write: itself, or, for a zero, the length of the block that it ends. Only a block of 254 bytes without a zero takes
@@ -56,65 +77,60 @@ class Packer(wiring.Component):
                 "items": In(stream.Signature(item_layout(self.derived))),
                 "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
-                "decide": Out(1),
-                "verdict": In(verdict_layout(self.derived)),
-                "commit": Out(1),
-                "end": Out(offset_bits),
-                "write": Out(wiring.Signature({"en": Out(1), "offset": Out(offset_bits), "data": Out(8)})),
+                "frames": Out(frames_signature(self.derived, offset_bits)),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        self._byte = Signal(8)  # the one that is written
-        self._byte_valid = Signal()
-        self._byte_ready = Signal()
-        self._restart = Signal()
-        self._stuff(m)
-        self._sequence_bytes(m)
+        plain = stream.Signature(8).create()  # the frame's bytes before they are stuffed
+        restart = Signal()  # the next of them is a frame's first one
+        self._sequence_bytes(m, plain, restart)
+        self._stuff(m, plain, restart)
         return m
 
-    def _sequence_bytes(self, m):
+    def _sequence_bytes(self, m: Module, plain: stream.Interface, restart: Value) -> None:
         """Items as they come, each taken with its last byte, then the trailer."""
         item_bytes, trailer_bytes = self.derived.item_bytes, self.derived.trailer_bytes
+        decide, send = self.frames.decide, self.frames.verdict.send
         index = Signal(range(max(item_bytes, trailer_bytes + 1)))
         item, trailer = self.items.payload.data, self._trailer(m)
-        free = ~self._byte_valid | self._byte_ready
+        free = ~plain.valid | plain.ready
         ends = self.items.valid & self.items.payload.end
         with m.If(free):
-            m.d.sync += self._byte_valid.eq(0)
+            m.d.sync += plain.valid.eq(0)
         with m.FSM(name="part") as part:
             with m.State("ITEMS"):
                 last = index == item_bytes - 1
                 m.d.comb += [
                     self.items.ready.eq(free & (self.items.payload.end | last)),
-                    self.decide.eq(free & ends),
-                    self._restart.eq(self.decide & ~self.verdict.send),
+                    decide.eq(free & ends),
+                    restart.eq(decide & ~send),
                 ]
                 with m.If(free & self.items.valid & ~self.items.payload.end):
-                    m.d.sync += [self._byte_valid.eq(1), index.eq(Mux(last, 0, index + 1))]
-                with m.If(self.decide & self.verdict.send):
-                    m.d.sync += [self._byte_valid.eq(1), index.eq(1)]
+                    m.d.sync += [plain.valid.eq(1), index.eq(Mux(last, 0, index + 1))]
+                with m.If(decide & send):
+                    m.d.sync += [plain.valid.eq(1), index.eq(1)]
                     m.next = "TRAILER"
             with m.State("TRAILER"):
                 with m.If(free):
-                    m.d.sync += [self._byte_valid.eq(1), index.eq(index + 1)]
+                    m.d.sync += [plain.valid.eq(1), index.eq(index + 1)]
                     with m.If(index == trailer_bytes):
-                        m.d.sync += [self._byte_valid.eq(0), index.eq(0)]
+                        m.d.sync += [plain.valid.eq(0), index.eq(0)]
                         m.next = "CLOSE"
             with m.State("CLOSE"):
-                m.d.comb += [self.commit.eq(1), self._restart.eq(1)]
+                m.d.comb += [self.frames.commit.eq(1), restart.eq(1)]
                 m.next = "ITEMS"
         from_trailer = part.ongoing("TRAILER") | ends
         with m.If(free):
-            m.d.sync += self._byte.eq(Mux(from_trailer, trailer.word_select(index, 8), item.word_select(index, 8)))
+            m.d.sync += plain.payload.eq(Mux(from_trailer, trailer.word_select(index, 8), item.word_select(index, 8)))
 
-    def _trailer(self, m):
+    def _trailer(self, m: Module) -> Value:
         trailer = Signal(_trailer_layout(self.derived))
         m.d.comb += [
             trailer.time.eq(self.tag.time),
-            trailer.sequence.eq(self.verdict.sequence),
-            trailer.overwritten.eq(self.verdict.overwritten),
+            trailer.sequence.eq(self.frames.verdict.sequence),
+            trailer.overwritten.eq(self.frames.verdict.overwritten),
             trailer.overflow.eq(self.summary.overflow),
             trailer.mismatch.eq(self.summary.mismatch),
             trailer.fault.eq(self.tag.stuck.any()),
@@ -125,24 +141,26 @@ class Packer(wiring.Component):
         ]
         return trailer.as_value()
 
-    def _stuff(self, m):
+    def _stuff(self, m: Module, plain: stream.Interface, restart: Value) -> None:
         """COBS: ``code`` is the place of the open block's length, ``length`` that length so far."""
-        code = Signal.like(self.write.offset)
-        place = Signal.like(self.write.offset, init=1)
+        write, commit = self.frames.write, self.frames.commit
+        code = Signal.like(write.offset)
+        place = Signal.like(write.offset, init=1)
         longest = min(FULL_BLOCK, self.derived.max_stored_bytes)
         length = Signal(range(longest + 1), init=1)
         full = length == FULL_BLOCK
-        ends_block = self.commit | full | (self._byte == 0)
+        ends_block = Signal()
         m.d.comb += [
-            self._byte_ready.eq(~full),
-            self.end.eq(place),
-            self.write.en.eq(self._byte_valid | self.commit),
-            self.write.offset.eq(Mux(ends_block, code, place)),
-            self.write.data.eq(Mux(ends_block, length, self._byte)),
+            ends_block.eq(commit | full | (plain.payload == 0)),
+            plain.ready.eq(~full),
+            self.frames.end.eq(place),
+            write.en.eq(plain.valid | commit),
+            write.offset.eq(Mux(ends_block, code, place)),
+            write.data.eq(Mux(ends_block, length, plain.payload)),
         ]
-        with m.If(self._restart):
+        with m.If(restart):
             m.d.sync += [code.eq(0), place.eq(1), length.eq(1)]
-        with m.Elif(self._byte_valid):
+        with m.Elif(plain.valid):
             m.d.sync += place.eq(place + 1)
             with m.If(ends_block):
                 m.d.sync += [code.eq(place), length.eq(1)]

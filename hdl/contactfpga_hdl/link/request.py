@@ -1,6 +1,6 @@
-"""What the host asks: requests among the bytes at the receive pin (docs/protocol.md)."""
+"""What the host asks for: requests among the bytes at the receive pin (docs/protocol.md)."""
 
-from amaranth.hdl import Const, Module, Signal
+from amaranth.hdl import Const, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -33,7 +33,7 @@ class RequestReader(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        place = Signal(range(_WHOLE + 2), init=_WHOLE + 1)  # bytes since the last delimiter; stays behind the last
+        place = Signal(range(_WHOLE + 2), init=_WHOLE + 1)  # bytes since the last delimiter; stays after the last
         bit = Signal(3)
         zero = Signal(init=1)  # all bits of this byte so far
         with m.If(self.bits.bit):
@@ -52,7 +52,7 @@ class RequestReader(wiring.Component):
         self._keep_number(m, place, bit)
         return m
 
-    def _check(self, m, place, bit, restart):
+    def _check(self, m: Module, place: Value, bit: Value, restart: Value) -> Value:
         """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these, which leaves all zeros."""
         crc = Signal(16, init=0xFFFF)
         own = (place == _CHECK) | (place == _CHECK + 1)
@@ -65,7 +65,7 @@ class RequestReader(wiring.Component):
             m.d.sync += crc.eq(0xFFFF)
         return crc == 0
 
-    def _read_kind(self, m, place, bit):
+    def _read_kind(self, m: Module, place: Value, bit: Value) -> Value:
         fits = Signal()
         wanted = Const(protocol.last_byte(protocol.KIND_REQUEST), 8).bit_select(bit, 1)
         with m.If(self.bits.bit & (place == _KIND)):
@@ -75,7 +75,7 @@ class RequestReader(wiring.Component):
                 m.d.sync += fits.eq(fits & (self.bits.level == wanted))
         return fits
 
-    def _keep_number(self, m, place, bit):
+    def _keep_number(self, m: Module, place: Value, bit: Value) -> None:
         number = Signal.like(self.number)
         whole = Signal()
         with m.If(self.bits.bit & (place >= _NUMBER) & (place < _KIND) & (bit != 7)):

@@ -7,7 +7,11 @@ from amaranth.lib.wiring import In, Out
 
 
 class Transmitter(wiring.Component):
-    """Bytes in, line level out. A byte takes ten bits of ``bit_clocks``; the next one follows without a gap."""
+    """Bytes in, line level out. A byte takes ten bits of ``bit_clocks``; the next one follows without a gap.
+
+    bytes (in): one is taken in the last clock of the stop bit before, or whenever nothing is sent.
+    pin (out): the line; the start bit begins in the clock after a byte is taken.
+    """
 
     def __init__(self, bit_clocks: int):
         self.bit_clocks = bit_clocks
@@ -38,12 +42,16 @@ class Transmitter(wiring.Component):
 
 
 LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "good": Out(1), "bad": Out(1)})
-"""What a receiver tells: ``bit`` is high in the middle of each data bit, whose level is then ``level``. In the middle
+"""What a receiver finds: ``bit`` is high in the middle of each data bit, whose level is then ``level``. In the middle
 of the stop bit ``good`` or ``bad`` is high for one clock."""
 
 
 class Receiver(wiring.Component):
-    """Line level in, bits out."""
+    """Line level in, bits out.
+
+    pin (in): the line; it passes two synchronizer stages.
+    bits (out): see :data:`LINE_BITS`.
+    """
 
     def __init__(self, bit_clocks: int):
         self.bit_clocks = bit_clocks

@@ -18,11 +18,13 @@ from contactfpga_hdl.report.tally import Change, Tally
 
 
 class Audit(wiring.Component):
-    """Counts a frame before and behind the labeller; lets as many zones through as the frame can carry.
+    """Counts a frame before and after the labeller; lets as many zones through as the frame can carry.
 
-    Records pass without delay. Of ``summary``, ``zones``, ``overflow`` and ``changed`` are there one clock after the
-    end mark, ``cells`` and ``mismatch`` at most seven, which is before the packer can come to them; all hold until
-    the next frame's.
+    taken, row (in): a row, in the clock in which the labeller takes it.
+    records (in): from the labeller.
+    items (out): the same without delay, but no more than the frame can carry.
+    summary (out): until the next frame's. ``zones``, ``overflow`` and ``changed`` are there one clock after the end
+    mark, ``cells`` and ``mismatch`` at most seven, which is before the packer can come to them.
     """
 
     def __init__(self, skin: Skin):
@@ -80,7 +82,9 @@ class Audit(wiring.Component):
 class Bitmap(wiring.Component):
     """With ``report = "cells"`` in the place of labeller and audit: rows go into the frame as they are.
 
-    The end mark follows the last row three clocks later, when that is counted.
+    rows (in): a frame's rows in ascending order.
+    items (out): the same without delay; the end mark follows the last one three clocks later, when that is counted.
+    summary (out): as of :class:`Audit`, where it has no zones.
     """
 
     def __init__(self, skin: Skin):
@@ -154,7 +158,7 @@ class _Counts(wiring.Component):
             m.d.comb += self.changed.eq(1)
         return m
 
-    def _explain(self, m, tally):
+    def _explain(self, m: Module, tally: Tally) -> None:
         """Cells are added as they are counted, zones subtracted as they pass; for these the counting holds."""
         cells = Signal.like(self.cells)
         unexplained = Signal(self.zone.shape())
@@ -178,7 +182,7 @@ class _Counts(wiring.Component):
                 unexplained.eq(0),
             ]
 
-    def _watch_change(self, m):
+    def _watch_change(self, m: Module) -> None:
         m.submodules.change = change = Change(self.skin)
         m.d.comb += [change.taken.eq(self.taken), change.row.eq(self.row), change.clear.eq(self.ends)]
         with m.If(self.ends):

@@ -9,9 +9,8 @@ One divider for x and y in turn takes 18 LUT4 less on an iCE40UP5K with 16x16 ce
 22 with 64x64 (91, not 113), and twice the clocks, in which a dense frame's zones would not be done before the next.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
@@ -19,47 +18,15 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import barycenter_layout, item_layout, record_layout
 
 
-class Divide(wiring.Component):
-    """Records of exact moments in, items of area and barycenter out, in the same order.
-
-    Records wait in a queue, from which one can be taken two clocks after it came; ``records`` is always ready, as the
-    queue has room for what can wait. See :class:`Divider` for the clocks from there on.
-    """
-
-    def __init__(self, skin: Skin):
-        self.skin = skin
-        self.derived = Derived(skin)
-        super().__init__(
-            {
-                "records": In(stream.Signature(record_layout(self.derived))),
-                "items": Out(stream.Signature(item_layout(self.derived))),
-            }
-        )
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.queue = queue = SyncFIFOBuffered(
-            width=record_layout(self.derived).size, depth=self.derived.backlog
-        )
-        m.submodules.divider = divider = Divider(self.skin)
-        m.d.comb += [
-            queue.w_data.eq(self.records.payload),
-            queue.w_en.eq(self.records.valid),
-            self.records.ready.eq(queue.w_rdy),
-            divider.records.payload.eq(queue.r_data),
-            divider.records.valid.eq(queue.r_rdy),
-            queue.r_en.eq(divider.records.ready),
-        ]
-        wiring.connect(m, divider.items, wiring.flipped(self.items))
-        return m
-
-
 class Divider(wiring.Component):
-    """One zone at a time, a bit a clock: offered in clock t, its item is offered from ``t + Q + 1`` on, with Q =
+    """One zone at a time, one bit per clock: offered in clock t, its item is offered from ``t + Q + 1`` on, with Q =
     ``Derived.quotient_bits``, and the next zone can begin in that clock.
 
     While an item waits, the next zone is divided up to its last bit. A zone is taken with that bit; an end mark passes
     without delay when no item is before it.
+
+    records (in): zones and end marks.
+    items (out): area and barycenter of each, in the same order.
     """
 
     def __init__(self, skin: Skin):
@@ -104,7 +71,7 @@ class Divider(wiring.Component):
         ]
         return m
 
-    def _divide(self, m, name, total, area, begins, steps):
+    def _divide(self, m: Module, name: str, total: Value, area: Value, begins: Value, steps: Value) -> Value:
         """Registers of one axis; returns the quotient's bits, the last of them worked out in this clock."""
         whole = self.derived.cell_bits
         # Kept inverted, so that adding the area subtracts it and no carry is left where it fits.
@@ -121,7 +88,7 @@ class Divider(wiring.Component):
             m.d.sync += [remainder.eq(Mux(fits, less, shifted)), bits.eq(Cat(fits, bits))]
         return Cat(fits, bits)
 
-    def _rounded(self, m, quotients):
+    def _rounded(self, m: Module, quotients: data.View) -> Value:
         """The bits of x and y on the wire."""
         layout = barycenter_layout(self.derived)
         return Cat(((quotients[name] + 1) >> 1)[: layout[name].width] for name in ("x", "y"))

@@ -2,7 +2,7 @@
 
 import math
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import memory, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -16,11 +16,14 @@ GROUPS = 4
 
 
 class Tally(wiring.Component):
-    """Moments of each row, a group of columns a clock.
+    """Moments of each row, one group of columns per clock.
 
-    The groups' shares come from two clocks behind ``taken`` on, one in each clock without ``hold``; before and after,
-    they are zero. A row has at most :data:`GROUPS`, an empty one none. Only empty ones may be taken until ``busy``
-    falls, behind the last group.
+    A row has at most :data:`GROUPS` groups, an empty one none.
+
+    taken (in): high for the clock in which ``row`` (in) is taken. Only empty rows may be taken while ``busy``.
+    moments (out): a group's share in each clock without ``hold``, from two clocks after ``taken`` on; otherwise zero.
+    hold (in): no group is counted.
+    busy (out): falls after the last group.
     """
 
     def __init__(self, skin: Skin):
@@ -101,7 +104,7 @@ class Change(wiring.Component):
         return m
 
 
-def _count_offsets(bits):
+def _count_offsets(bits: Value) -> Value:
     """The numbers of the bits that are set, summed: for each bit of the numbers, how many have it."""
     return sum(
         popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place

@@ -1,6 +1,6 @@
 """Drives rows together where nothing is touched, one by one where something is."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -14,18 +14,34 @@ from contactfpga_hdl.scan.shift import RowChain
 from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
 
 
+class _Sample:
+    """The columns in this clock, and what that clock is."""
+
+    def __init__(self, derived: Derived):
+        self.read = Signal(derived.skin.columns)  # columns that read pressed
+        self.pressed = Signal(derived.skin.columns)  # and are not masked in the row that is driven alone
+        self.of_released = Signal()  # no row was driven
+        self.watches = Signal()  # idle rows were driven for the settle time and still are
+
+
 class AdaptiveScanner(wiring.Component):
-    """Adaptive scan: a diode a switch makes the columns the OR of the rows that are driven.
+    """Adaptive scan: a diode at each switch makes the columns the OR of the rows that are driven.
 
     Rows are offered in ascending order, each as soon as it and those before it are known: one that was driven alone
-    three clocks after its sample, those that a probe found empty a clock each behind that. Untouched, all rows are
-    driven without a pause and the columns looked at in each clock: ``contact`` rises three clocks behind a touch, and
-    the next slots find it. ``contact`` falls two clocks behind the last strobe of a frame in which no row had a pressed
-    switch. ``tag`` belongs to the frame whose last strobe was; it is complete three clocks after that and holds until
-    the next frame's.
+    three clocks after its sample, those that a probe found empty in the clocks after that, one per clock. Untouched,
+    all rows are driven without a pause and the columns looked at in each clock; the slots after a touch find it.
 
-    With debounce ``alone`` says of the row on offer that it was driven alone, and ``sampled`` in which slot, counted
-    from power-up on; ``busy``, a bit a row, keeps rows on the list.
+    pins: those of the row driver and of the column reader.
+    rows (out): rows in ascending order.
+    tag (out): of the frame whose last strobe was; complete three clocks after that, until the next frame's.
+    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
+    heard (in): taken over into that tag.
+    epoch (out): high for a clock when another 2^22 us are over.
+    contact (out): rises three clocks after a touch, and falls two clocks after the last strobe of a frame in which no
+    row had a pressed switch.
+    alone (out): the row on offer was driven alone.
+    sampled (out): in which slot, counted from power-up on.
+    busy (in): a bit per row, with debounce; keeps that row on the list.
     """
 
     def __init__(self, skin: Skin):
@@ -48,52 +64,53 @@ class AdaptiveScanner(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.seek = self._seek = Seek(self.skin)
-        m.submodules.driver = self._driver = self._row_driver()
-        m.submodules.reader = self._reader = DirectColumns(self.skin)
-        connect_pins(m, self._driver.pins, self.pins)
-        connect_pins(m, self._reader.pins, self.pins)
-        self._read_columns(m)
-        self._time_slots(m)
-        self._offer_rows(m)
-        self._keep_listed(m)
-        self._watch_contact(m)
-        self._watch_stuck(m)
-        self._tag_frame(m)
+        skin = self.skin
+        m.submodules.seek = seek = Seek(skin)
+        m.submodules.driver = driver = DirectRows(skin) if skin.row_drive == "direct" else RowChain(skin)
+        m.submodules.reader = reader = DirectColumns(skin)
+        m.submodules.stuck = stuck = Stuck(skin)
+        connect_pins(m, driver.pins, self.pins)
+        connect_pins(m, reader.pins, self.pins)
+        sample = _Sample(self.derived)
+        self._read_columns(m, reader.levels, seek, sample)
+        self._time_slots(m, driver, seek, sample)
+        self._offer_rows(m, seek, sample)
+        self._keep_listed(m, seek)
+        self._watch_contact(m, seek, sample)
+        self._tag_frame(m, seek)
+        m.d.comb += [
+            stuck.columns.eq(sample.read),
+            stuck.released.eq(sample.of_released),
+            stuck.take.eq(seek.ends),
+            self.tag.stuck.eq(stuck.count),
+        ]
         return m
 
-    def _row_driver(self):
-        return DirectRows(self.skin) if self.skin.row_drive == "direct" else RowChain(self.skin)
-
-    def _read_columns(self, m):
-        levels, seek = self._reader.levels, self._seek
-        self._columns = Signal(self.skin.columns)
-        self._pressed = Signal(self.skin.columns)  # of the row that is driven alone
+    def _read_columns(self, m: Module, levels: Value, seek: Seek, sample: _Sample) -> None:
         m.d.comb += [
-            self._columns.eq(~levels if self.skin.selects_low else levels),
-            self._pressed.eq(self._columns),
+            sample.read.eq(~levels if self.skin.selects_low else levels),
+            sample.pressed.eq(sample.read),
             # A masked switch that is closed keeps its row on the list, so that it hides no other row's.
-            seek.hit.eq((self._columns & anywhere(self.skin)).any()),
+            seek.hit.eq((sample.read & anywhere(self.skin)).any()),
         ]
         for row in sorted({row for row, _ in self.skin.mask}):
             with m.If(seek.pattern[row]):
-                m.d.comb += self._pressed.eq(self._columns & present(self.skin, row))
+                m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
-    def _time_slots(self, m):
-        """As in a raster scan, but that idle rows stay driven. A column that reads pressed then ends the wait at once:
-        that is the slot's strobe, and the release begins behind it."""
-        derived, driver, seek = self.derived, self._driver, self._seek
+    def _time_slots(self, m: Module, driver: DirectRows | RowChain, seek: Seek, sample: _Sample) -> None:
+        """As in a raster scan, but idle rows stay driven. A column that reads pressed ends that wait at once: it is the
+        slot's strobe, and the release begins after it."""
+        derived = self.derived
         slot, settled, shifting = derived.row_clocks, derived.settle_clocks, derived.row_shift_clocks
         clock = Signal(range(slot), init=(slot - shifting) % slot)
         ends = clock == slot - 1
         off = Signal()  # no row is driven
-        row_due = Signal(2)  # a sample on its way through the synchroniser
+        row_due = Signal(2)  # a sample on its way through the synchronizer
         released_due = Signal(2)
-        self._watches = Signal()  # idle rows were driven for the settle time and still are
         wakes = seek.strobe & seek.idle & seek.hit
-        self._released = released_due[-1]
         m.d.comb += [
-            seek.strobe.eq(row_due[-1] | self._watches & seek.idle & seek.hit),
+            seek.strobe.eq(row_due[-1] | sample.watches & seek.idle & seek.hit),
+            sample.of_released.eq(released_due[-1]),
             driver.pattern.eq(seek.pattern),
             driver.drive.eq(ends & ~wakes),
             driver.release.eq((clock == settled - 1) & ~seek.idle | wakes),
@@ -104,28 +121,25 @@ class AdaptiveScanner(wiring.Component):
             clock.eq(Mux(ends, 0, clock + 1)),
         ]
         if shifting:
-            self._shift_rows(m, clock == slot - shifting, clock == 0, off, ends)
+            begun = Signal()  # the first slot has
+            with m.If(ends):
+                m.d.sync += begun.eq(1)
+            # A pattern is shifted once it is chosen. That of idle rows is shifted again at the beginning of each slot,
+            # so that registers that were disturbed get it back.
+            again = (clock == 0) & seek.idle
+            m.d.comb += driver.shift.eq(Mux(begun & ~off, again, clock == slot - shifting))
         with m.If(driver.release):
             m.d.sync += off.eq(1)
         with m.Elif(driver.drive):
             m.d.sync += off.eq(0)
         with m.If(seek.strobe):
-            m.d.sync += self._watches.eq(seek.idle & ~seek.hit)
+            m.d.sync += sample.watches.eq(seek.idle & ~seek.hit)
         with m.If(wakes):
             m.d.sync += [clock.eq(settled), row_due.eq(0)]
 
-    def _shift_rows(self, m, in_release, in_settle, off, ends):
-        """A pattern is shifted once it is chosen. That of idle rows is shifted anew at the beginning of each slot, so
-        that registers that were disturbed get it back."""
-        driver, seek = self._driver, self._seek
-        begun = Signal()  # the first slot has
-        with m.If(ends):
-            m.d.sync += begun.eq(1)
-        m.d.comb += driver.shift.eq(Mux(begun & ~off, in_settle & seek.idle, in_release))
-
-    def _offer_rows(self, m):
+    def _offer_rows(self, m: Module, seek: Seek, sample: _Sample) -> None:
         """Rows that are known, in order; at most one that was driven alone waits."""
-        seek, rows = self._seek, self.rows
+        rows = self.rows
         place = Signal(self.skin.rows, init=1)  # of the next row to go, one-hot
         alone = Signal(self.skin.rows)  # of the row that waits
         cells = Signal(self.skin.columns)
@@ -143,11 +157,10 @@ class AdaptiveScanner(wiring.Component):
         with m.If(seek.strobe):
             m.d.sync += slot.eq(slot + 1)
         with m.If(seek.strobe & seek.alone):
-            m.d.sync += [alone.eq(seek.pattern), cells.eq(self._pressed), self.sampled.eq(slot)]
+            m.d.sync += [alone.eq(seek.pattern), cells.eq(sample.pressed), self.sampled.eq(slot)]
 
-    def _keep_listed(self, m):
-        """A row stays on the list if it was pressed, or a switch in it counted so, behind its sample before."""
-        seek = self._seek
+    def _keep_listed(self, m: Module, seek: Seek) -> None:
+        """A row stays on the list if it was pressed, or a switch in it counted so, after its sample before."""
         if self.skin.debounce != "none":
             m.d.comb += seek.busy.eq((self.busy & seek.pattern).any())
             return
@@ -156,31 +169,21 @@ class AdaptiveScanner(wiring.Component):
         with m.If(seek.strobe & seek.alone):
             m.d.sync += before.eq(before & ~seek.pattern | Mux(seek.hit, seek.pattern, 0))
 
-    def _watch_contact(self, m):
+    def _watch_contact(self, m: Module, seek: Seek, sample: _Sample) -> None:
         """In a probe a column counts if none of its switches is masked."""
-        seek = self._seek
         clean = sum(1 << column for column in range(self.skin.columns) if all(column != c for _, c in self.skin.mask))
         row, seen = Signal(), Signal()
-        looks = seek.strobe & ~seek.alone | self._watches
-        m.d.comb += row.eq(seek.strobe & seek.alone & self._pressed.any())
+        looks = seek.strobe & ~seek.alone | sample.watches
+        m.d.comb += row.eq(seek.strobe & seek.alone & sample.pressed.any())
         m.d.sync += seen.eq((seen | row) & ~seek.ends)
-        with m.If(row | looks & (self._columns & clean).any()):
+        with m.If(row | looks & (sample.read & clean).any()):
             m.d.sync += self.contact.eq(1)
         with m.Elif(seek.ends & ~seen):
             m.d.sync += self.contact.eq(0)
 
-    def _watch_stuck(self, m):
-        m.submodules.stuck = stuck = Stuck(self.skin)
-        m.d.comb += [
-            stuck.columns.eq(self._columns),
-            stuck.released.eq(self._released),
-            stuck.take.eq(self._seek.ends),
-            self.tag.stuck.eq(stuck.count),
-        ]
-
-    def _tag_frame(self, m):
+    def _tag_frame(self, m: Module, seek: Seek) -> None:
         """Time and request at the first strobe, and how many slots there were up to the last."""
-        per_us, seek = self.derived.clocks_per_us, self._seek
+        per_us = self.derived.clocks_per_us
         prescaler = Signal(range(max(2, per_us)))
         time, begun = Signal(TIME_BITS), Signal(TIME_BITS)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)

@@ -1,4 +1,4 @@
-"""Between scanner and sheet: which pins there are, and the drivers for a pin a row and a pin a column."""
+"""Between scanner and sheet: which pins there are, and the drivers for one pin per row and per column."""
 
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
@@ -10,20 +10,21 @@ from contactfpga.skin import Skin
 
 
 def row_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that drive the rows: one a row, or those of the shift registers with one ``row_data`` a chain."""
+    """The pins that drive the rows: one per row, or those of the shift registers with one ``row_data`` per chain."""
     if skin.row_drive == "direct":
         return {"rows": Out(skin.rows)}
     return {"row_data": Out(skin.row_chains), "row_clock": Out(1), "row_latch": Out(1), "row_enable_n": Out(1, init=1)}
 
 
 def column_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that read the columns: one a column, or those of the shift registers, one ``column_data`` a chain."""
+    """The pins that read the columns: one per column, or those of the shift registers with
+    one ``column_data`` per chain."""
     if skin.column_read == "direct":
         return {"columns": In(skin.columns)}
     return {"column_load_n": Out(1, init=1), "column_clock": Out(1), "column_data": In(skin.column_chains)}
 
 
-def connect_pins(m: Module, inner: wiring.PureInterface, outer) -> None:
+def connect_pins(m: Module, inner: wiring.PureInterface, outer: wiring.PureInterface) -> None:
     """Connect the pins of ``inner`` to the ones of the same names further out."""
     for name, member in inner.signature.members.items():
         inside, outside = getattr(inner, name), getattr(outer, name)
@@ -33,10 +34,14 @@ def connect_pins(m: Module, inner: wiring.PureInterface, outer) -> None:
 def row_driver(skin: Skin) -> wiring.Signature:
     """What drives the rows, as the scanner sees it.
 
-    ``pattern`` holds the rows of the next slot as ones. It must be stable from ``shift``, given
-    ``Derived.row_shift_clocks`` before the slot, until ``drive`` in the last clock before it. They are driven from the
-    clock after ``drive`` to that of ``release``; a pattern that is driven already may be shifted anew. Direct rows need
-    no ``shift``, and after power-up drive row 0 at once, in an adaptive scan all rows.
+    pins (out): those at the sheet.
+    pattern (in): the rows of the next slot as ones. It must be stable from ``shift`` until ``drive``.
+    shift (in): high for a clock, ``Derived.row_shift_clocks`` before the slot; direct rows need none. A pattern that is
+    driven already may be shifted again.
+    drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
+    release (in): high in the last clock in which they are driven.
+
+    Direct rows drive row 0 after power-up, in an adaptive scan all rows.
     """
     return wiring.Signature(
         {
@@ -52,8 +57,10 @@ def row_driver(skin: Skin) -> wiring.Signature:
 def column_reader(skin: Skin) -> wiring.Signature:
     """What reads the columns, as the scanner sees it.
 
-    The columns are sampled ``Derived.column_load_clocks`` after ``begin``. Their ``levels`` are there while ``done``,
-    ``2 + Derived.column_shift_clocks`` after they were sampled.
+    pins (out): those at the sheet.
+    begin (in): high for a clock; the columns are sampled ``Derived.column_load_clocks`` later.
+    levels (out): of the columns, while ``done``.
+    done (out): high for a clock, ``2 + Derived.column_shift_clocks`` after they were sampled.
     """
     return wiring.Signature(
         {
@@ -66,7 +73,7 @@ def column_reader(skin: Skin) -> wiring.Signature:
 
 
 def released_levels(skin: Skin, lines: int) -> int:
-    """Levels of so many columns that read released."""
+    """Levels of ``lines`` columns that read released."""
     return (1 << lines) - 1 if skin.selects_low else 0
 
 
@@ -90,7 +97,7 @@ class DirectRows(wiring.Component):
 
 
 class DirectColumns(wiring.Component):
-    """Two synchroniser stages."""
+    """Two synchronizer stages."""
 
     def __init__(self, skin: Skin):
         self.skin = skin

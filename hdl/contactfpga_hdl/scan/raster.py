@@ -1,6 +1,6 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -12,16 +12,49 @@ from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
 
 
-class Scanner(wiring.Component):
-    """Raster scan: a row a settle time, then a release time with no row driven.
+class _Slots:
+    """Which slot it is: rows follow each other, and before the first one there is the time to shift its row."""
 
-    A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchroniser
-    stages and the row register), and later by what its columns take on shift registers. ``contact`` rises with the
-    offer of the first row that holds a pressed switch and falls with the last row of a scan without one. ``tag``
-    belongs to the frame whose last row was offered; it is complete one clock after that and holds until the next
-    frame's last row. A ``request`` is answered by ``requested`` in the tag of the next frame to start, which takes
-    ``heard`` over. ``epoch`` is high for a clock when a further 2^22 us are over. ``pins`` are those of the row driver
-    and of the column reader.
+    def __init__(self, derived: Derived):
+        slot, shifting = derived.row_clocks, derived.row_shift_clocks
+        begun = int(not shifting)
+        self.clock = Signal(range(slot), init=(slot - shifting) % slot)
+        self.scans = Signal(init=begun)  # in the first slot and after it
+        self.following = Signal(derived.skin.rows, init=1 << begun % derived.skin.rows)  # row of the next one, one-hot
+
+    @property
+    def is_last(self) -> Value:
+        return self.following[0] & self.scans
+
+
+class _Sample:
+    """The columns as they were sampled, and of which row."""
+
+    def __init__(self, derived: Derived):
+        self.begins = Signal()  # the next one, of a row
+        self.of_row = Signal()  # high for a clock: it is there, and was taken while the row was driven
+        self.of_released = Signal()  # likewise while no row was driven
+        self.row = Signal(range(max(2, derived.skin.rows)))  # the next to be sampled
+        self.read = Signal(derived.skin.columns)  # columns that read pressed
+        self.pressed = Signal(derived.skin.columns)  # and are not masked in this row
+        self.is_first = self.row == 0
+        self.is_last = self.row == derived.skin.rows - 1
+
+
+class Scanner(wiring.Component):
+    """Raster scan: each row for the settle time, then no row for the release time.
+
+    A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
+    stages and the row register), and later by what its columns take on shift registers.
+
+    pins: those of the row driver and of the column reader.
+    rows (out): rows in ascending order.
+    tag (out): of the frame whose last row was offered; complete one clock after that, until the next frame's last row.
+    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
+    heard (in): taken over into that tag.
+    epoch (out): high for a clock when another 2^22 us are over.
+    contact (out): rises with the offer of the first row that holds a pressed switch, and falls with the last row of a
+    scan without one.
     """
 
     def __init__(self, skin: Skin):
@@ -41,127 +74,106 @@ class Scanner(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        self._connect_pins(m)
-        self._drive_rows(m)
-        self._sample_columns(m)
-        self._mask_row(m)
-        self._offer_row(m)
-        self._watch_contact(m)
-        self._watch_stuck(m)
-        self._tag_frame(m)
+        skin = self.skin
+        m.submodules.driver = driver = DirectRows(skin) if skin.row_drive == "direct" else RowChain(skin)
+        m.submodules.reader = reader = DirectColumns(skin) if skin.column_read == "direct" else ColumnChain(skin)
+        m.submodules.stuck = stuck = Stuck(skin)
+        connect_pins(m, driver.pins, self.pins)
+        connect_pins(m, reader.pins, self.pins)
+        slots, sample = _Slots(self.derived), _Sample(self.derived)
+        self._drive_rows(m, slots, driver)
+        self._sample_columns(m, slots, reader, sample)
+        self._mask_row(m, reader.levels, sample)
+        self._offer_row(m, sample)
+        self._watch_contact(m, sample)
+        self._tag_frame(m, slots, sample)
+        m.d.comb += [
+            stuck.columns.eq(sample.read),
+            stuck.released.eq(sample.of_released),
+            stuck.take.eq(sample.of_row & sample.is_last),
+            self.tag.stuck.eq(stuck.count),
+        ]
         return m
 
-    def _connect_pins(self, m):
-        skin = self.skin
-        self._driver = DirectRows(skin) if skin.row_drive == "direct" else RowChain(skin)
-        self._reader = DirectColumns(skin) if skin.column_read == "direct" else ColumnChain(skin)
-        m.submodules.driver, m.submodules.reader = self._driver, self._reader
-        connect_pins(m, self._driver.pins, self.pins)
-        connect_pins(m, self._reader.pins, self.pins)
-
-    def _drive_rows(self, m):
-        """Slots follow each other; before the first one there is the time to shift its row."""
-        derived, driver = self.derived, self._driver
+    def _drive_rows(self, m: Module, slots: _Slots, driver: DirectRows | RowChain) -> None:
+        derived = self.derived
         slot, shifting = derived.row_clocks, derived.row_shift_clocks
-        begun = int(not shifting)
-        self._clock = Signal(range(slot), init=(slot - shifting) % slot)
-        self._scans = Signal(init=begun)  # in the first slot and after it
-        following = Signal(self.skin.rows, init=1 << begun % self.skin.rows)  # the row of the next slot, one-hot
-        self._in_last_slot = following[0] & self._scans
-        ends = self._clock == slot - 1
-        m.d.sync += self._clock.eq(self._clock + 1)
+        ends = slots.clock == slot - 1
+        m.d.sync += slots.clock.eq(slots.clock + 1)
         with m.If(ends):
-            m.d.sync += [self._clock.eq(0), self._scans.eq(1), following.eq(following.rotate_left(1))]
+            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(slots.following.rotate_left(1))]
         m.d.comb += [
-            driver.pattern.eq(following),
-            driver.shift.eq(self._clock == slot - shifting),
+            driver.pattern.eq(slots.following),
+            driver.shift.eq(slots.clock == slot - shifting),
             driver.drive.eq(ends),
-            driver.release.eq(self._clock == derived.settle_clocks - 1),
+            driver.release.eq(slots.clock == derived.settle_clocks - 1),
         ]
 
-    def _sample_columns(self, m):
+    def _sample_columns(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> None:
         """A slot has two samples: in the last clock its row is driven, and in the last one that no row is."""
-        derived, reader = self.derived, self._reader
+        derived = self.derived
         lead = derived.column_load_clocks + 1
-        self._begins_row = Signal()
         begins_released = Signal()
         done_is_row = Signal(init=1)  # the two come in turn
-        self._sampled = Signal()
-        self._released = Signal()
         m.d.comb += [
-            self._begins_row.eq(self._scans & (self._clock == derived.settle_clocks - lead)),
-            begins_released.eq(self._scans & (self._clock == derived.row_clocks - lead)),
-            reader.begin.eq(self._begins_row | begins_released),
-            self._sampled.eq(reader.done & done_is_row),
-            self._released.eq(reader.done & ~done_is_row),
+            sample.begins.eq(slots.scans & (slots.clock == derived.settle_clocks - lead)),
+            begins_released.eq(slots.scans & (slots.clock == derived.row_clocks - lead)),
+            reader.begin.eq(sample.begins | begins_released),
+            sample.of_row.eq(reader.done & done_is_row),
+            sample.of_released.eq(reader.done & ~done_is_row),
         ]
         m.d.sync += done_is_row.eq(done_is_row ^ reader.done)
-        self._row = Signal(range(max(2, self.skin.rows)))  # the next to be sampled
-        self._first = self._row == 0
-        self._last = self._row == self.skin.rows - 1
-        with m.If(self._sampled):
-            m.d.sync += self._row.eq(Mux(self._last, 0, self._row + 1))
+        with m.If(sample.of_row):
+            m.d.sync += sample.row.eq(Mux(sample.is_last, 0, sample.row + 1))
 
-    def _mask_row(self, m):
-        levels = self._reader.levels
-        self._columns = Signal(self.skin.columns)
-        self._pressed = Signal(self.skin.columns)
+    def _mask_row(self, m: Module, levels: Value, sample: _Sample) -> None:
         m.d.comb += [
-            self._columns.eq(~levels if self.skin.selects_low else levels),
-            self._pressed.eq(self._columns),
+            sample.read.eq(~levels if self.skin.selects_low else levels),
+            sample.pressed.eq(sample.read),
         ]
-        with m.Switch(self._row):
+        with m.Switch(sample.row):
             for row in sorted({row for row, _ in self.skin.mask}):
                 with m.Case(row):
-                    m.d.comb += self._pressed.eq(self._columns & present(self.skin, row))
+                    m.d.comb += sample.pressed.eq(sample.read & present(self.skin, row))
 
-    def _offer_row(self, m):
-        with m.If(self._sampled):
+    def _offer_row(self, m: Module, sample: _Sample) -> None:
+        with m.If(sample.of_row):
             m.d.sync += [
                 self.rows.valid.eq(1),
-                self.rows.payload.cells.eq(self._pressed),
-                self.rows.payload.last.eq(self._last),
+                self.rows.payload.cells.eq(sample.pressed),
+                self.rows.payload.last.eq(sample.is_last),
             ]
         with m.Elif(self.rows.ready):
             m.d.sync += self.rows.valid.eq(0)
 
-    def _watch_contact(self, m):
+    def _watch_contact(self, m: Module, sample: _Sample) -> None:
         seen = Signal()  # in this scan's rows so far
-        with m.If(self._sampled):
-            now = self._pressed.any()
+        with m.If(sample.of_row):
+            now = sample.pressed.any()
             m.d.sync += [
-                seen.eq(~self._last & (seen | now)),
-                self.contact.eq(now | Mux(self._last, seen, self.contact)),
+                seen.eq(~sample.is_last & (seen | now)),
+                self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
             ]
 
-    def _watch_stuck(self, m):
-        m.submodules.stuck = stuck = Stuck(self.skin)
-        m.d.comb += [
-            stuck.columns.eq(self._columns),
-            stuck.released.eq(self._released),
-            stuck.take.eq(self._sampled & self._last),
-            self.tag.stuck.eq(stuck.count),
-        ]
-
-    def _tag_frame(self, m):
+    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> None:
         """Time and request at the first row's sample; the tag takes them over with the last row's strobe."""
         per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
-        # The clock starts with the first slot of the last row, to tell at its strobe what it was at the first row's
-        # sample: so no register has to keep that.
+        # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of the
+        # first row's sample: no register has to keep that.
         ahead = self.derived.row_shift_clocks - late
         prescaler = Signal(range(max(2, per_us)), init=ahead % per_us)
         time = Signal(TIME_BITS, init=ahead // per_us % (1 << TIME_BITS))
         runs = Signal()
-        with m.If(self._in_last_slot):
+        with m.If(slots.is_last):
             m.d.sync += runs.eq(1)
-        with m.If(runs | self._in_last_slot):
+        with m.If(runs | slots.is_last):
             m.d.sync += prescaler.eq(prescaler + 1)
             with m.If(prescaler == per_us - 1):
                 m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
         watch_epoch(m, time, self.epoch, late=ahead < 0)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         # What comes while columns are shifted in came after their sample: it asks for the next frame.
-        begins = (self._begins_row if late else self._sampled) & self._first
+        begins = (sample.begins if late else sample.of_row) & sample.is_first
         asked, heard_now = requested, heard
         if not late:
             asked, heard_now = Mux(begins, waiting, requested), Mux(begins, self.heard, heard)
@@ -169,7 +181,7 @@ class Scanner(wiring.Component):
             m.d.sync += [requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
-        with m.If(self._sampled & self._last):
+        with m.If(sample.of_row & sample.is_last):
             m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked), self.tag.heard.eq(heard_now)]
 
 

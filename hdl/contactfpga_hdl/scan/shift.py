@@ -76,7 +76,7 @@ class ColumnChain(wiring.Component):
         clock = Signal(range(clocks))
         ends = Signal()
         last = bit == lines
-        # The pins lag this count by their register, what comes back by that and the synchroniser's two stages.
+        # The pins lag this count by their register, what comes back by that and the synchronizer's two stages.
         taken, done = Signal(3), Signal(3)
         m.d.sync += [taken.eq(Cat(ends & (bit != 0), taken)), done.eq(Cat(ends & last, done))]
         m.d.comb += self.done.eq(done[-1])

@@ -1,7 +1,11 @@
 """How many bits are set, or the sum of numbers: balanced trees of adders."""
 
+from collections.abc import Iterable
 
-def popcount(bits):
+from amaranth.hdl import Value
+
+
+def popcount(bits: Iterable[Value]) -> Value | int:
     """The sum of bits or of numbers, added in pairs."""
     numbers = list(bits)
     while len(numbers) > 1:

@@ -1,6 +1,6 @@
 """A stack whose top is always at hand."""
 
-from amaranth.hdl import Elaboratable, Module, Mux, Signal
+from amaranth.hdl import Elaboratable, Module, Mux, Signal, Value
 from amaranth.lib import data, memory
 
 SHALLOW = 4
@@ -44,7 +44,7 @@ class Stack(Elaboratable):
             m.d.sync += self.top.eq(self.entry)
         return m
 
-    def _shift(self, m, deeper, shallower):
+    def _shift(self, m: Module, deeper: Value, shallower: Value) -> Value:
         """Entries below the top in registers, the next one first; returns that."""
         entries = [self.top, *(Signal(self.entry.shape(), name=f"below_{i}") for i in range(1, self.depth))]
         for index in range(1, self.depth):
@@ -55,7 +55,7 @@ class Stack(Elaboratable):
                     m.d.sync += entries[index].eq(entries[index + 1])
         return entries[1] if self.depth > 1 else self.top
 
-    def _spill(self, m, deeper, shallower):
+    def _spill(self, m: Module, deeper: Value, shallower: Value) -> Value:
         """Entries below the top in a memory, entry i at address i; returns the one next to the top.
 
         That one is read ahead, or, when it was just written, kept in a register: no address is read and written in

@@ -34,7 +34,7 @@ _GATES = (
     "aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
 _STORE = "link.store["  # the frames' memory, by far the most registers
-_CLOCKS = ("scan._clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
+_CLOCKS = ("scan.clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
 # Outputs that say what is handed over, and the one that says when.
 _HANDED = {
     "row_cells": "row_transfer",

@@ -7,7 +7,8 @@ from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.seek import PICK, SEARCH, START, WAIT
 
 ROWS = 2
@@ -51,34 +52,34 @@ def released_between(proof: Proof) -> None:
 
 def _seek_lemmas(proof: Proof, inside: Inside) -> None:
     state, pattern, alone = inside["seek.choice_state"], inside["seek.pattern"], inside["seek.alone"]
-    proof.lemma(inside["seek._listed"] == popcount(inside["seek._list"]))
-    proof.lemma((inside["seek._level"] == 0) & ((state == SEARCH) | ~inside["seek._searching"]))
+    proof.lemma(inside["seek.listed"] == popcount(inside["seek.on_list"]))
+    proof.lemma((inside["seek.level"] == 0) & ((state == SEARCH) | ~inside["seek.searching"]))
     with proof.m.If(state == WAIT):
         proof.lemma((pattern != 0) & (~alone | (pattern != ALL)))
     with proof.m.If(inside["seek.idle"]):
         proof.lemma((state == WAIT) & (pattern == ALL) & ~alone)
-        proof.lemma((inside["seek._list"] == 0) & (inside["seek._todo"] == 0) & (inside["seek._hits"] == 0))
+        proof.lemma((inside["seek.on_list"] == 0) & (inside["seek.todo"] == 0) & (inside["seek.hits"] == 0))
     with proof.m.If(state == SEARCH):
-        proof.lemma((inside["seek._suspects"] != 0) & ~inside["seek._suspected"])
+        proof.lemma((inside["seek.suspects"] != 0) & ~inside["seek.suspected"])
 
 
 def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since) -> None:
-    """When in a slot rows are chosen: behind its strobe, or where idle rows hit, from the release on."""
+    """When in a slot rows are chosen: after its strobe, or where idle rows hit, from the release on."""
     clock, state = inside["clock"], inside["seek.choice_state"]
-    pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["_watches"]
-    todo, due = inside["seek._todo"], inside["row_due"]
+    pattern, idle, watches = inside["seek.pattern"], inside["seek.idle"], inside["watches"]
+    todo, due = inside["seek.todo"], inside["row_due"]
     waits = state == WAIT
     proof.lemma(waits | (clock >= settled) & (clock <= settled + 4))
     proof.lemma((state != START) | (clock == settled + 3))
     proof.lemma((state != SEARCH) | off & ((clock == settled) | (clock == settled + 2)))
     proof.lemma((state != PICK) | (clock > settled))
-    chosen = (todo != 0) & ~inside["seek._suspected"]
+    chosen = (todo != 0) & ~inside["seek.suspected"]
     proof.lemma((state != PICK) | (clock == settled + 2) | chosen & off)
     proof.lemma(due == Mux(waits, Mux(clock == settled, 1, Mux(clock == settled + 1, 2, 0)), 0))
     with proof.m.If(~off & (clock < settled)):
         proof.lemma(driven == pattern)
     with proof.m.If(~off & (clock >= settled)):
-        asleep = (inside["seek._list"] == 0) & (todo == 0) & ~inside["seek._suspected"]
+        asleep = (inside["seek.on_list"] == 0) & (todo == 0) & ~inside["seek.suspected"]
         at_rest = waits & idle & (pattern == ALL)
         proof.lemma(Mux(clock == settled + 2, (state == PICK) & asleep, 1))
         proof.lemma(Mux(clock == settled + 3, (state == START) & asleep, 1))
@@ -88,9 +89,14 @@ def _slot_lemmas(proof: Proof, inside: Inside, settled: int, off, driven, since)
         proof.lemma(idle | (clock == settled + 2) | (clock == settled + 3))
 
 
+def _wakes(inside: Inside):
+    return inside["strobe"] & inside["seek.idle"] & inside["hit"]
+
+
 _BUGS = (
-    Bug("driven on", AdaptiveScanner, "_time_slots", "ends & ~wakes", "ends"),
-    Bug("no release", AdaptiveScanner, "_time_slots", "~seek.idle | wakes", "~seek.idle"),
-    Bug("a short release", AdaptiveScanner, "_time_slots", "clock.eq(settled)", "clock.eq(settled + 1)"),
-)
+    Bug("driven on", AdaptiveScanner, "drive",
+        lambda _, inside: inside["clock"] == inside.component.derived.row_clocks - 1),
+    Bug("no release", AdaptiveScanner, "release", lambda release, inside: release & ~_wakes(inside)),
+    Bug("a short release", AdaptiveScanner, "clock", lambda clock, inside: clock + _wakes(inside)),
+)  # fmt: skip
 CASES = (Case("a release between rows", "2 rows", released_between, 4, _BUGS, 60),)

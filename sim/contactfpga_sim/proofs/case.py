@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Callable
 
-from contactfpga_sim.proofs.bugs import Bug, planted
+from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.solve import Verdict, prove, search
 
@@ -34,5 +34,4 @@ class Case:
 
     def run_with(self, bug: Bug, limit_s: float = 3600) -> Verdict:
         """Look for a counterexample to the claims, without the lemmas, in the gateware with the bug."""
-        with planted(bug):
-            return search(self.build, self.bug_clocks, limit_s)
+        return search(self.build, self.bug_clocks, limit_s, bug)

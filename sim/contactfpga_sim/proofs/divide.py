@@ -9,7 +9,8 @@ from contactfpga_hdl.payloads import barycenter_layout, moments_layout
 from contactfpga_hdl.report.divide import Divider
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.streams import drain, feed
 
 
@@ -94,15 +95,18 @@ def _lemmas(proof: Proof, dut: Divider, inside: Inside, age, full, kept) -> None
 
 
 _BUGS = (
-    Bug("rounds down", Divider, "_rounded", "(quotients[name] + 1)", "(quotients[name] + 0)"),
-    Bug("what just fits does not", Divider, "_divide", "less.eq(shifted + area)", "less.eq(shifted + area + 1)"),
-    Bug("a bit too few", Divider, "elaborate", "m.d.sync += left.eq(bits)", "m.d.sync += left.eq(bits - 1)"),
-    Bug("what waits behind an end mark shows", Divider, "elaborate", "m.If(last & free)", "m.If(free)"),
-    Bug("overwrites what waits", Divider, "elaborate", "free = ~waits | self.items.ready",
-        "free = self.items.ready | 1"),
-    Bug("the end mark goes first", Divider, "elaborate", "Mux(end, ~waits & self.items.ready,",
-        "Mux(end, self.items.ready,"),
-    Bug("begins with a bit too many", Divider, "_divide", "begun.eq(total >> whole)", "begun.eq(total >> whole - 1)"),
+    Bug("rounds down", Divider, "waiting.x", lambda quotient, _: quotient & ~1),
+    Bug("what just fits does not", Divider, "x_less", lambda less, _: less + 1),
+    Bug("a bit too few", Divider, "left",
+        lambda left, inside: left - ((inside["left"] == 0) & (left != 0))),
+    Bug("what waits changes under an end mark", Divider, "waiting",
+        lambda quotients, inside: Mux(inside["waits"], quotients, inside["found"])),
+    Bug("overwrites what waits", Divider, "waiting",
+        lambda quotients, inside: Mux(inside["left"] == 1, inside["found"], quotients)),
+    Bug("the end mark goes first", Divider, "records__ready",
+        lambda ready, inside: Mux(inside.component.records.payload.end, inside.component.items.ready, ready)),
+    Bug("begins with a bit too many", Divider, "x_begun",
+        lambda _, inside: inside.component.records.payload.zone.sum_x >> inside.component.derived.cell_bits - 1),
 )  # fmt: skip
 CASES = tuple(
     Case("zones are divided", f"{rows}x{columns}, {bits} fraction bit{'s' * (bits != 1)}",

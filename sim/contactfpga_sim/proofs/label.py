@@ -1,4 +1,4 @@
-"""The labeller: nothing runs over or empty, nothing is left behind, and no stall changes what it does."""
+"""The labeller: nothing runs over or empty, nothing is left over, and no stall changes what it does."""
 
 from functools import partial
 
@@ -13,6 +13,7 @@ from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.util.stack import Stack
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
 
 
@@ -37,7 +38,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     is no restriction.
 
     Claimed: the stacks neither overflow nor run empty; no place of the table is written while an open zone lies there,
-    or read while none does or in the clock in which it is written; behind a frame's last row no zone is open, in the
+    or read while none does or in the clock in which it is written; after a frame's last row no zone is open, in the
     table or on a stack.
     """
     m = proof.m
@@ -54,7 +55,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     with m.If(works & stack.push & ~stack.pop):
         proof.claim(stack.level < nesting(derived))
 
-    # Which places of the table hold an open zone; all of it is a clock behind the stack of `join`.
+    # Which places of the table hold an open zone; all of it comes one clock after the stack of `join`.
     summing = join.join_valid & ~joined.end
     load_place = proof.before(place_of(derived, step.before))
     live, taken, stored = (Signal(derived.open_zones, name=name) for name in ("live", "taken", "stored"))
@@ -87,7 +88,8 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     open_places = sum(places, Const(0, derived.open_zones))  # no two are the same
     with m.If(~midst):
         proof.lemma((open_row == 0) | nests)
-        proof.lemma((stack.level == 0) & (join._after == 0) & (join._before == 0) & (join._number == 0))
+        proof.lemma(stack.level == 0)
+        proof.lemma((inside["join.after"] == 0) & (inside["join.before"] == 0) & (inside["join.number"] == 0))
     with m.If(~proof.before(midst)):
         proof.lemma(live == proof.before(open_places))
     proof.lemma(summed_level == proof.before(stack.level))
@@ -95,16 +97,16 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
         proof.lemma(~midst & (open_row == 0))
     proof.lemma(inside["walk.before"] == Mux(walked_last, 0, walked))
     with m.If((midst | works) & ~(works & step.row_done)):
-        proof.lemma(walk._inside[0])
-    proof.lemma(mask_of_first_cluster(walk))
-    with m.If(~walk._inside[0]):
+        proof.lemma(inside["walk.inside"][0])
+    proof.lemma(mask_of_first_cluster(inside))
+    with m.If(~inside["walk.inside"][0]):
         proof.lemma(inside["walk.opens"])
         proof.lemma(inside["walk.before"] == Mux(works, Mux(step.final, 0, stepped), open_row))
 
 
-def mask_of_first_cluster(walk: Walk):
-    """Whether the walk's mask is a run of ones from column 0 on, with the other clusters' ends behind it."""
-    inside, ends = walk._inside, walk._ends
+def mask_of_first_cluster(labeller: Inside):
+    """Whether the walk's mask is a run of ones from column 0 on, with the other clusters' ends after it."""
+    inside, ends = labeller["walk.inside"], labeller["walk.ends"]
     return ((inside & (inside + 1)) == 0) & ((ends & inside) == 0) & (inside[0] | (ends == 0))
 
 
@@ -162,27 +164,39 @@ def an_end_mark_a_frame(proof: Proof, columns: int, connectivity: int) -> None:
     proof.claim(owed <= 3)
     with m.If(dut.records.valid & dut.records.payload.end):
         proof.claim(owed != 0)
-    held = walk._last + (walk.step_valid & walk.step.end) + (join.join_valid & join.join.end)
+    held = inside["walk.last"] + (walk.step_valid & walk.step.end) + (join.join_valid & join.join.end)
     proof.lemma(owed == held)
 
 
+def _pushed_in_a_stall(level, inside: Inside):
+    stack = inside.component
+    return level + (stack.push & ~stack.pop & ~stack.enable)
+
+
 _OVERFLOW_BUGS = (
-    Bug("brackets forgotten", Join, "_brackets", "old_before.eq(self._new_before)", "old_before.eq(0)"),
-    Bug("never pushed", Join, "elaborate", "stack.push.eq(self.step.closes & (group.open != 0))", "stack.push.eq(0)"),
-    Bug("always in the first place", Join, "_decide", "join.place.eq(group.place)", "join.place.eq(0)"),
-    Bug("the last row is a row like others", Walk, "_take_row", "self._last.eq(row.last)", "self._last.eq(0)"),
-    Bug("a zone stays open", Walk, "_take_row", "before.eq(Mux(row.last, 0, row.cells))", "before.eq(row.cells)"),
-)
+    Bug("brackets forgotten", Join, "old_before",
+        lambda brackets, inside: Mux(inside.component.step.row_done, 0, brackets)),
+    Bug("never pushed", Join, "push", lambda *_: 0),
+    Bug("always in the first place", Join, "decided.place", lambda *_: 0),
+    Bug("the last row is a row like others", Walk, "last", lambda *_: 0),
+    Bug("a zone stays open", Walk, "before",
+        lambda row, inside: Mux(inside["rows__ready"] & inside.component.rows.valid,
+                                inside.component.rows.payload.cells, row)),
+)  # fmt: skip
 _STALL_BUGS = (
-    Bug("the walk runs on", Walk, "_walk_clusters", "m.If(self.enable & work)", "m.If(work)"),
-    Bug("the join runs on", Join, "elaborate", "self.enable & self.valid", "self.valid"),
-    Bug("the stack runs on", Stack, "elaborate", "self.enable & self.push & ~self.pop", "self.push & ~self.pop"),
-    Bug("the table is written", Sum, "elaborate", "works = self.enable & self.valid", "works = self.valid"),
-    Bug("rows are taken", Walk, "_take_row", "rows.ready.eq(self.enable & ~work)", "rows.ready.eq(~work)"),
-)
+    Bug("the walk runs on", Walk, "inside",
+        lambda columns, inside: Mux(inside.component.enable, columns, columns >> 1)),
+    Bug("the join runs on", Join, "kept",
+        lambda group, inside: Mux(inside.component.enable | ~inside.component.valid, group, inside["group"])),
+    Bug("the stack runs on", Stack, "level", _pushed_in_a_stall),
+    Bug("the table is written", Sum, "write__en",
+        lambda _, inside: inside.component.valid & ~inside.component.join.end & inside.component.join.store),
+    Bug("rows are taken", Walk, "rows__ready", lambda _, inside: ~inside["inside"][0]),
+)  # fmt: skip
 _END_BUGS = (
-    Bug("no mark behind the first row", Walk, "_walk_clusters", "| self._last", "| self._last & self._y.any()"),
-    Bug("the mark comes again", Walk, "_take_row", "self._last.eq(0)", "self._last.eq(self._last)"),
+    Bug("no mark after the first row", Walk, "step_valid",
+        lambda valid, inside: valid & (inside["inside"][0] | inside["y"].any() | ~inside.component.enable)),
+    Bug("the mark comes again", Walk, "last", lambda last, inside: last | inside["last"]),
 )  # fmt: skip
 CASES = (
     *(

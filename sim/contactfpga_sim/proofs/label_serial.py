@@ -1,16 +1,17 @@
-"""The labeller that takes a cell a clock: its records are the zones, and its memories neither overflow nor collide."""
+"""The labeller that takes one cell per clock: its records are the zones, its memories neither overflow nor collide."""
 
 from functools import partial
 
-from amaranth.hdl import Const, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Mux, Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.label import rows_into
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.zones import OpenRow, next_row, open_rows_agree
 
 
@@ -24,35 +25,38 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
     """Free and assumed: as below.
 
     Claimed: what is wanted of the memory is there, nothing is written to a place in use or outside the table, no word
-    is used that was read while it was written, the brackets nest no deeper than there is room, and behind a frame no
+    is used that was read while it was written, the brackets nest no deeper than there is room, and after a frame no
     place is in use.
     """
-    dut, open_row = _labeller(proof, columns, connectivity, rows, proof.lemma)
+    dut, inside, open_row = _labeller(proof, columns, connectivity, rows, proof.lemma)
     m, places = proof.m, dut.derived.open_zones
     live = Signal(places)  # in use: by zones of the row before that are to come or of the new row, or groups that wait
-    write, wanted = dut._write, dut._wanted
-    read = dut._read.addr[: len(dut._place)]
+    groups, wanted, whole, final = inside.part("groups"), inside["wanted"], inside["whole"], inside["last"]
+    (read_port,), (write,) = groups.read_ports, groups.write_ports
+    read = read_port.addr[:-1]
     taken = Mux(wanted, Const(1) << read, 0)[:places]
     stored = Mux(write.en, Const(1) << write.addr, 0)[:places]
-    m.d.sync += live.eq(live & ~taken | Mux(dut._whole & dut._last, 0, stored))
+    m.d.sync += live.eq(live & ~taken | Mux(whole & final, 0, stored))
     with m.If(wanted):
         proof.claim((taken & live).any())
         proof.claim(~write.en | (write.addr != read))
     with m.If(write.en):
         proof.claim((stored & ~live).any())
-    for port, written in ((dut._read_earlier, dut._write_earlier), (dut._read_later, dut._write_later)):
-        lost = Signal(name=f"lost_{port.data.name}")
+    for name in ("earlier", "later"):
+        (port,), (written,) = inside.part(name).read_ports, inside.part(name).write_ports
+        lost = Signal(name=f"lost_{name}")
         with m.If(port.en):
             m.d.sync += lost.eq(written.en & (written.addr == port.addr))
-        proof.claim(~(dut._begins & lost))
+        proof.claim(~(inside["begins"] & lost))
         proof.claim(~written.en | (written.addr < places))
     depth = Signal(range(nesting(dut.derived) + 1))
-    opens, closes = dut._joins & dut._later & ~dut._earlier, dut._joins & dut._earlier & ~dut._later
+    joins, earlier, later = inside["joins"], inside["earlier"], inside["later"]
+    opens, closes = joins & later & ~earlier, joins & earlier & ~later
     m.d.sync += depth.eq(depth + opens - closes)
     proof.claim(~opens | (depth < nesting(dut.derived)))
     proof.claim(~closes | (depth != 0))
     with m.If(dut.rows.ready):
-        proof.claim(~dut._last | (live == 0))
+        proof.claim(~final | (live == 0))
         firsts = (Mux(leader, 1 << place_of(dut.derived, x), 0) for x, leader in enumerate(open_row.leaders()))
         proof.lemma(live == sum(firsts, Const(0, places)))
         proof.lemma(depth == 0)
@@ -61,13 +65,15 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come.
 
-    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and behind a last row
+    Claimed: when a row can be taken, the zones that end with the one before have left, each once, and after a last row
     one end mark; that is so after C + e + 2 clocks at most.
     """
     _labeller(proof, columns, connectivity, rows, proof.claim)
 
 
-def _labeller(proof: Proof, columns: int, connectivity: int, rows: int, claim) -> tuple[SerialLabeller, OpenRow]:
+def _labeller(
+    proof: Proof, columns: int, connectivity: int, rows: int, claim
+) -> tuple[SerialLabeller, Inside, OpenRow]:
     """The labeller beside the specification, and what is said of both."""
     m = proof.m
     dut = SerialLabeller(_skin(rows, columns, connectivity))
@@ -96,11 +102,12 @@ def _labeller(proof: Proof, columns: int, connectivity: int, rows: int, claim) -
         claim(seen_now == expected)
         claim(ends_now == expected_end)
         _at_rest(proof, dut, inside, open_row)
-        proof.lemma(Mux(dut._last, 0, dut._y + 1)[: len(y)] == y)
+        proof.lemma(Mux(inside["last"], 0, inside["y"] + 1)[: len(y)] == y)
     open_rows_agree(proof, open_row)
-    for place in range(dut.derived.open_zones, 2 << len(dut._place)):
-        proof.lemma((place < 1 << len(dut._place)) | (inside.word("groups", place) == 0))
-    return dut, open_row
+    place_bits = len(inside["first"])
+    for place in range(dut.derived.open_zones, 2 << place_bits):
+        proof.lemma((place < 1 << place_bits) | (inside.word("groups", place) == 0))
+    return dut, inside, open_row
 
 
 def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRow) -> None:
@@ -108,7 +115,7 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
     derived, columns = dut.derived, range(dut.derived.skin.columns)
     starts = Signal(len(columns), name="run_starts")
     proof.m.d.comb += starts.eq(open_row.cells & ~(open_row.cells << 1))
-    moments = len(dut._group.as_value())
+    moments = len(inside["moments"])
     for x in columns:
         place = place_of(derived, x)
         earlier, later = open_row.reach[x][:x].any(), (open_row.reach[x] & starts)[x + 1 :].any()
@@ -119,11 +126,13 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
             word = inside.word("groups", place)
             proof.lemma(word[:moments] == open_row.moments[x].as_value())
             proof.lemma(~word[moments])  # has_run
-    proof.lemma(dut._before == open_row.cells << 1)
-    proof.lemma((dut._cells == 0) & ~dut._c_left & ~dut._b_left & ~dut._walking & ~dut._tail & ~dut._second)
-    proof.lemma(dut._whole & ~dut._has_run & (dut._group.as_value() == 0))
+    proof.lemma(inside["before"] == open_row.cells << 1)
+    proof.lemma((inside["cells"] == 0) & ~inside["cell_left"] & ~inside["before_left"])
+    proof.lemma(~inside["active"] & ~inside["tail"] & ~inside["second"])
+    proof.lemma(inside["whole"] & ~inside["has_run"] & (inside["moments"] == 0))
+    found = Value.cast(inside.part("groups").read_ports[0].data)
     started = proof.before(Const(1))  # at power-up it is not known what the memory reads
-    proof.lemma(~started | (dut._found.as_value() == 0))
+    proof.lemma(~started | (found == 0))
 
 
 def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
@@ -137,34 +146,46 @@ def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: i
     proof.m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
     waits = dut.records.valid & ~dut.records.ready
     with proof.m.If(waits):
-        proof.claim(~dut.rows.ready & ~dut._write_earlier.en & ~dut._write_later.en)
+        proof.claim(~dut.rows.ready & ~inside["write_earlier__en"] & ~inside["write_later__en"])
     with proof.m.If(proof.before(waits)):
         for register in (dut.records.valid, dut.records.payload, *inside.registers()):
             proof.claim(Value.cast(register) == proof.before(register))
 
 
+def _clusters_end_early(closes, inside: Inside):
+    """At a column that is empty in the row before."""
+    return (inside["cell_left"] | inside["before_left"]) & ~inside["before"][0]
+
+
 _STALL_BUGS = (
-    Bug("the walk runs on", SerialLabeller, "_walk", "m.If(self._enable)", "m.If(self._enable | 1)"),
-    Bug("rows are taken", SerialLabeller, "_walk", "self._enable & ~self._walking", "~self._walking"),
-    Bug("runs are forgotten", SerialLabeller, "_know_runs", "m.If(self._enable)", "m.If(self._enable | 1)"),
-    Bug("brackets are written", SerialLabeller, "_write_brackets", "later.en.eq(self._enable & ", "later.en.eq("),
-)
+    Bug("the walk runs on", SerialLabeller, "tail", lambda tail, inside: tail & inside["enable"]),
+    Bug("rows are taken", SerialLabeller, "rows__ready", lambda _, inside: ~inside["active"] & ~inside["tail"]),
+    Bug("runs are forgotten", SerialLabeller, "has_run",
+        lambda has_run, inside: has_run & ~(inside["closes"] | ~inside["active"])),
+    Bug("brackets are written", SerialLabeller, "write_later__en",
+        lambda enable, inside: enable | inside["closes"] & inside["whole"] & inside["has_run"]),
+)  # fmt: skip
 _BUGS = (
-    Bug("clusters end with the row before", SerialLabeller, "_cut", "~(self._c | self._b)", "~self._b"),
-    Bug("a zone is expected to go on for ever", SerialLabeller, "_write_brackets",
-        "self._starts | self._closes & self._whole & self._has_run", "self._starts"),
-    Bug("the table is not read", SerialLabeller, "_read_group", "(~self._earlier | self._whole)",
-        "self._earlier & self._whole"),
-    Bug("a zone leaves a row early", SerialLabeller, "_let_out", "(~self._has_run |", "(self._has_run |"),
-    Bug("always in the first row", SerialLabeller, "_walk", "Mux(self._last, 0, self._y + 1)", "0"),
+    Bug("clusters end with the row before", SerialLabeller, "closes", _clusters_end_early),
+    Bug("a zone is expected to go on for ever", SerialLabeller, "write_later__en",
+        lambda enable, inside: enable & inside["starts"]),
+    Bug("the table is not read", SerialLabeller, "wanted",
+        lambda wanted, inside: wanted & inside["earlier"]),
+    Bug("a zone leaves a row early", SerialLabeller, "records__valid",
+        lambda valid, inside: valid | inside["closes"] & inside["whole"]),
+    Bug("always in the first row", SerialLabeller, "y", lambda *_: 0),
 )  # fmt: skip
 
 
 _OVERFLOW_BUGS = (
-    Bug("always in the first place", SerialLabeller, "_sum", "addr.eq(self._first)", "addr.eq(0)"),
-    Bug("a place is read again", SerialLabeller, "_read_group", "(~self._earlier | self._whole)", "1"),
-    Bug("brackets are read too late", SerialLabeller, "_read_brackets", "self._advance & odd", "self._advance"),
-    Bug("the last row is a row like others", SerialLabeller, "_walk", "self._c & ~self._last", "self._c"),
+    Bug("always in the first place", SerialLabeller, "write__addr", lambda *_: 0),
+    Bug("a place is read again", SerialLabeller, "wanted",
+        lambda _, inside: inside["begins"] & ~inside["second"]),
+    Bug("brackets are read too late", SerialLabeller, "read_later__en",
+        lambda enable, inside: enable | inside["advance"]),
+    Bug("the last row is a row like others", SerialLabeller, "before",
+        lambda before, inside: Mux(inside["advance"] & inside["active"],
+                                   Cat(before[:-1], inside["cells"][0]), before)),
 )  # fmt: skip
 
 

@@ -1,23 +1,25 @@
-"""The link behind the packer: which frame is sent, and that its bytes are those that were packed."""
+"""The link after the packer: which frame is sent, and that its bytes are those that were packed."""
 
 from functools import partial
 from unittest import mock
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
+from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
-from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.link import HELLO_REGION, Link, hello_words, offset_bits, stored_hello
 from contactfpga_hdl.link.odometer import LIVE_DIGITS
+from contactfpga_hdl.link.pack import Packer
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.streams import drain, feed
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
 _STATES = ("IDLE", "FETCH", "BYTE", "TAIL")
-_HELLO_REGION = 3
 
 
 def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
@@ -34,28 +36,29 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
-        dut = Link(_SKIN)
-    inside = proof.put(dut)
-    place = proof.chosen(dut._offset_bits, "place")
-    hello_place = proof.chosen(range(len(dut._hello)), "hello_place")
-    proof.given(hello_place < len(dut._hello))
+        dut = _PackerAndLink()
+        inside = proof.put(dut)
+        stored, first_word = stored_hello(_SKIN), hello_words(_SKIN).start
+    place = proof.chosen(len(dut.packer.frames.end), "place")
+    hello_place = proof.chosen(range(len(stored)), "hello_place")
+    proof.given(hello_place < len(stored))
     feed(proof, dut.items, "items")
     drain(proof, dut.bytes, "bytes")
     for port, name in ((dut.tag, "tag"), (dut.summary, "summary")):
         m.d.comb += port.eq(proof.free(port.shape(), name))
     for port, name in ((dut.asked, "asked"), (dut.epoch, "epoch"), (dut.number, "number")):
         m.d.comb += port.eq(proof.free(port.shape(), name))
-    packer = dut.packer
-    frames = _Frames(m, dut, place)
-    with m.If(packer.commit):
-        proof.given((packer.end != 0) & (frames.written_now | (place >= packer.end)))
-    wire = _Wire(m, dut, frames)
-    taken = dut._take_frame | dut._take_hello
-    proof.claim(~(taken & wire.busy) & ~(dut._take_frame & ~frames.waits))
-    proof.claim(~(dut.bytes.valid & ~wire.busy) & ~(packer.commit & frames.waits))
+    packed = dut.packer.frames
+    frames = _Frames(m, packed, inside["link.take_frame"], place)
+    with m.If(packed.commit):
+        proof.given((packed.end != 0) & (frames.written_now | (place >= packed.end)))
+    wire = _Wire(m, dut, inside, frames, len(stored))
+    taken = inside["link.take_frame"] | inside["link.take_hello"]
+    proof.claim(~(taken & wire.busy) & ~(inside["link.take_frame"] & ~frames.waits))
+    proof.claim(~(dut.bytes.valid & ~wire.busy) & ~(packed.commit & frames.waits))
     with m.If(wire.busy & ~proof.before(taken | dut.bytes.valid & dut.bytes.ready)):
         proof.claim(dut.bytes.valid)
-    hello_byte = Array(dut._hello)[hello_place]
+    hello_byte = Array(stored)[hello_place]
     in_state = (wire.index >= protocol.STATE_OFFSET) & (wire.index < protocol.STATE_OFFSET + protocol.STATE_DIGITS)
     with m.If(dut.bytes.valid & (wire.index < wire.length)):
         with m.If(wire.is_hello & in_state):
@@ -70,11 +73,32 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
     with m.If(dut.bytes.valid & (wire.index == wire.length + CHECK_BYTES)):
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     with m.If(frames.closing):
-        proof.claim(packer.verdict.sequence == frames.sent[: len(packer.verdict.sequence)])
-        proof.claim(packer.verdict.overwritten == frames.dropped)
-    _lemmas(proof, dut, inside, place, frames, wire)
-    hello_region = Const(_HELLO_REGION << dut._offset_bits)
-    proof.lemma(inside.word("store", (hello_region + hello_place)[: len(hello_region)]) == hello_byte)
+        proof.claim(packed.verdict.sequence == frames.sent[: len(packed.verdict.sequence)])
+        proof.claim(packed.verdict.overwritten == frames.dropped)
+    _lemmas(proof, inside, place, frames, wire)
+    hello_region = Const(first_word)
+    proof.lemma(inside.word("link.store", (hello_region + hello_place)[: len(hello_region)]) == hello_byte)
+
+
+class _PackerAndLink(wiring.Component):
+    """As the top joins them."""
+
+    def __init__(self) -> None:
+        self.packer, self.link = Packer(_SKIN, offset_bits(_SKIN)), Link(_SKIN)
+        packer, link = self.packer.signature.members, self.link.signature.members
+        names = ("tag", "summary", "asked", "epoch", "number", "bytes")
+        super().__init__({"items": packer["items"], **{name: link[name] for name in names}})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.packer, m.submodules.link = self.packer, self.link
+        wiring.connect(m, wiring.flipped(self.items), self.packer.items)
+        wiring.connect(m, self.packer.frames, self.link.frames)
+        wiring.connect(m, self.link.bytes, wiring.flipped(self.bytes))
+        for part in (self.packer, self.link):
+            m.d.comb += [part.tag.eq(self.tag), part.summary.eq(self.summary)]
+        m.d.comb += [getattr(self.link, name).eq(getattr(self, name)) for name in ("asked", "epoch", "number")]
+        return m
 
 
 class _Frames:
@@ -83,8 +107,8 @@ class _Frames:
     Of each, what was written at the followed place.
     """
 
-    def __init__(self, m: Module, dut: Link, place):
-        packer, write = dut.packer, dut.packer.write
+    def __init__(self, m: Module, packed, take_frame, place):
+        write = packed.write
         self.closing = Signal(name="closing")  # from the clock after the end mark to the frame's last one
         self.waits = Signal(name="waits")
         self.written = Signal(name="written")  # the place, in the frame that is packed
@@ -92,101 +116,117 @@ class _Frames:
             Signal(8, name=f"{n}_value") for n in ("packed", "waiting", "sent")
         )
         self.waiting_length, self.sent_length = (
-            Signal.like(packer.end, name=f"{n}_length") for n in ("waiting", "sent")
+            Signal.like(packed.end, name=f"{n}_length") for n in ("waiting", "sent")
         )
         self.sent = Signal(7 * LIVE_DIGITS, name="sent_frames")
-        self.dropped = Signal.like(packer.verdict.overwritten, name="dropped_frames")
+        self.dropped = Signal.like(packed.verdict.overwritten, name="dropped_frames")
         hit = write.en & (write.offset == place)
         self.written_now = self.written | hit
         packed_now = Mux(hit, write.data, self.packed_value)
         m.d.sync += [self.written.eq(self.written_now), self.packed_value.eq(packed_now)]
-        replaces = self.waits & ~dut._take_frame
-        with m.If(dut._take_frame):
+        replaces = self.waits & ~take_frame
+        with m.If(take_frame):
             m.d.sync += [self.waits.eq(0), self.sent.eq(self.sent + 1)]
             m.d.sync += [self.sent_value.eq(self.waiting_value), self.sent_length.eq(self.waiting_length)]
-        with m.If(packer.decide):
-            with m.If(packer.verdict.send):
+        with m.If(packed.decide):
+            with m.If(packed.verdict.send):
                 m.d.sync += [self.closing.eq(1), self.waits.eq(0), self.dropped.eq(self.dropped + replaces)]
             with m.Else():
                 m.d.sync += self.written.eq(0)
-        with m.If(packer.commit):
+        with m.If(packed.commit):
             m.d.sync += [self.closing.eq(0), self.waits.eq(1), self.written.eq(0)]
-            m.d.sync += [self.waiting_value.eq(packed_now), self.waiting_length.eq(packer.end)]
+            m.d.sync += [self.waiting_value.eq(packed_now), self.waiting_length.eq(packed.end)]
 
 
 class _Wire:
     """How many bytes of the frame or hello on the wire were taken."""
 
-    def __init__(self, m: Module, dut: Link, frames: _Frames):
+    def __init__(self, m: Module, dut: _PackerAndLink, inside: Inside, frames: _Frames, hello_length: int):
         self.busy, self.is_hello = Signal(name="busy"), Signal(name="is_hello")
-        self.index = Signal(len(dut.packer.end) + 1, name="index")
-        self.length = Mux(self.is_hello, len(dut._hello), frames.sent_length)
+        self.index = Signal(len(dut.packer.frames.end) + 1, name="index")
+        self.length = Mux(self.is_hello, hello_length, frames.sent_length)
         with m.If(self.busy & dut.bytes.valid & dut.bytes.ready):
             m.d.sync += [self.index.eq(self.index + 1), self.busy.eq(self.index != self.length + CHECK_BYTES)]
-        with m.If(dut._take_frame | dut._take_hello):
-            m.d.sync += [self.busy.eq(1), self.index.eq(0), self.is_hello.eq(dut._take_hello)]
+        with m.If(inside["link.take_frame"] | inside["link.take_hello"]):
+            m.d.sync += [self.busy.eq(1), self.index.eq(0), self.is_hello.eq(inside["link.take_hello"])]
 
 
-def _lemmas(proof: Proof, dut: Link, inside: Inside, place, frames: _Frames, wire: _Wire) -> None:
+def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -> None:
     m = proof.m
-    filling, waiting, sending = dut._filling, inside["waiting"], dut._sending
+    filling, waiting, sending = (inside[f"link.{name}"] for name in ("filling", "waiting", "sending"))
     proof.lemma((filling != waiting) & (waiting != sending) & (sending != filling))
-    proof.lemma((filling != _HELLO_REGION) & (waiting != _HELLO_REGION) & (sending != _HELLO_REGION))
-    words = Array(inside.word("store", Cat(place, Const(region, 2))) for region in range(_HELLO_REGION))
+    proof.lemma((filling != HELLO_REGION) & (waiting != HELLO_REGION) & (sending != HELLO_REGION))
+    words = Array(inside.word("link.store", Cat(place, Const(region, 2))) for region in range(HELLO_REGION))
     proof.lemma(~frames.written | (words[filling] == frames.packed_value))
     with m.If(frames.waits):
         proof.lemma((words[waiting] == frames.waiting_value) | (place >= frames.waiting_length))
-        proof.lemma((frames.waiting_length != 0) & (dut._waiting_end == frames.waiting_length))
+        proof.lemma((frames.waiting_length != 0) & (inside["link.waiting_end"] == frames.waiting_length))
     proof.lemma((inside["packer.part_state"] != 0) == frames.closing)
-    proof.lemma(~(frames.waits & frames.closing) & (dut._waits == frames.waits))
-    proof.lemma(Cat(dut._sent, inside["overwritten"]) == Cat(frames.sent, frames.dropped))
-    state, tail = inside["wire_state"], inside["tail"]
-    offset, end = dut._offset, inside["end"]
+    proof.lemma(~(frames.waits & frames.closing) & (inside["link.waits"] == frames.waits))
+    proof.lemma(Cat(inside["link.frames_sent"], inside["link.overwritten"]) == Cat(frames.sent, frames.dropped))
+    state, tail = inside["link.wire_state"], inside["link.tail"]
+    offset, end = inside["link.offset"], inside["link.end"]
     fetch, byte, in_tail = (state == _STATES.index(name) for name in ("FETCH", "BYTE", "TAIL"))
     proof.lemma((state != 0) == wire.busy)
-    proof.lemma(~wire.busy | (dut._sends_hello == wire.is_hello))
+    proof.lemma(~wire.busy | (inside["link.is_hello"] == wire.is_hello))
     with m.If(wire.busy & ~wire.is_hello):
         proof.lemma((words[sending] == frames.sent_value) | (place >= frames.sent_length))
         proof.lemma(frames.sent_length != 0)
     with m.If(fetch | byte):
         proof.lemma((offset == wire.index) & (end == wire.length))
         proof.lemma((wire.index < wire.length) | fetch & (wire.index == wire.length) & (tail == 0))
-    _lemmas_on_state(proof, dut, inside, wire, fetch, byte)
+    _lemmas_on_state(proof, inside, wire, fetch, byte)
     with m.If(in_tail):
         proof.lemma((tail <= CHECK_BYTES) & (wire.index == wire.length + tail))
 
 
-def _lemmas_on_state(proof: Proof, dut: Link, inside: Inside, wire: _Wire, fetch, byte) -> None:
+def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
     """Carries of the odometer are over before the first digit is fetched, and the digit on offer stands."""
-    m, state, at = proof.m, inside["odometer.carry_state"], inside["odometer.at"]
+    m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
     carries = state != 0
     proof.lemma((state <= 2) & (~carries | (at >= LIVE_DIGITS) & (at <= 10)))
     with m.If((fetch | byte) & wire.is_hello):
-        passed = Cat(byte, wire.index)  # at least so many clocks since it was taken
+        passed = Cat(byte, wire.index)  # at least this many clocks since it was taken
         proof.lemma(~carries | (Cat(state == 2, at) >= passed + 2 * LIVE_DIGITS))
         with m.If(byte & (wire.index >= protocol.STATE_OFFSET)):
-            place = dut._offset[: len(at)]
-            proof.lemma(inside.part("odometer").digit == inside.word("odometer.digits", place))
+            place = inside["link.offset"][: len(at)]
+            proof.lemma(inside.part("link.odometer").digit == inside.word("link.odometer.digits", place))
         for place in range(LIVE_DIGITS):
             with m.If(byte & (wire.index == protocol.STATE_OFFSET + place)):
-                proof.lemma(inside["live"] == dut._sent.word_select(place, 7))
+                proof.lemma(inside["link.live"] == inside["link.frames_sent"].word_select(place, 7))
     for place in range(LIVE_DIGITS):
-        proof.lemma(inside.word("odometer.digits", Const(place, 4)) == 0)
+        proof.lemma(inside.word("link.odometer.digits", Const(place, 4)) == 0)
+
+
+_IDLE, _FETCH, _BYTE, _TAIL = range(len(_STATES))
+
+
+def _leaves(inside: Inside, state: int, when):
+    return (inside["wire_state"] == state) & when
+
+
+def _last_left_out(state, inside: Inside):
+    return Mux(_leaves(inside, _FETCH, inside["offset"] + 1 == inside["end"]), _TAIL, state)
+
+
+def _check_byte_short(state, inside: Inside):
+    last = inside.component.bytes.ready & (inside["tail"] == CHECK_BYTES - 1)
+    return Mux(_leaves(inside, _TAIL, last), _IDLE, state)
 
 
 _BUGS = (
-    Bug("a byte does not wait", Link, "_send", "m.If(self.bytes.ready):\n                m.d.comb",
-        "m.If(1):\n                m.d.comb"),
-    Bug("the wrong region is sent", Link, "_place_frames", "self._sending.eq(waiting)",
-        "self._sending.eq(self._filling)"),
-    Bug("a frame is sent twice", Link, "_place_frames", "[self._waits.eq(0), self._sending", "[self._sending"),
-    Bug("a byte is passed over", Link, "_send", "_offset.eq(self._offset + 1)", "_offset.eq(self._offset + 2)"),
-    Bug("the last byte is left out", Link, "_send", "self._offset == end", "self._offset + 1 == end"),
-    Bug("a check byte short", Link, "_send", "tail == CHECK_BYTES", "tail == CHECK_BYTES - 1"),
-    Bug("a loss is not counted", Link, "_decide", "overwritten + drops", "overwritten"),
+    Bug("a byte does not wait", Link, "wire_state",
+        lambda state, inside: Mux(_leaves(inside, _BYTE, 1), _FETCH, state)),
+    Bug("the wrong region is sent", Link, "sending",
+        lambda region, inside: Mux(inside["take_frame"], inside["filling"], region)),
+    Bug("a frame is sent twice", Link, "waits", lambda waits, inside: waits | inside["take_frame"]),
+    Bug("a byte is passed over", Link, "offset", lambda offset, inside: offset + (offset == inside["offset"] + 1)),
+    Bug("the last byte is left out", Link, "wire_state", _last_left_out),
+    Bug("a check byte short", Link, "wire_state", _check_byte_short),
+    Bug("a loss is not counted", Link, "overwritten", lambda _, inside: inside["overwritten"]),
 )  # fmt: skip
 _HELLO = protocol.encode_hello(_SKIN)
-_SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames behind it
+_SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames after it
 CASES = (
     Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3),
     Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,

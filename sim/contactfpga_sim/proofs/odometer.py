@@ -64,10 +64,10 @@ def _others(at, counter: str):
 
 
 _BUGS = (
-    Bug("the epoch begins a place late", Odometer, "elaborate", "Mux(sent_waits, LIVE_DIGITS, _EPOCH)",
-        "Mux(sent_waits, LIVE_DIGITS, _EPOCH + 1)"),
-    Bug("a pulse is lost while the other counter's waits", Odometer, "elaborate",
-        "epoch_waits.eq(epoch_waits & sent_waits)", "epoch_waits.eq(0)"),
+    Bug("the epoch begins a place late", Odometer, "at",
+        lambda at, inside: at + ((inside["carry_state"] == _REST) & (at == SENT_DIGITS) & (inside["at"] != at))),
+    Bug("a pulse is lost while the other counter's waits", Odometer, "epoch_waits",
+        lambda waits, inside: waits & ~((inside["carry_state"] == _REST) & inside["sent_waits"])),
 )  # fmt: skip
 CASES = (
     Case("digits are the counts", "frames sent", partial(digits_are_the_counts, counter="sent"), 2),

@@ -9,7 +9,8 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.streams import feed
 
 _STATES = ("ITEMS", "TRAILER", "CLOSE")
@@ -21,7 +22,7 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
     ``commit`` the tag stays as it is, and from the clock after ``decide`` on the summary and the verdict's numbers.
 
     Claimed: when a frame closes, that place was written and holds what COBS puts there for the bytes of all items,
-    lowest first, and of the trailer; the frame ends behind its last byte; nothing is written outside of it. An item is
+    lowest first, and of the trailer; the frame ends after its last byte; nothing is written outside of it. An item is
     taken with its last byte. The frame closes as soon as its bytes are written, and one that is not sent leaves
     nothing.
     """
@@ -31,7 +32,7 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
     inside = proof.put(dut)
     place = proof.chosen(range(derived.max_stored_bytes), "place")
     feed(proof, dut.items, "items")
-    for port, name in ((dut.tag, "tag"), (dut.summary, "summary"), (dut.verdict, "verdict")):
+    for port, name in ((dut.tag, "tag"), (dut.summary, "summary"), (dut.frames.verdict, "verdict")):
         m.d.comb += port.eq(proof.free(port.shape(), name))
     plain = _PlainBytes(m, dut)
     _described_until_commit(proof, dut, plain)
@@ -39,19 +40,19 @@ def frames_are_packed(proof: Proof, skin: Skin) -> None:
     proof.given(plain.items <= derived.max_items)
     with m.If(dut.items.valid):
         proof.claim(dut.items.ready == (plain.last_read | plain.decides))
-    proof.claim(dut.decide == plain.decides)
-    proof.claim(dut.commit == plain.closes)
-    proof.claim(dut.write.en == (plain.writes | plain.closes))
-    with m.If(dut.write.en):
-        proof.claim(dut.write.offset < frame.length + plain.writes)
+    proof.claim(dut.frames.decide == plain.decides)
+    proof.claim(dut.frames.commit == plain.closes)
+    proof.claim(dut.frames.write.en == (plain.writes | plain.closes))
+    with m.If(dut.frames.write.en):
+        proof.claim(dut.frames.write.offset < frame.length + plain.writes)
     with m.If(plain.closes):
-        proof.claim(dut.end == frame.length)
+        proof.claim(dut.frames.end == frame.length)
         proof.claim((place >= frame.length) | frame.agrees_now)
     _lemmas(proof, dut, inside, plain, frame)
 
 
 def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> None:
-    verdict = dut.verdict
+    verdict = dut.frames.verdict
     numbers = Cat(verdict.sequence, verdict.overwritten, dut.summary)
     tag_before, numbers_before = proof.before(dut.tag), proof.before(numbers)
     with proof.m.If(plain.closing):
@@ -63,7 +64,7 @@ class _PlainBytes:
     """The bytes of items and trailer in their order, one a clock, from the clock after the one they come in."""
 
     def __init__(self, m: Module, dut: Packer):
-        derived, items, send = dut.derived, dut.items, dut.verdict.send
+        derived, items, send = dut.derived, dut.items, dut.frames.verdict.send
         queue = Signal(8 * max(derived.item_bytes, derived.trailer_bytes), name="queue")
         self.queue = Signal.like(queue, name="queue_now")
         self.left = Signal(range(len(queue) // 8 + 1), name="queued")
@@ -91,7 +92,7 @@ class _PlainBytes:
 
 def _trailer(derived: Derived, dut: Packer):
     """As docs/protocol.md has it."""
-    summary, verdict = dut.summary, dut.verdict
+    summary, verdict = dut.summary, dut.frames.verdict
     kind = {"moments": 5, "cells": 6}[derived.skin.report]
     return Cat(
         dut.tag.time,
@@ -123,14 +124,14 @@ class _Followed:
         expected_now, found_now = Signal(8, name="expected_now"), Signal(8, name="found_now")
         written = Signal(name="written")  # in this frame
         zero = plain.closes | plain.writes & (plain.byte == 0)
-        hit = dut.write.en & (dut.write.offset == place)
-        m.d.comb += [expected_now.eq(expected), found_now.eq(Mux(hit, dut.write.data, found))]
+        hit = dut.frames.write.en & (dut.frames.write.offset == place)
+        m.d.comb += [expected_now.eq(expected), found_now.eq(Mux(hit, dut.frames.write.data, found))]
         m.d.sync += [expected.eq(expected_now), found.eq(found_now), written.eq(written | hit)]
         with m.If(zero & (self.last_zero == place)):
             m.d.comb += expected_now.eq(self.length - place)
         with m.Elif(plain.writes & (self.length == place)):
             m.d.comb += expected_now.eq(plain.byte)
-        with m.If(plain.closes | plain.decides & ~dut.verdict.send):
+        with m.If(plain.closes | plain.decides & ~dut.frames.verdict.send):
             m.d.sync += [self.length.eq(1), self.last_zero.eq(0), written.eq(0)]
         with m.Elif(plain.writes):
             m.d.sync += self.length.eq(self.length + 1)
@@ -143,8 +144,8 @@ class _Followed:
 def _lemmas(proof: Proof, dut: Packer, inside: Inside, plain: _PlainBytes, frame: _Followed) -> None:
     derived, left = dut.derived, plain.left
     state = Mux(plain.closes, _STATES.index("CLOSE"), Mux(plain.closing, _STATES.index("TRAILER"), 0))
-    proof.lemma((inside["part_state"] == state) & (inside["_byte_valid"] == plain.writes))
-    proof.lemma(~plain.writes | (inside["_byte"] == plain.byte))
+    proof.lemma((inside["part_state"] == state) & (inside["plain__valid"] == plain.writes))
+    proof.lemma(~plain.writes | (inside["plain__payload"] == plain.byte))
     proof.lemma(Mux(plain.closes, plain.closing & ~plain.writes, ~plain.closing | plain.writes))
     _lemmas_on_reading(proof, dut, inside["index"], plain)
     open_length = inside["length"]  # of the block that is being filled
@@ -176,21 +177,45 @@ def _lemmas_on_reading(proof: Proof, dut: Packer, index, plain: _PlainBytes) -> 
         proof.lemma(index == 0)
 
 
+_ITEMS, _TRAILER, _CLOSE = range(len(_STATES))
+
+
+def _in_state(inside: Inside, state: int):
+    return inside["part_state"] == state
+
+
+def _last_byte_first(byte, inside: Inside):
+    dut = inside.component
+    turned = dut.items.payload.data.word_select(
+        (dut.derived.item_bytes - 1 - inside["index"])[: len(inside["index"])], 8
+    )
+    return Mux(_in_state(inside, _ITEMS) & dut.items.valid & ~dut.items.payload.end, turned, byte)
+
+
+def _taken_early(ready, inside: Inside):
+    dut = inside.component
+    return ready | _in_state(inside, _ITEMS) & (inside["index"] == dut.derived.item_bytes - 2)
+
+
+def _closes_early(state, inside: Inside):
+    last = inside["index"] == inside.component.derived.trailer_bytes - 1
+    return Mux(_in_state(inside, _TRAILER) & last, _CLOSE, state)
+
+
+def _item_again(byte, inside: Inside):
+    return Mux(inside["frames__decide"], inside.component.items.payload.data[:8], byte)
+
+
 _BUGS = (
-    Bug("the item is taken a byte early", Packer, "_sequence_bytes", "index == item_bytes - 1",
-        "index == item_bytes - 2"),
-    Bug("a zero too many", Packer, "_stuff", "self._byte == 0", "self._byte <= 1"),
-    Bug("the length is off by one", Packer, "_stuff", "length.eq(length + 1)", "length.eq(length + 2)"),
-    Bug("highest byte first", Packer, "_sequence_bytes", "item.word_select(index, 8)",
-        "item[::-1].word_select(index, 8)[::-1]"),
-    Bug("the trailer begins with an item's byte", Packer, "_sequence_bytes", 'ongoing("TRAILER") | ends',
-        'ongoing("TRAILER")'),
-    Bug("closes a byte early", Packer, "_sequence_bytes", "index == trailer_bytes", "index == trailer_bytes - 1"),
-    Bug("what is not sent stays", Packer, "_sequence_bytes", "self._restart.eq(self.decide & ~self.verdict.send)",
-        "self._restart.eq(0)"),
-    Bug("two fields change places", Packer, "_trailer", "trailer.cells.eq(self.summary.cells)",
-        "trailer.cells.eq(self.summary.zones)"),
-)  # fmt: skip
+    Bug("the item is taken a byte early", Packer, "items__ready", _taken_early),
+    Bug("a zero too many", Packer, "ends_block", lambda ends, inside: ends | (inside["plain__payload"] == 1)),
+    Bug("the length is off by one", Packer, "length", lambda length, inside: length + (length == inside["length"] + 1)),
+    Bug("highest byte first", Packer, "plain__payload", _last_byte_first),
+    Bug("the trailer begins with an item's byte", Packer, "plain__payload", _item_again),
+    Bug("closes a byte early", Packer, "part_state", _closes_early),
+    Bug("what is not sent stays", Packer, "restart", lambda restart, inside: restart & ~_in_state(inside, _ITEMS)),
+    Bug("two fields change places", Packer, "trailer.cells", lambda _, inside: inside.component.summary.zones),
+)
 _ZONES = Skin(rows=2, columns=4, zone_capacity=2, settle_us=40)
 _CELLS = Skin(rows=2, columns=4, report="cells", settle_us=40)
 CASES = (

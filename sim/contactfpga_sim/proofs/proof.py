@@ -1,11 +1,8 @@
 """A component with the solver's choices around it: what is free, what is assumed, what is claimed."""
 
-from collections.abc import Iterator
+from amaranth.hdl import Assert, Assume, ClockDomain, Fragment, Module, Signal, Value
 
-from amaranth.hdl import Assert, Assume, Cat, ClockDomain, Const, Fragment, Module, Shape, Signal, Value
-from amaranth.hdl._ast import SignalSet
-from amaranth.hdl._mem import MemoryInstance
-from amaranth.utils import ceil_log2
+from contactfpga_sim.proofs.inside import Inside
 
 
 class Proof:
@@ -20,7 +17,7 @@ class Proof:
         self.m.submodules.memory = self._memory
         self._names = 0
 
-    def put(self, component) -> "Inside":
+    def put(self, component) -> Inside:
         """Elaborate the component and make it the one under proof."""
         self.m.submodules.dut = fragment = Fragment.get(component, None)
         return Inside(fragment)
@@ -62,57 +59,3 @@ class Proof:
         """What is proved beside the claims because their induction stands on it; no part of what is claimed."""
         if not self._claims_alone:
             self.m.d.comb += Assert(condition)
-
-
-class Inside:
-    """What is in an elaborated component: its parts, and the signals that are driven there."""
-
-    def __init__(self, fragment: Fragment):
-        self._fragment = fragment
-
-    def __getitem__(self, path: str) -> Signal:
-        """The signal that is driven under this name, such as ``level`` or ``join.stack.level``."""
-        *names, last = path.split(".")
-        fragment = self._part(names)
-        for domain in fragment.statements:
-            for signal in _driven(fragment, domain):
-                if signal.name == last:
-                    return signal
-        raise KeyError(path)
-
-    def part(self, path: str):
-        """The component of that path, with the attributes that its ``elaborate`` has set."""
-        return self._part(path.split(".")).origins[0]
-
-    def word(self, path: str, address) -> Signal:
-        """What the memory holds at an address in this clock: seen through a read port that is added for it."""
-        (memory,) = (part for part in _fragments(self._part(path.split("."))) if isinstance(part, MemoryInstance))
-        data = memory._data
-        word = Signal(Shape.cast(data.shape).width, name=f"{path.replace('.', '_')}_word")
-        address = Cat(Value.cast(address), Const(0, data.depth.bit_length()))[: ceil_log2(data.depth)]
-        memory.read_port(domain="comb", addr=address, data=word, en=Const(1), transparent_for=())
-        return word
-
-    def registers(self) -> Iterator[Signal]:
-        """All signals of the component and what is in it that change with the clock."""
-        for fragment in _fragments(self._fragment):
-            yield from _driven(fragment, "sync")
-
-    def _part(self, names) -> Fragment:
-        fragment = self._fragment
-        for name in names:
-            fragment = next(sub for sub, known, _ in fragment.subfragments if known == name)
-        return fragment
-
-
-def _fragments(fragment):
-    yield fragment
-    for sub, _, _ in fragment.subfragments:
-        yield from _fragments(sub)
-
-
-def _driven(fragment, domain):
-    seen = SignalSet()
-    for statement in fragment.statements.get(domain, ()):
-        seen.update(statement._lhs_signals())
-    return list(seen)

@@ -8,21 +8,21 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import place_of
-from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.label import mask_of_first_cluster, rows_into, skin_of
-from contactfpga_sim.proofs.proof import Inside, Proof
-from contactfpga_sim.proofs.zones import OpenRow, flood_fill, next_row, open_rows_agree
+from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.zones import OpenRow, RowStep, flood_fill, next_row, open_rows_agree
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come.
 
-    Claimed: what comes from the second clock behind a row to the second clock behind the next one are the zones that
-    end with it, each once, and behind a last row one end mark.
+    Claimed: what comes from the second clock after a row to the second clock after the next one are the zones that
+    end with it, each once, and after a last row one end mark.
     """
     m = proof.m
     dut = RunLabeller(skin_of(rows, columns, connectivity))
@@ -88,29 +88,31 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
         for x in columns:
             with m.If(starts[x] & ~earlier[x]):
                 proof.lemma(words[place_of(dut.derived, x)] == open_row.moments[x].as_value())
-        proof.lemma((join._after == 0) & (join._before == 0) & (join._number == 0) & (inside["sum.kept"] == 0))
+        proof.lemma((inside["join.after"] == 0) & (inside["join.before"] == 0) & (inside["join.number"] == 0))
+        proof.lemma(inside["sum.kept"] == 0)
         proof.lemma((inside.part("join.stack").level == 0) & (inside.part("sum.stack").level == 0))
     with m.If(idle):
-        proof.lemma(~inside.part("walk")._last & ~inside.part("walk").step_valid & ~join.join_valid)
-        proof.lemma(~inside.part("walk")._inside[0] & (inside["walk.before"] == open_row.cells))
-    proof.lemma(mask_of_first_cluster(inside.part("walk")))
-    with m.If(~inside.part("walk")._inside[0]):
+        proof.lemma(~inside["walk.last"] & ~inside.part("walk").step_valid & ~join.join_valid)
+        proof.lemma(~inside["walk.inside"][0] & (inside["walk.before"] == open_row.cells))
+    proof.lemma(mask_of_first_cluster(inside))
+    with m.If(~inside["walk.inside"][0]):
         proof.lemma(inside["walk.opens"])
     open_rows_agree(proof, open_row)
 
 
 def _loaded(proof: Proof, dut: RunLabeller, inside: Inside, before, row, last, y) -> None:
-    """In the clock behind the one in which a row was handed over the walk has it all before it."""
+    """In the clock after the one in which a row was handed over the walk has it all before it."""
     walk = inside.part("walk")
-    proof.lemma((walk._befores == (before & ~(before << 1))) & (walk._last == last) & (walk._y == y))
-    proof.lemma((walk._starts == (row & ~(row << 1))) & (walk._stops == (row & ~(row >> 1))))
+    proof.lemma(inside["walk.befores"] == (before & ~(before << 1)))
+    proof.lemma((inside["walk.last"] == last) & (inside["walk.y"] == y))
+    proof.lemma((inside["walk.starts"] == (row & ~(row << 1))) & (inside["walk.stops"] == (row & ~(row >> 1))))
     if dut.derived.skin.connectivity == 8:
         joined = (row | before) & ((row | before) >> 1)
     else:
         joined = row & (row >> 1) | before & (before >> 1)
     ends = (row | before) & ~joined
-    proof.lemma(walk._ends == (ends & (ends - 1)))
-    proof.lemma(walk._inside == Mux(ends == 0, 0, ends ^ (ends - 1)))
+    proof.lemma(inside["walk.ends"] == (ends & (ends - 1)))
+    proof.lemma(inside["walk.inside"] == Mux(ends == 0, 0, ends ^ (ends - 1)))
     proof.lemma(~walk.step_valid | walk.step.end)
 
 
@@ -132,18 +134,27 @@ def rows_find_the_zones(proof: Proof, rows: int, columns: int, connectivity: int
     proof.claim(found == flood_fill(m, derived, frame, wanted))
 
 
+def _takes(inside: Inside):
+    return inside["rows__ready"] & inside.component.rows.valid
+
+
+def _clusters_end_early(columns, inside: Inside):
+    """With the first run of the row before, or of the new row if that one has none."""
+    before, row = inside["before"], inside.component.rows.payload.cells
+    ends = (before & ~(before >> 1))[: len(before)]
+    return Mux(_takes(inside), Mux(ends == 0, row | before, ends ^ ends - 1), columns)
+
+
 _BUGS = (
-    Bug("clusters end with the row before", Walk, "_take_row", "(row.cells | before) & ~joined", "before & ~joined"),
-    Bug("always in the first row", Walk, "_take_row", "self._y.eq(y_next)", "self._y.eq(0)"),
-    Bug("the group on the stack is forgotten", Sum, "elaborate", "join.pop, stack.top[name],", "join.pop, 0,"),
-    Bug("the table is not read", Sum, "elaborate", "Mux(join.load, read.data[name], 0)", "0"),
-    Bug("a zone leaves a row early", Join, "_decide", "step.final | ~group.has_run", "step.final | group.has_run"),
-    Bug("runs do not join", Join, "_mark", "self._before | bit(over, waiting.last) | bit(onto, joined.last)",
-        "self._before"),
+    Bug("clusters end with the row before", Walk, "inside", _clusters_end_early),
+    Bug("always in the first row", Walk, "y", lambda *_: 0),
+    Bug("the group on the stack is forgotten", Join, "decided.pop", lambda *_: 0),
+    Bug("the table is not read", Join, "decided.load", lambda *_: 0),
+    Bug("a zone leaves a row early", Join, "decided.leaves",
+        lambda leaves, inside: leaves | inside["decided.closes"] & inside["decided.store"]),
+    Bug("runs do not join", Join, "new_before", lambda _, inside: inside["before"]),
 )  # fmt: skip
-_SPECIFICATION_BUGS = (
-    Bug("zones of one row do not merge", OpenRow, "leaders", "cell & ~self.reach[x][:x].any() if x else cell", "cell"),
-)
+_SPECIFICATION_BUGS = (Bug("zones of one row do not merge", RowStep, "next_reach_2", lambda reach, _: reach & 0b100),)
 
 
 def _case(columns: int, connectivity: int, clocks: int, rows: int = 4, **options) -> Case:

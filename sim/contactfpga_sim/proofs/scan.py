@@ -10,7 +10,8 @@ from contactfpga_hdl.scan.pins import DirectColumns, DirectRows
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 
 
 def skin_of(diodes: Literal["col2row", "row2col"]) -> Skin:
@@ -63,7 +64,7 @@ def each_sample_once(proof: Proof, diodes: Literal["col2row", "row2col"]) -> Non
     released = Signal()  # a slot is over: its released sample is on its way at the beginning of the next one
     with m.If(slot == dut.derived.row_clocks - 1):
         m.d.sync += released.eq(1)
-    proof.lemma(inside["_row"] == next_row)
+    proof.lemma(inside["row"] == next_row)
     proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
     proof.lemma(inside["reader.done"] == (strobe | released & (slot == 1)))
     proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))
@@ -71,8 +72,8 @@ def each_sample_once(proof: Proof, diodes: Literal["col2row", "row2col"]) -> Non
 
 def _slot_lemmas(proof: Proof, inside: Inside, dut: Scanner, slot, row) -> None:
     following = 1 << (row + 1)[:2]
-    proof.lemma((inside["_clock"] == slot) & (slot < dut.derived.row_clocks))
-    proof.lemma((inside["following"] == following) & inside["_scans"])
+    proof.lemma((inside["clock"] == slot) & (slot < dut.derived.row_clocks))
+    proof.lemma((inside["following"] == following) & inside["scans"])
 
 
 def _slots(proof: Proof, derived):
@@ -85,17 +86,20 @@ def _slots(proof: Proof, derived):
 
 
 _DRIVE_BUGS = (
-    Bug("no release", DirectRows, "elaborate", "m.Elif(self.release)", "m.Elif(0)"),
-    Bug("the next row early", DirectRows, "elaborate", "selected.eq(0)", "selected.eq(self.pattern)"),
-    Bug("two rows from power-up", DirectRows, "elaborate", "init=first", "init=3"),
-    Bug("a row twice", Scanner, "_drive_rows", "init=1 << begun", "init=1 << 0 * begun"),
+    Bug("no release", DirectRows, "selected",
+        lambda rows, inside: Mux(inside.component.release, inside["selected"], rows)),
+    Bug("the next row early", DirectRows, "selected",
+        lambda rows, inside: Mux(inside.component.release, inside.component.pattern, rows)),
+    Bug("two rows at once", DirectRows, "selected", lambda rows, _: rows | rows << 1),
+    Bug("row 1 again and again", Scanner, "following",
+        lambda following, inside: Mux(inside["following"][1], inside["following"], following)),
 )  # fmt: skip
 _OFFER_BUGS = (
-    Bug("offered for one clock", Scanner, "_offer_row", "m.Elif(self.rows.ready)", "m.Else()"),
-    Bug("never taken back", Scanner, "_offer_row", "m.Elif(self.rows.ready)", "m.Elif(0)"),
-    Bug("a strobe early", DirectColumns, "elaborate", "self.done.eq(begun)", "self.done.eq(self.begin)"),
-    Bug("the released sample is a row", Scanner, "_sample_columns", "reader.done & done_is_row", "reader.done"),
-    Bug("unmasked", Scanner, "_mask_row", "self._columns & present(self.skin, row)", "self._columns"),
+    Bug("offered for one clock", Scanner, "rows__valid", lambda _, inside: inside["of_row"]),
+    Bug("never taken back", Scanner, "rows__valid", lambda valid, inside: valid | inside["rows__valid"]),
+    Bug("a strobe early", DirectColumns, "done", lambda _, inside: inside.component.begin),
+    Bug("the released sample is a row", Scanner, "of_row", lambda _, inside: inside["reader.done"]),
+    Bug("unmasked", Scanner, "pressed", lambda _, inside: inside["read"]),
 )
 CASES = (
     Case("one row at a time", "4 rows, col2row", partial(one_row_at_a_time, diodes="col2row"), 2, _DRIVE_BUGS, 80),

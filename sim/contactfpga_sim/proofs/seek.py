@@ -9,17 +9,18 @@ from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Inside, Proof
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
 
 WAIT, PICK, SEARCH, START = range(4)  # in the order in which the source names them
 
 
 def frames(proof: Proof, rows: int) -> None:
-    """Free: whether a slot hits, and whether its row is busy, each time anew; when a strobe comes once rows are chosen.
+    """Free: whether a slot hits, and whether its row is busy, each time; when a strobe comes once rows are chosen.
 
     Assumed: a frame's rows are handed on before the next one's first strobe, as the Skin's limits see to.
 
-    Claimed: each slot drives rows that are not known yet, one if alone; these come in ascending order; behind the last
+    Claimed: each slot drives rows that are not known yet, one if alone; these come in ascending order; after the last
     slot of a frame every row is known; a frame has at most ``2 rows - 1`` slots, and ``rows + 2 ceil(log2 rows) + 2``.
     """
     m = proof.m
@@ -55,8 +56,8 @@ def frames(proof: Proof, rows: int) -> None:
 
 def _lemmas(proof: Proof, inside: Inside, dut: Seek, state, known, alone, last, probes) -> None:
     rows, everything = dut.skin.rows, (1 << dut.skin.rows) - 1
-    todo, suspects, spare = inside["_todo"], inside["_suspects"], inside["_spare"]
-    searching, level = inside["_searching"], inside["_level"]
+    todo, suspects, spare = inside["todo"], inside["suspects"], inside["spare"]
+    searching, level = inside["searching"], inside["level"]
     starts = state == START
     rest = (~known & ~todo)[:rows]
     above = rest & ~suspects
@@ -67,11 +68,11 @@ def _lemmas(proof: Proof, inside: Inside, dut: Seek, state, known, alone, last, 
     proof.lemma(alone & ~known == 0)
     proof.lemma((known & (last | last - 1)[:rows] == (last | last - 1)[:rows]) | (last == 0))
     proof.lemma((last & (last - 1))[:rows] == 0)
-    proof.lemma(inside["_listed"] == popcount(inside["_list"]))
+    proof.lemma(inside["listed"] == popcount(inside["on_list"]))
     proof.lemma(starts | (probes + spare + probing <= rows - 1))
-    proof.lemma(inside["_hits"] <= 2)
+    proof.lemma(inside["hits"] <= 2)
     levels = dut.derived.row_levels
-    searches = inside["_hits"] * levels - Mux(searching, level, 0)
+    searches = inside["hits"] * levels - Mux(searching, level, 0)
     proof.lemma(starts | (probes <= searches + (rest == 0)))
     with proof.m.If(starts):
         proof.lemma((known == 0) & (probes == 0) & (alone == 0) & (last == 0))
@@ -100,16 +101,36 @@ def _lemmas(proof: Proof, inside: Inside, dut: Seek, state, known, alone, last, 
         proof.lemma((dut.pattern == (todo & -todo)[:rows]) & (todo != 0) & ~dut.idle)
         proof.lemma((suspects != 0) | (rest == 0))
     with proof.m.If(state == PICK):
-        proof.lemma((suspects != 0) | (rest == 0) | inside["_suspected"])
+        proof.lemma((suspects != 0) | (rest == 0) | inside["suspected"])
+
+
+def _in_state(inside: Inside, state: int):
+    return inside["choice_state"] == state
+
+
+def _highest(rows):
+    """The highest of the rows, alone."""
+    turned = rows[::-1]
+    return (turned & -turned)[: len(rows)][::-1]
+
+
+def _wrong_half(suspects, inside: Inside):
+    dut, now = inside.component, inside["suspects"]
+    probed = _in_state(inside, WAIT) & dut.strobe & ~dut.alone & inside["searching"]
+    return Mux(probed, Mux(dut.hit, now & ~dut.pattern, dut.pattern), suspects)
 
 
 _BUGS = (
-    Bug("the wrong half", Seek, "_learn", "Mux(self.hit, pattern", "Mux(~self.hit, pattern"),
-    Bug("known rows again", Seek, "_learn", "m.If(self.alone | ~self.hit)", "m.If(self.alone)"),
-    Bug("alone for ever", Seek, "_learn", "self._todo & ~pattern | behind", "self._todo | behind"),
-    Bug("the highest first", Seek, "_pick", "self._todo & -self._todo", "self._todo & ~(self._todo - 1) << 1"),
-    Bug("what is behind is forgotten", Seek, "_pick", "self._open.any()", "0"),
-)
+    Bug("the wrong half", Seek, "suspects", _wrong_half),
+    Bug("known rows again", Seek, "known",
+        lambda known, inside: Mux(inside.component.alone, known, known & inside["known"])),
+    Bug("alone for ever", Seek, "todo",
+        lambda todo, inside: todo | Mux(_in_state(inside, WAIT) & inside.component.alone, inside["pattern"], 0)),
+    Bug("the highest first", Seek, "pattern",
+        lambda rows, inside: Mux(_in_state(inside, PICK) & (rows & (rows - 1) == 0), _highest(inside["todo"]), rows)),
+    Bug("what comes after them is forgotten", Seek, "open",
+        lambda rows, inside: Mux(_in_state(inside, PICK), 0, rows)),
+)  # fmt: skip
 CASES = (
     Case("frames of an adaptive scan", "4 rows", partial(frames, rows=4), 3, _BUGS, 40),
     Case("frames of an adaptive scan", "8 rows", partial(frames, rows=8), 3),

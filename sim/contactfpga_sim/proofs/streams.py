@@ -103,7 +103,7 @@ def audit(proof: Proof, capacity: int = 2) -> None:
 def bitmap(proof: Proof) -> None:
     """Free: rows at any time, and when items are taken.
 
-    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks behind a last one an end mark is
+    Claimed: a row is taken in the clock in which it passes on, as it is. Three clocks after a last one an end mark is
     offered, once, and no row is taken before that is.
     """
     m = proof.m
@@ -111,28 +111,28 @@ def bitmap(proof: Proof) -> None:
     inside = proof.put(dut)
     feed(proof, dut.rows, "rows")
     drain(proof, dut.items, "items")
-    behind = Signal(2)  # clocks since a last row whose end mark is to come, 3 at most; 0: none is
+    since_last = Signal(2)  # clocks since a last row whose end mark is to come, 3 at most; 0: none is
     row, item = dut.rows.payload, dut.items.payload
-    with m.If(behind == 0):
-        m.d.sync += behind.eq(dut.rows.valid & dut.rows.ready & row.last)
+    with m.If(since_last == 0):
+        m.d.sync += since_last.eq(dut.rows.valid & dut.rows.ready & row.last)
         proof.claim(dut.items.valid == dut.rows.valid)
         proof.claim(dut.rows.ready == dut.items.ready)
         proof.claim(~dut.items.valid | (item.data == row.cells) & ~item.end)
     with m.Else():
-        with m.If(behind != 3):
-            m.d.sync += behind.eq(behind + 1)
+        with m.If(since_last != 3):
+            m.d.sync += since_last.eq(since_last + 1)
         with m.Elif(dut.items.ready):
-            m.d.sync += behind.eq(0)
+            m.d.sync += since_last.eq(0)
         proof.claim(~dut.rows.ready)
-        proof.claim(dut.items.valid == (behind == 3))
+        proof.claim(dut.items.valid == (since_last == 3))
         proof.claim(~dut.items.valid | item.end)
-    proof.lemma(inside["countdown"] == Mux(behind == 0, 0, 4 - behind))
+    proof.lemma(inside["countdown"] == Mux(since_last == 0, 0, 4 - since_last))
 
 
 def backlog(proof: Proof, depth: int) -> None:
     """The FIFO in front of the packer. Free: items at any time, when they are taken, and one item that is followed.
 
-    Claimed: the item comes out as it was, behind those that were in before it and no others; an item that is inside for
+    Claimed: the item comes out as it was, after those that were in before it and no others; an item that is inside for
     two clocks is offered; no room is wanting before all but one place are taken.
     """
     m = proof.m
@@ -173,27 +173,32 @@ def backlog(proof: Proof, depth: int) -> None:
 
 
 _DEBOUNCE_BUGS = (
-    Bug("withdrawn", Debounce, "_walk_columns", "m.Elif(self.rows.ready)", "m.Else()"),
-    Bug("a row taken while one waits", Debounce, "_walk_columns", " & ~self.rows.valid", ""),
-    Bug("columns swapped", Debounce, "_walk_columns", "self._next_pressed)[1:]", "self._next_pressed)[:-1]"),
-    Bug("a column short", Debounce, "_walk_columns", "column != columns - 1", "column != columns - 2"),
-)
+    Bug("withdrawn", Debounce, "rows__valid", lambda _, inside: inside["finish"]),
+    Bug("a row taken while one waits", Debounce, "raw__ready", lambda ready, inside: ready | inside["rows__valid"]),
+    Bug("columns swapped", Debounce, "rows__payload.cells",
+        lambda cells, inside: Mux(inside["decide"], Cat(inside["rows__payload.cells"], inside["next_pressed"]), cells)),
+    Bug("a column short", Debounce, "busy",
+        lambda busy, inside: busy & (inside["column"] != inside.component.skin.columns - 2)),
+)  # fmt: skip
 _AUDIT_BUGS = (
-    Bug("one too many", Audit, "elaborate", "zones < self", "zones <= self"),
-    Bug("the end mark is dropped", Audit, "elaborate", "record.end | fits", "fits"),
-    Bug("taken without being passed on", Audit, "elaborate", "self.items.ready | ~passes", "1"),
-    Bug("not counted anew", Audit, "elaborate", "zones.eq(0)", "zones.eq(zones)"),
-)
+    Bug("one too many", Audit, "items__valid",
+        lambda valid, inside: valid | inside.component.records.valid & (inside["zones"] == 2)),
+    Bug("the end mark is dropped", Audit, "items__valid", lambda valid, inside: valid & (inside["zones"] < 2)),
+    Bug("taken without being passed on", Audit, "records__ready", lambda *_: 1),
+    Bug("not counted from 0 again", Audit, "zones", lambda zones, inside: Mux(zones == 0, inside["zones"], zones)),
+)  # fmt: skip
 _BITMAP_BUGS = (
-    Bug("the mark comes again", Bitmap, "elaborate", "(~ends | self.items.ready)", "~ends"),
-    Bug("the mark is withdrawn", Bitmap, "elaborate", "(~ends | self.items.ready)", "1"),
-    Bug("a row is lost", Bitmap, "elaborate", "~counting & self.items.ready", "self.items.ready"),
-)
+    Bug("the mark comes again", Bitmap, "countdown",
+        lambda left, inside: Mux(inside["countdown"] == 1, inside["countdown"], left)),
+    Bug("the mark is withdrawn", Bitmap, "countdown", lambda left, inside: Mux(inside["countdown"] == 1, 0, left)),
+    Bug("a row is lost", Bitmap, "rows__ready", lambda _, inside: inside.component.items.ready),
+)  # fmt: skip
 _BACKLOG_BUGS = (
-    Bug("one too many", SyncFIFOBuffered, "elaborate", "inner_level != inner_depth", "1"),
-    Bug("an item comes again", SyncFIFOBuffered, "elaborate", "m.Elif(self.r_en)", "m.Elif(0)"),
-    Bug("an item is passed over", SyncFIFOBuffered, "elaborate", "(~self.r_rdy | self.r_en)", "1"),
-)
+    Bug("one too many", SyncFIFOBuffered, "w_rdy", lambda *_: 1),
+    Bug("an item comes again", SyncFIFOBuffered, "r_rdy", lambda ready, inside: ready | inside["r_rdy"]),
+    Bug("an item is passed over", SyncFIFOBuffered, "consume",
+        lambda place, inside: place + (inside["r_rdy"] & ~inside.component.r_en & (inside["inner_level"] != 0))),
+)  # fmt: skip
 CASES = (
     Case("debounce hands on each row", "3 columns, sym_defer_pk", partial(debounce, method="sym_defer_pk"), 10,
          _DEBOUNCE_BUGS, bug_clocks=20),

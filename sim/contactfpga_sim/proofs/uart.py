@@ -7,6 +7,7 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
 
 
@@ -40,13 +41,20 @@ def framing(proof: Proof, bit_clocks: int) -> None:
         proof.lemma(inside["shift"] == (Cat(frame[1:], Const(0x3FF, 10)) >> bit)[:9])
 
 
+def _taken(inside: Inside):
+    stream = inside.component.bytes
+    return stream.valid & stream.ready
+
+
 _BUGS = (
-    Bug("no start bit", Transmitter, "elaborate", "Cat(Const(0, 1), self", "Cat(Const(1, 1), self"),
-    Bug("a bit short", Transmitter, "elaborate", "bits_left.eq(10)", "bits_left.eq(9)"),
-    Bug("stop bit low", Transmitter, "elaborate", "self.bytes.payload, Const(1, 1)", "self.bytes.payload, Const(0, 1)"),
-    Bug("highest bit first", Transmitter, "elaborate", "self.bytes.payload,", "self.bytes.payload[::-1],"),
-    Bug("taken a bit early", Transmitter, "elaborate", "(bits_left == 1) & bit_ends", "(bits_left == 2) & bit_ends"),
-)
+    Bug("no start bit", Transmitter, "pin", lambda pin, inside: Mux(_taken(inside), 1, pin)),
+    Bug("a bit short", Transmitter, "bits_left", lambda left, inside: Mux(_taken(inside), 9, left)),
+    Bug("stop bit low", Transmitter, "shift", lambda shift, inside: Mux(_taken(inside), shift[:8], shift)),
+    Bug("highest bit first", Transmitter, "shift",
+        lambda shift, inside: Mux(_taken(inside), Cat(shift[:8][::-1], shift[8]), shift)),
+    Bug("taken a bit early", Transmitter, "bytes__ready",
+        lambda ready, inside: ready | (inside["bits_left"] == 2) & (inside["clock"] == 0)),
+)  # fmt: skip
 CASES = (
     Case("UART framing", "4 clocks a bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
     Case("UART framing", "5 clocks a bit", partial(framing, bit_clocks=5), 2),

@@ -4,7 +4,7 @@ No runs, clusters, brackets or places here: the cells of two adjacent rows are t
 together is its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Elaboratable, Module, Mux, Signal
 
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
@@ -33,29 +33,48 @@ class OpenRow:
         return [cell & ~self.reach[x][:x].any() if x else cell for x, cell in enumerate(self.cells)]
 
 
-def next_row(m: Module, derived: Derived, before: OpenRow, cells, last, y, wanted):
-    """The open row behind ``cells``, and how many zones with the moments ``wanted`` end there.
+class RowStep(Elaboratable):
+    """From a row to the next one.
 
-    Zones end that have no cell in the new row, and in the last row all others, too.
+    ``after`` is the open row after ``cells``, ``ended`` how many zones with the moments ``wanted`` end there: those
+    that have no cell in the new row, and in the last row all others, too.
     """
-    columns = range(derived.skin.columns)
-    after = OpenRow(derived, "next")
-    reach = _closure(m, before, cells, derived.skin.connectivity)
-    m.d.comb += after.cells.eq(cells)
-    for x in columns:
-        old, new = reach[len(columns) + x][: len(columns)], reach[len(columns) + x][len(columns) :]
-        m.d.comb += after.reach[x].eq(new)
-        merged = [leader & old[j] for j, leader in enumerate(before.leaders())]
-        for field, weights in zip(FIELDS, ([1] * len(columns), columns, [y] * len(columns))):
-            parts = [Mux(merged[j], before.moments[j][field], 0) for j in columns]
-            parts += [Mux(new[k], weights[k], 0) for k in columns]
-            m.d.comb += after.moments[x][field].eq(sum(parts))
-    ends = [
-        leader & ~reach[j][len(columns) :].any() & (before.moments[j].as_value() == wanted)
-        for j, leader in enumerate(before.leaders())
-    ]
-    ends += [last & leader & (after.moments[x].as_value() == wanted) for x, leader in enumerate(after.leaders())]
-    return after, sum(ends)
+
+    def __init__(self, derived: Derived, before: OpenRow, cells, last, y, wanted):
+        self.derived, self.before, self.cells, self.last, self.y, self.wanted = derived, before, cells, last, y, wanted
+        self.after = OpenRow(derived, "next")
+        self.ended = Signal(range(2 * derived.skin.columns + 1))
+
+    def elaborate(self, platform):
+        m = Module()
+        columns = range(self.derived.skin.columns)
+        before, after = self.before, self.after
+        reach = _closure(m, before, self.cells, self.derived.skin.connectivity)
+        m.d.comb += after.cells.eq(self.cells)
+        for x in columns:
+            old, new = reach[len(columns) + x][: len(columns)], reach[len(columns) + x][len(columns) :]
+            m.d.comb += after.reach[x].eq(new)
+            merged = [leader & old[j] for j, leader in enumerate(before.leaders())]
+            for field, weights in zip(FIELDS, ([1] * len(columns), columns, [self.y] * len(columns))):
+                parts = [Mux(merged[j], before.moments[j][field], 0) for j in columns]
+                parts += [Mux(new[k], weights[k], 0) for k in columns]
+                m.d.comb += after.moments[x][field].eq(sum(parts))
+        ends = [
+            leader & ~reach[j][len(columns) :].any() & (before.moments[j].as_value() == self.wanted)
+            for j, leader in enumerate(before.leaders())
+        ]
+        ends += [
+            self.last & leader & (after.moments[x].as_value() == self.wanted)
+            for x, leader in enumerate(after.leaders())
+        ]
+        m.d.comb += self.ended.eq(sum(ends))
+        return m
+
+
+def next_row(m: Module, *given) -> tuple[OpenRow, Signal]:
+    """What comes of a :class:`RowStep`."""
+    m.submodules += (step := RowStep(*given))
+    return step.after, step.ended
 
 
 def _closure(m: Module, before: OpenRow, cells, connectivity: int) -> list:
