@@ -1,19 +1,16 @@
-"""Recorded frames through the compiled gateware: ``contactfpga replay``."""
+"""Recorded frames through the compiled gateware."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
-import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
@@ -22,9 +19,6 @@ from contactfpga.wire.protocol import Frame
 from contactfpga_sim.board import native
 from contactfpga_sim.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.scenes.recordings import Recording
-
-if TYPE_CHECKING:
-    import argparse
 
 CHUNK = 256
 """Frames that are simulated while those before are decoded."""
@@ -49,6 +43,21 @@ class Replayed:
     """The same to its last record."""
     duration: int
     """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
+
+
+def load(
+    path: str | Path,
+    threshold: float | None = None,
+    connectivity: int = 8,
+    pitch_mm: float = 10.0,
+    barycenter_bits: int | None = None,
+) -> tuple[np.ndarray, Skin]:
+    """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled."""
+    frames = Recording.load(path, threshold).pressed
+    _, rows, columns = frames.shape
+    skin = skin_for(rows, columns, connectivity, zones_bound(frames, connectivity), pitch_mm, barycenter_bits)
+    native.load(model_of(skin))
+    return frames, skin
 
 
 def zones_bound(frames: np.ndarray, connectivity: int) -> int:
@@ -235,32 +244,3 @@ def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
         "frame": result.duration,
     }
     return {"frame": index, "zones": zones, "flags": sorted(result.frame.flags), "cycles": cycles}
-
-
-def main(args: argparse.Namespace) -> int:
-    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.barycenter_bits,
-    args.json."""
-    frames = Recording.load(args.frames, args.threshold).pressed
-    _, rows, columns = frames.shape
-    bound = zones_bound(frames, args.connectivity)
-    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm, args.barycenter_bits)
-    native.load(model_of(skin))  # which is no part of the speed
-    started = time.monotonic()
-    counts, late = [0], [0]
-    for index, result in enumerate(replay(frames, skin)):
-        if args.json:
-            sys.stdout.write(json.dumps(to_json(index, result, skin)) + "\n")
-        else:
-            counts.append(result.frame.zones)
-            late.append(result.last_record or 0)
-    if not args.json:
-        seconds = time.monotonic() - started
-        for title, what in (
-            ("frames", f"{len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity"),
-            ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
-            ("last record", f"at most {max(late)} clocks after a frame's last row"),
-            ("speed", f"{len(frames) / seconds:,.0f} frames a second, once compiled"),
-        ):
-            terminal.say(f"{title:20}{what}", hang=20)
-        terminal.say("Every frame came back exactly once. One JSON object a frame: --json")
-    return 0

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.scenes.scene import Source
 from contactfpga_sim.scenes.scene import scene as make_scene
-
-if TYPE_CHECKING:
-    import argparse
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -63,11 +58,3 @@ class VirtualBoard:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def main(args: argparse.Namespace) -> int:
-    """``contactfpga board``: args.skin (path or None), args.scene (name, path or None), args.link (path or None)."""
-    from contactfpga_sim.board.pty_board import PtyBoard
-
-    skin = Skin.load(args.skin) if args.skin else Skin()
-    return PtyBoard(skin, args.scene, link=args.link).serve()

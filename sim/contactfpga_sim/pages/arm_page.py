@@ -14,7 +14,6 @@ from contactfpga.console import interrupt, outputs
 from contactfpga_sim.pages import figures
 from contactfpga_sim.studies.arm import comply, latency_charts, report, run_pictures, sweep
 from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.command import SHARES
 from contactfpga_sim.studies.arm.run import Result, run
 from contactfpga_sim.studies.arm.sweep import Point, Task
 from contactfpga_sim.studies.arm.world import Faults
@@ -78,9 +77,7 @@ def failure_table() -> str:
 
 def push_table() -> str:
     """Pushes up to the fastest that the arm yields to, and a faster one."""
-    case = Case.load("push")
-    fastest = comply.fastest_m_s(case)
-    return report.markdown(report.push_lines([comply.pushed(case, share * fastest)[0] for share in SHARES]))
+    return report.markdown(report.push_lines(comply.pushes(Case.load("push"))[1]))
 
 
 def step_table() -> str:

@@ -7,12 +7,11 @@ import shlex
 import sys
 from collections.abc import Callable
 
-from contactfpga.commands import fit_flags
+from contactfpga.commands.fit import add_flags, asked
 from contactfpga.console import interrupt
 from contactfpga_sim.pages import figures
 from contactfpga_sim.studies import pool
 from contactfpga_sim.studies.fit import show
-from contactfpga_sim.studies.fit.command import asked
 from contactfpga_sim.studies.fit.search import fit
 
 EXAMPLES = {
@@ -28,7 +27,7 @@ def section(arguments: str) -> str:
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
-    fit_flags.add(parser)
+    add_flags(parser)
     task, tried = asked(parser.parse_args(shlex.split(arguments)))
     with pool.executor(None, None) as executor, pool.progress() as step:
         found = fit(task, tried, executor, step)
