@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 UNSOLVED = 3
 """Exit status of a command whose answer is that there is no solution."""
 

@@ -19,14 +19,13 @@ from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
 from contactfpga_sim.golden import zones
-from contactfpga_sim.pages import chart_page, figures
+from contactfpga_sim.pages import chart_page, writer
 from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.chart import errors, host, numbers, picture, speed, steady, study
-from contactfpga_sim.studies.chart.command import FAMILIES_DRAWN
 from contactfpga_sim.studies.chart.errors import Blob
 from contactfpga_sim.studies.chart.methods import EXTENT_MM, METHODS
-from contactfpga_sim.studies.chart.study import Task
+from contactfpga_sim.studies.chart.study import FAMILIES_DRAWN, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = METHODS["run, 20 mm"]
@@ -255,7 +254,7 @@ def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     picture.save(points, tmp_path)
     assert (tmp_path / "chart.svg").read_text() == (ROOT / "docs/chart/chart.svg").read_text()
     page = (ROOT / "docs/chart.md").read_text()
-    assert figures.update(page, {"front": chart_page.front_table}) == page
+    assert writer.update(page, {"front": chart_page.front_table}) == page
 
 
 @pytest.mark.campaign

@@ -9,7 +9,6 @@ from contactfpga.console import numbers, outputs
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 
-
 HELP = "Build a bitstream for a board."
 EXTRA = "boards"
 

@@ -27,7 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.pages import failures_page
+    from contactfpga_sim.pages import failures_page, writer
     from contactfpga_sim.studies.failures.catalogue import STUDIES
 
     names = flags.known("--study", args.study, list(STUDIES))
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
     if path:
-        failures_page.write(path, turned)
+        writer.write(path, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
     else:
         path = _write(turned, folder / "failures.md")
     print(path, flush=True)

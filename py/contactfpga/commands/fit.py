@@ -60,7 +60,7 @@ def _limit(
     what: str,
 ) -> None:
     shown = "none" if usual is None else f"{usual:g}"
-    told = f"{what} (default: {shown})".replace("%", "%%")
+    told = f"{what} (default: {shown}).".replace("%", "%%")
     goals.add_argument(flag, type=numbers.or_none(kind), default=usual, metavar=unit, help=told)
 
 

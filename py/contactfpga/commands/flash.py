@@ -10,7 +10,6 @@ from pathlib import Path
 from contactfpga.commands.build import BOARD, default_folder
 from contactfpga.errors import ContactFPGAError, MissingTool
 
-
 HELP = "Write a bitstream to a board."
 EXTRA = None
 

@@ -32,9 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga_sim.board import replay
 
-    frames, skin = replay.load(
-        args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits
-    )
+    frames, skin = replay.load(args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits)
     started = time.monotonic()
     if args.json:
         for index, result in enumerate(replay.replay(frames, skin)):

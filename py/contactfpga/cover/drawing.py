@@ -13,6 +13,7 @@ matplotlib.use("Agg")
 from matplotlib.figure import Figure
 
 from contactfpga.cover import elastic, impact, line, medium, motion, point
+from contactfpga.cover import formula_study as measured
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.hertz import Ball
 from contactfpga.cover.paper import FIRST_DESIGN, WORST_M
@@ -149,8 +150,6 @@ def study(path: Path) -> Path:
 
 
 def _rules(place: Any) -> None:
-    from contactfpga.cover import formula_study as measured
-
     found = []
     for rules, colour in ((measured.RULES, COLOURS["halfspace"]), (measured.FAILING, COLOURS["bonded"])):
         for name, rule in rules.items():
@@ -177,8 +176,6 @@ def _rules(place: Any) -> None:
 
 
 def _models(place: Any) -> None:
-    from contactfpga.cover import formula_study as measured
-
     for number, model in enumerate(measured.LADDER):
         for ball, mark in zip(measured.BALLS.values(), ("o", "x")):
             sheet = measured.Sheet(measured.SWITCH, measured.THICKNESS_M, ball)

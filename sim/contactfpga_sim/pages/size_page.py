@@ -14,7 +14,7 @@ from typing import NamedTuple
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import boards, build, sizes
-from contactfpga_sim.pages import figures, label_figures
+from contactfpga_sim.pages import label_figures, writer
 from contactfpga_sim.studies import size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
@@ -126,4 +126,4 @@ TABLES: dict[str, Callable[[], str]] = {
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -23,6 +23,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     try:
-        return TOPICS[args.topic].run(args)
+        status: int = TOPICS[args.topic].run(args)
+        return status
     except OverflowError:
         raise CoverError("a number is too large to compute with; all are in SI units") from None

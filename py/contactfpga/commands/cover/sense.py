@@ -34,9 +34,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     switch.add_argument("--switch-area", type=units.FACE, default=usual.area_m2, metavar="M2", help=face)
     ball = parser.add_argument_group("what touches, if known")
     ball.add_argument("--modulus", type=units.PASCAL, metavar="PA", help="Young's modulus of the cover.")
-    ball.add_argument(
-        "--poisson", type=units.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5)."
-    )
+    ball.add_argument("--poisson", type=units.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5).")
     ball.add_argument("--effective-radius", type=units.LENGTH, metavar="M", help="R* with 1/R* = 1/R + 1/R'.")
     model = parser.add_argument_group("model (default: the simplest within the tolerance)")
     within = "What the cover is: a half-space, or a layer on a rigid base."
