@@ -15,8 +15,8 @@ import numpy as np
 
 from contactfpga.cover import elastic, impact, motion
 from contactfpga.cover.answer import NoSolution
+from contactfpga.cover.arm import Arm, slowness, speed2
 from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Arm
 from contactfpga.cover.sense import LADDER, Model, Sheet
 from contactfpga.cover.solve import Floats, gauss, legendre
 from contactfpga.cover.switch import Switch
@@ -41,7 +41,7 @@ class Blow(NamedTuple):
         return impact.compression_m(self.arm, self.speed_m_s, self.stiffness)
 
     def square(self, depth: np.ndarray) -> Floats:
-        return impact.speed2(self.arm, self.speed_m_s, self.stiffness, depth)
+        return speed2(self.arm, self.speed_m_s, self.stiffness, depth)
 
 
 _SPRING = elastic.stiffness(Ball(0.019, elastic.effective_modulus_pa(3.65e5, 0.5)))
@@ -127,9 +127,7 @@ def _euler(step_share: float) -> Rule:
 def _sine(nodes: int) -> Callable[..., float]:
     def rule(blow: Blow, depth: float | None = None) -> float:
         end = blow.depth_m if depth is None else depth
-        return gauss(
-            lambda phi: impact.slowness(blow.arm, blow.speed_m_s, blow.stiffness, end, phi), 0.0, math.pi / 2, nodes
-        )
+        return gauss(lambda phi: slowness(blow.arm, blow.speed_m_s, blow.stiffness, end, phi), 0.0, math.pi / 2, nodes)
 
     return rule
 

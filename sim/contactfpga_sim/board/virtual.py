@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import Source
 from contactfpga_sim.scenes.scene import scene as make_scene
 
@@ -58,3 +59,12 @@ class VirtualBoard:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def board_for(scene: str | None, skin: Skin | None, threshold: float | None) -> VirtualBoard:
+    """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed."""
+    if threshold is None:
+        return VirtualBoard(skin, scene)
+    if scene is None or not scene.endswith((".npy", ".npz")):
+        raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
+    return VirtualBoard(skin, Recording.load(scene, threshold))

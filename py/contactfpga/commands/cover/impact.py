@@ -9,8 +9,9 @@ from contactfpga.commands.cover import units
 from contactfpga.commands.cover.printing import KPA, MM, notes, say, table, unsolved
 from contactfpga.cover import elastic, impact
 from contactfpga.cover.answer import CoverError, NoSolution
+from contactfpga.cover.arm import Arm
 from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import METHODS, Arm, Impact
+from contactfpga.cover.impact import METHODS, Impact
 
 HELP = "Compute compression, time and peak force when an arm runs into something."
 
