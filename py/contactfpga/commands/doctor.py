@@ -12,7 +12,7 @@ from contactfpga.console import flags, numbers, terminal
 from contactfpga.driver import driver, ports
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError, ReplayEnded
-from contactfpga.skin.mismatch import report_of
+from contactfpga.wire.mismatch import report_of
 
 HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None

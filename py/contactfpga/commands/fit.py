@@ -7,7 +7,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from contactfpga.console import flags, numbers, outputs
 from contactfpga.console.interrupt import Interrupted
@@ -122,16 +122,25 @@ def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
     count = default_count(sources) if args.placements is None else args.placements
     for one in sources:
         goals.check_count(one.most(count))
-    methods = candidates.methods_by_name()
     tried = candidates.candidates(
         base or Skin(),
         candidates.pitches_for(base, sources, args.pitch_mm),
         candidates.size_for(base, sources),
-        [method for name in flags.known("--labeller", args.labeller, list(methods)) for method in methods[name]],
+        _methods(args.labeller),
         flags.known("--scan", args.scan, list(candidates.SCANS)),
         args.baud,
     )
     return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick), tried
+
+
+def _methods(names: list[str] | None) -> list[dict[str, Any]]:
+    """Those of the labellers named, or of the host, which labels cells."""
+    from contactfpga_sim.studies.fit.candidates import METHODS
+
+    by_name: dict[str, list[dict[str, Any]]] = {}
+    for method in METHODS:
+        by_name.setdefault(method.get("labeller", method["report"]), []).append(method)
+    return [method for name in flags.known("--labeller", names, list(by_name)) for method in by_name[name]]
 
 
 def _share(percent: float | None) -> float | None:

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.console import interrupt
-from contactfpga.skin import Skin, SkinError
+from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.board.received import frames_in
@@ -26,6 +24,7 @@ from contactfpga_sim.pages import writer
 from contactfpga_sim.pages.label_figures import labeller_table, recorded_table
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import CONTACTS
+from contactfpga_sim.studies.sheets import adaptive_skin
 
 INSTANTS = 96
 """Touch instants, spread evenly over a scan."""
@@ -187,17 +186,6 @@ def gain_row(name: str, frames: np.ndarray) -> str:
     active = frames.any(axis=2).sum(axis=1).mean()
     times = (f"{scan_us:.0f} us", f"{mean:.1f} / {us.max():.1f} us", f"{scan_us / mean:.1f}")
     return writer.line((name, f"{rows}x{columns}", f"{known.clocks_per_us} MHz", f"{active:.1f}", *times))
-
-
-def adaptive_skin(rows: int, columns: int) -> Skin:
-    """A sheet with 5 us settle and 1 us release a row, and the slowest clock that an adaptive scan of it can have."""
-    zones = min(64, math.ceil(rows / 2) * math.ceil(columns / 2))
-    for megahertz in (12, 24, 36, 48):
-        with contextlib.suppress(SkinError):
-            return Skin(
-                rows=rows, columns=columns, scan="adaptive", zone_capacity=zones, clock_hz=megahertz * 1_000_000
-            )
-    raise AssertionError("no clock is fast enough")
 
 
 def built_in_scenes() -> dict[str, np.ndarray]:

@@ -40,14 +40,6 @@ class Candidate:
     """What Skin says."""
 
 
-def methods_by_name() -> dict[str, list[dict[str, Any]]]:
-    """:data:`METHODS` by what finds the zones: a labeller, or the host from cells."""
-    found: dict[str, list[dict[str, Any]]] = {}
-    for method in METHODS:
-        found.setdefault(method.get("labeller", method["report"]), []).append(method)
-    return found
-
-
 def candidates(
     base: Skin,
     pitches_mm: Sequence[tuple[float, float]],
