@@ -112,10 +112,11 @@ soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does an
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (half an hour and more)
 	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.mutants.campaign --page docs/mutants.md $(ARGS)
 
-lint: $(VENV)/.stamp-lint ## check style and types
+lint: $(VENV)/.stamp-lint ## check style, types and who imports whom
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
+	$(VENV)/bin/lint-imports --no-cache
 
 format: $(VENV)/.stamp-lint ## apply the style that `make lint` checks
 	$(PY) -m ruff check --fix

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+UNSOLVED = 3
+"""Exit status of a command whose answer is that there is no solution."""
+
 
 class ContactFPGAError(Exception):
     """Base of every error of this package."""

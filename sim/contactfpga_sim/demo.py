@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.console import interrupt, outputs, terminal
-from contactfpga.console.tables import tables
+from contactfpga.console import interrupt, outputs, tables, terminal
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.wire import protocol
 from contactfpga.wire.protocol import Frame
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.cosim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, Trace, predict
@@ -92,20 +91,9 @@ def run(name: str, engine: str, skin: Skin) -> Outcome:
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
     """Cycle of the start bit of its first byte, end of its last one, its bytes on the wire, the frame."""
-    packet: list[tuple[int, int]] = []
-    for cycle, value in trace.bytes:
-        packet.append((cycle, value))
-        if value != protocol.DELIMITER:
-            continue
-        if len(packet) == 1:  # in front of a hello
-            packet = []
-            continue
-        plain = protocol.unseal(bytes(value for _, value in packet[:-1]), protocol.check_prefix(skin))
-        if protocol.kind_of(plain) != protocol.KIND_HELLO:
-            frame = protocol.decode_frame(plain, Derived(skin))
-            if frame.cells:
-                return packet[0][0] + 1, cycle + 1 + 10 * Derived(skin).bit_clocks, len(packet), frame
-        packet = []
+    for got in frames_in(skin, trace.bytes):
+        if got.frame.cells:
+            return got.first + 1, got.last + 1 + 10 * Derived(skin).bit_clocks, got.size, got.frame
     return 0, 0, 0, None
 
 
@@ -156,13 +144,10 @@ def main() -> int:
         return 1
     outcomes = _run_all(Skin())
     scenes_run = [out for out in outcomes if out.engine == "compiled"]
-    console = terminal.console()
-    console.print(drawing.in_terminal(scenes_run, terminal.of().unicode))
+    terminal.console().print(drawing.in_terminal(scenes_run, terminal.of().unicode))
     wrong = [out for out in outcomes if out.difference or out.frame is None]
     styles = {number: "red" for number, out in enumerate(outcomes) if out in wrong}
-    for table in tables(rows_of(outcomes), console.width, keys=3, title=TITLE, texts=(VERDICT,), styles=styles):
-        console.print(table)
-        console.print()
+    tables.show(rows_of(outcomes), keys=3, title=TITLE, texts=(VERDICT,), styles=styles)
     for line in LEGEND:
         terminal.say(line, hang=2)
     for out in wrong:

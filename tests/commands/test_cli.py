@@ -1,18 +1,21 @@
 """The command line: what each command prints, how it fails, and how light it starts."""
 
+import argparse
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_board import FakeBoard, background, wait_until
 
 import contactfpga
-from contactfpga import cli
+from contactfpga import cli, commands
 from contactfpga.commands import doctor
 from contactfpga.driver import ports
 
@@ -45,16 +48,64 @@ def test_help_names_every_command(capsys):
         cli.main(["--help"])
     assert caught.value.code == 0
     said = capsys.readouterr().out
-    for command in ("zones", "wire", "board", "doctor", "build", "flash", "replay", "cover"):
-        assert f"\n    {command} " in said
+    for name, command in cli.COMMANDS.items():
+        assert re.search(rf"\n    {name} +{re.escape(command.HELP)}", said)
 
 
-@pytest.mark.parametrize("command", ["zones", "wire", "board", "doctor", "build", "flash", "replay", "cover"])
-def test_every_command_explains_itself(command, capsys):
+def parsers(parser, name="contactfpga"):
+    """The parsers of all commands and of their topics, by what is typed."""
+    yield name, parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for word, below in action.choices.items():
+                yield from parsers(below, f"{name} {word}")
+
+
+PARSERS = dict(parsers(cli._parser()))
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as caught:
-        cli.main([command, "--help"])
+        cli.main([*name.split()[1:], "--help"])
     assert caught.value.code == 0
-    assert f"contactfpga {command}" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"usage: {name} " in said
+    assert PARSERS[name].description in said
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_every_flag_is_explained_in_a_sentence(name):
+    own = {action.dest: action.help for action in PARSERS[name]._actions if action.dest not in ("help", "version")}
+    own.pop("command", None), own.pop("topic", None)
+    assert all(re.fullmatch(r"[A-Z].*\.", text or "") for text in own.values()), own
+    assert re.fullmatch(r"[A-Z].*\.", PARSERS[name].description)
+
+
+def test_the_host_alone_explains_every_command():
+    """With none of the extras installed."""
+    code = f"""
+import sys
+for name in {HEAVY!r}.split():
+    if name != "serialx":
+        sys.modules[name] = None
+from contactfpga import cli
+for name in cli.COMMANDS:
+    try:
+        cli.main([name, "--help"])
+    except SystemExit as end:
+        assert end.code == 0, name
+"""
+    result = python(code)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("usage: contactfpga ") == len(cli.COMMANDS)
+
+
+def test_every_command_has_a_file_of_its_own():
+    folder = Path(commands.__file__).parent
+    files = {path.stem if path.is_file() else path.name for path in folder.iterdir()} - {"__init__", "__pycache__"}
+    assert files == set(cli.COMMANDS)
+    assert {command.__name__ for command in cli.COMMANDS.values()} == {f"contactfpga.commands.{name}" for name in files}
 
 
 def test_without_a_command_help_is_shown(capsys):
@@ -94,7 +145,7 @@ def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
     np.save(frames, np.eye(16, dtype=bool)[None])
     status, out, _ = run("replay", frames, "--json")  # builds the model where it is not built yet
     assert status == 0
-    assert json.loads(out)["zones"][0]["area"] == 16
+    assert json.loads(out)["zones"][0]["area_cells"] == 16
     code = f"from contactfpga import cli\ncli.main(['replay', {str(frames)!r}, '--json'])"
     assert loaded(code) == "contactfpga_sim"
 

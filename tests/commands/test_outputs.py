@@ -17,7 +17,6 @@ def worked(monkeypatch):
     made = []
     right = pool.executor
     monkeypatch.setattr(pool, "executor", lambda *args: made.append(args) or right(*args))
-    monkeypatch.setattr(latency_charts, "executor", lambda *args: made.append(args) or right(*args))
     return made
 
 
@@ -82,20 +81,21 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
 
 
 def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsys):
-    from contactfpga_sim.studies.arm import command
+    from contactfpga_sim.studies.arm import report, run_pictures
 
     def refused(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(command.draw, "pictures", refused)
-    monkeypatch.setattr(command.report, "columns", lambda *_: {})
-    monkeypatch.setattr(command.report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
+    monkeypatch.setattr(run_pictures, "pictures", refused)
+    monkeypatch.setattr(report, "columns", lambda *_: {})
+    monkeypatch.setattr(report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
     assert cli.main(["arm", "--output", str(tmp_path)]) == 1
     assert "18.91" in capsys.readouterr().out
 
 
 def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, capsys):
-    from contactfpga_sim.board import native, replay
+    from contactfpga.commands import replay
+    from contactfpga_sim.board import native
 
     now = [0.0]
     built = []
@@ -111,4 +111,4 @@ def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypat
     np.save(tmp_path / "frames.npy", np.zeros((500, 8, 8), bool))
     assert cli.main(["replay", str(tmp_path / "frames.npy")]) == 0
     speed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("speed"))
-    assert "500 frames a second" in speed
+    assert "500 frames per second" in speed

@@ -81,7 +81,7 @@ def test_no_color_where_none_is_wanted(variables, files):
 
 def test_a_terminal_that_cannot_be_rewritten_is_not():
     dumb = OnTerminal([sys.executable, "-m", "contactfpga.cli", "zones", "sim://"], 80, TERM="dumb")
-    wait_for(lambda: "nothing can be drawn over here" in dumb.said)
+    wait_for(lambda: "this terminal cannot be redrawn" in dumb.said)
     time.sleep(1)  # for a frame
     dumb.type("\x03")
     assert dumb.wait() == 130

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from contactfpga.cover import Ball, CoverError, NoSolution, elastic, impact, motion, solve
-from contactfpga.cover.impact import Arm, Impact
+from contactfpga.cover.arm import Arm, speed2
+from contactfpga.cover.impact import Impact
 
 BASE = (0.6, 0.038, 0.15, 0.2)
 SPEED = 0.4
@@ -289,13 +290,13 @@ def test_the_first_of_several_roots_is_found():
     # An arm that stands on its joint: gravity slows it, then pulls it over; at some speed it all but stops on top.
     moved = Arm(1.0, 1.0, 0.0, 5.0, math.pi - 0.01)
     near = np.linspace(0, 0.03, 30001)
-    barrier = math.sqrt(-float(impact.speed2(moved, 0.0, 10.0, near).min()))
+    barrier = math.sqrt(-float(speed2(moved, 0.0, 10.0, near).min()))
     before = impact.strike(moved, 0.999 * barrier, 10.0)
     beyond = impact.strike(moved, 1.001 * barrier, 10.0)
     assert before.compression_m < 0.02 < 0.1 < beyond.compression_m
     for speed, found in ((0.999 * barrier, before), (1.001 * barrier, beyond)):
         depths = np.linspace(0, found.compression_m * 0.999999, 20001)
-        assert (impact.speed2(moved, speed, 10.0, depths) > 0).all()
+        assert (speed2(moved, speed, 10.0, depths) > 0).all()
         depth, seconds = motion.compress(moved, speed, 10.0, 1e-12)
         assert found.compression_m == pytest.approx(depth, rel=1e-8)
         assert found.time_s == pytest.approx(seconds, rel=1e-8)

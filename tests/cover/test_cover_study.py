@@ -10,6 +10,7 @@ import pytest
 from contactfpga.cover import Ball, formula_study, paper
 from contactfpga.cover.foams import FOAMS
 from contactfpga.cover.sense import LADDER
+from contactfpga_sim.pages import cover_page
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
 
@@ -26,12 +27,12 @@ def test_the_page_has_every_table():
     assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == [
         "rules", "failing", "sense", "thinning", "foams", "paper",
     ]  # fmt: skip
-    assert set(formula_study.TABLES) == {"rules", "failing", "sense", "thinning", "foams", "paper"}
+    assert set(cover_page.TABLES) == {"rules", "failing", "sense", "thinning", "foams", "paper"}
 
 
 @pytest.mark.parametrize("name", ["paper", "foams", "thinning"])
 def test_tables_without_times_are_up_to_date(name):
-    assert section(name) == formula_study.TABLES[name]()
+    assert section(name) == cover_page.TABLES[name]()
 
 
 @pytest.mark.parametrize("name", ["rules", "failing", "sense"])
@@ -40,7 +41,7 @@ def test_errors_in_the_other_tables_are_up_to_date(name):
         # the last column is a time; of an error near rounding only its order is the same everywhere
         return [[re.sub(r"\d(?=e-1)", "", cell) for cell in row[:-1]] for row in cells(table)]
 
-    assert comparable(section(name)) == comparable(formula_study.TABLES[name]())
+    assert comparable(section(name)) == comparable(cover_page.TABLES[name]())
     assert all(row[-1].endswith(" µs") for row in cells(section(name))[2:])
 
 
@@ -84,7 +85,7 @@ def test_every_line_of_the_papers_table_has_a_verdict():
     rows = paper.rows()
     assert len(rows) == 20
     assert all(row.printed and row.ours and row.verdict for row in rows)
-    text = formula_study.paper_table()
+    text = cover_page.paper_table()
     for value in (
         *("64.7785 N", "44.7066 N at 8.6603 mm", "3.6344 mm", "4.0958 mm at 15 N → 5.792 mm", "4.2002 mm", "15.789 N"),
         *("12.11 or 11.5; 15.79 or 15.00; 8.49 or 8.94", "4.49 m²/s²", "1.471637592", "2.174 mm", "3.29 to 4.08 mm"),
@@ -99,12 +100,6 @@ def test_every_foam_is_in_the_page():
     assert [row[0] for row in cells(section("foams"))[2:]] == [foam.name for foam in FOAMS]
 
 
-def test_only_sections_that_are_known_are_written_anew(monkeypatch):
-    monkeypatch.setattr(formula_study, "TABLES", {"one": lambda: "new"})
-    page = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
-    assert formula_study.update(page) == page.replace("old", "new")
-
-
 def test_a_time_is_measured():
     assert 0 < formula_study.seconds(lambda: np.ones(10), repeats=1) < 1e-3
 
@@ -113,7 +108,7 @@ def test_study_as_a_command(tmp_path, monkeypatch, capsys):
     page = tmp_path / "page.md"
     page.write_text("<!-- figures: foams -->\n<!-- end -->\n", encoding="utf-8")
     monkeypatch.setattr("sys.argv", ["study", str(page), str(tmp_path)])
-    assert formula_study.main() == 0
+    assert cover_page.main() == 0
     assert "Plastazote" in page.read_text(encoding="utf-8")
     drawn = sorted(file.name for file in tmp_path.glob("*.svg"))
     assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]

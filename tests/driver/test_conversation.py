@@ -8,7 +8,7 @@ from model_board import SCAN_US, ModelBoard
 from wire import EPOCH_US, Wire, last_byte, old_frame, old_hello
 
 import contactfpga
-from contactfpga.commands.zones import status
+from contactfpga.console.views import status
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.stats import Stats
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.pages import figures
+from contactfpga_sim.pages import figures, writer
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/performance.md"
@@ -32,11 +32,11 @@ def test_the_reference_skin_keeps_the_promised_latency():
 
 def test_the_gains_of_the_adaptive_scan_are_up_to_date():
     text = PAGE.read_text()
-    assert figures.update(text, {"gain": figures.TABLES["gain"]}) == text
+    assert writer.update(text, {"gain": figures.TABLES["gain"]}) == text
 
 
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_all_tables_are_up_to_date():
     text = PAGE.read_text()
-    assert figures.update(text) == text
+    assert writer.update(text, figures.TABLES) == text

@@ -9,7 +9,7 @@ import pytest
 from contactfpga.skin import Skin
 from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import volume
-from contactfpga_sim.pages import figures, label_figures
+from contactfpga_sim.pages import figures, label_figures, writer
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/performance.md").read_text()
@@ -89,5 +89,5 @@ def test_the_text_says_what_the_tables_say():
 @pytest.mark.skipif(not (ROOT / figures.RECORDINGS).is_dir(), reason="no recordings")
 def test_the_recordings_table_is_up_to_date():
     recordings = figures.recordings(ROOT / figures.RECORDINGS)
-    text = figures.update(PAGE, {"labeller_recorded": lambda: label_figures.recorded_table(recordings)})
+    text = writer.update(PAGE, {"labeller_recorded": lambda: label_figures.recorded_table(recordings)})
     assert text == PAGE

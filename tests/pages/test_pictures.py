@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import svg_texts
 
-from contactfpga.console import picture_style
+from contactfpga import picture_style
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PICTURES = sorted(DOCS.rglob("*.svg"))

@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from contactfpga.cover.impact import COMPRESSION_TIME, Arm
+from contactfpga.cover.arm import Arm
+from contactfpga.cover.impact import COMPRESSION_TIME
 from contactfpga_sim.studies.arm.case import Case
 from contactfpga_sim.studies.arm.plant import Plant
 from contactfpga_sim.studies.arm.run import run

@@ -81,7 +81,7 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
 
 def test_the_arm_needs_no_more_than_the_simulation():
     arm = "contactfpga_sim.studies.arm"
-    code = f"import sys, {arm}.command, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
+    code = f"import sys, contactfpga.cli, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

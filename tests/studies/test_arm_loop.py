@@ -11,7 +11,7 @@ import pytest
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.latency import latency_s
-from contactfpga.wire import protocol
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.golden import Timeline, predict
 from contactfpga_sim.studies.arm.case import Case
 from contactfpga_sim.studies.arm.run import run
@@ -57,18 +57,8 @@ def golden():
 
 def frame_ends(trace):
     """Times in s from the touch at which the stop bits of frames with a zone end."""
-    ends, packet = [], bytearray()
-    for cycle, value in trace.bytes:
-        if value != protocol.DELIMITER:
-            packet.append(value)
-            continue
-        if not packet:  # in front of a hello
-            continue
-        plain = protocol.unseal(bytes(packet), protocol.check_prefix(SKIN))
-        packet.clear()
-        if protocol.kind_of(plain) != protocol.KIND_HELLO and protocol.decode_frame(plain, Derived(SKIN)).cells:
-            ends.append((cycle + 1 + 10 * Derived(SKIN).bit_clocks) / SKIN.clock_hz - LEAD)
-    return ends
+    end = 1 + 10 * Derived(SKIN).bit_clocks
+    return [(got.last + end) / SKIN.clock_hz - LEAD for got in frames_in(SKIN, trace.bytes) if got.frame.cells]
 
 
 def test_the_pin_rises_in_the_clock_in_which_the_golden_model_says(by_pin, golden):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from contactfpga import cli
-from contactfpga_sim.pages import arm_page, figures
-from contactfpga_sim.studies.arm import command, comply, report
+from contactfpga_sim.pages import arm_page, writer
+from contactfpga_sim.studies.arm import comply, report
 from contactfpga_sim.studies.arm.case import Case, CaseError, names
 from contactfpga_sim.studies.arm.run import run
 
@@ -127,7 +127,7 @@ def test_a_case_that_cannot_be_is_refused_with_its_value(tmp_path, capsys, text,
 def test_every_case_that_comes_along_is_known_and_differs_from_the_paper():
     assert names() == ["paper", "paper-offset", "push"]
     assert Case.load("paper-offset") == PAPER.but(touch=({"x_mm": 83.6344},))
-    assert tomllib.loads((Path(command.__file__).parent / "cases/push.toml").read_text())["like"] == "paper"
+    assert tomllib.loads((Path(report.__file__).parent / "cases/push.toml").read_text())["like"] == "paper"
 
 
 def test_the_arm_yields_to_a_push_and_returns_and_the_torque_stays_below_the_limit():
@@ -162,7 +162,7 @@ def test_a_push_of_an_arm_that_does_not_comply_is_refused():
 
 def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
     monkeypatch.setattr(comply, "fastest_m_s", lambda case: 0.25)
-    monkeypatch.setattr(command, "SHARES", (1.0, 1.4))
+    monkeypatch.setattr(comply, "SHARES", (1.0, 1.4))
     monkeypatch.setattr(comply, "pushed", functools.cache(comply.pushed))
     assert cli.main(["arm", "--case", "push", "--json"]) == 0
     known = json.loads(capsys.readouterr().out)
@@ -179,11 +179,11 @@ PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert figures.update(PAGE, {"set": lambda: arm_page.set_table(found)}) == PAGE
+    assert writer.update(PAGE, {"set": lambda: arm_page.set_table(found)}) == PAGE
 
 
 def test_the_page_has_a_section_for_every_table():
     assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == ["set", "sheet", "speeds", "pushes", "failures", "steps"]
-    assert figures.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
+    assert writer.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
         "<!-- figures: steps -->\nnew\n<!-- end -->"
     )

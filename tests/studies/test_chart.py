@@ -20,14 +20,13 @@ from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
 from contactfpga_sim.golden import zones
-from contactfpga_sim.pages import chart_page, chart_pictures, figures
+from contactfpga_sim.pages import chart_page, chart_pictures, writer
 from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.chart import errors, front_picture, host, numbers, picture, speed, steady, study
-from contactfpga_sim.studies.chart.command import FAMILIES_DRAWN
 from contactfpga_sim.studies.chart.errors import Blob, Interval
 from contactfpga_sim.studies.chart.methods import EXTENT_MM, METHODS
-from contactfpga_sim.studies.chart.study import Task
+from contactfpga_sim.studies.chart.study import FAMILIES_DRAWN, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = METHODS["run, 20 mm"]
@@ -258,7 +257,7 @@ def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     front_picture.save(points, tmp_path / "front.svg")
     assert (tmp_path / "front.svg").read_text() == (ROOT / chart_pictures.FRONT).read_text()
     page = (ROOT / "docs/chart.md").read_text()
-    assert figures.update(page, {"front": chart_page.front_table}) == page
+    assert writer.update(page, {"front": chart_page.front_table}) == page
 
 
 def test_the_picture_of_the_front_names_it_and_what_it_is_compared_with(tmp_path):

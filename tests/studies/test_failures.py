@@ -13,7 +13,7 @@ from shadows import zones_by_image_tools
 from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import failures_page, figures
+from contactfpga_sim.pages import failures_page, writer
 from contactfpga_sim.studies.failures import axes, electric, knob_pictures, line, shapes, touch
 from contactfpga_sim.studies.failures.catalogue import STUDIES
 from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
@@ -118,7 +118,7 @@ def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turned, name, method)
 def test_the_page_and_its_pictures_are_up_to_date(turned):
     text = PAGE.read_text()
     assert (
-        figures.update(text, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
+        writer.update(text, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
         == text
     )
     for name, methods in turned.items():
@@ -353,7 +353,7 @@ def test_the_command_writes_a_study(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--study", "elbow"], "--study 'elbow' is not known; take one of winding, crossing"),
+        (["--study", "elbow"], "--study 'elbow' is not known; take one of: winding; crossing"),
         (["--study", "ghost", "--page", "x.md"], "--page takes all studies; leave --study out"),
     ],
 )

@@ -18,7 +18,7 @@ from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.pages import figures, fit_page
+from contactfpga_sim.pages import figures, fit_page, writer
 from contactfpga_sim.studies import kept, pool, size
 from contactfpga_sim.studies.chart import speed
 from contactfpga_sim.studies.chart.errors import Interval, interval
@@ -485,8 +485,8 @@ def test_the_command_fails_where_other_scenes_break_a_limit(tmp_path, shortcuts,
         (["guess"], "scene 'guess' is not known; take a .toml, .npz or .npy file, or one of bumper, fingers"),
         (["none.toml"], "No such file"),
         (["bumper", "--placements", "50"], "the limit of miscounted is 5 %; take 73 scenes or more"),
-        (["bumper", "--labeller", "x"], "--labeller 'x' is not known; take one of: single, projection, serial, run"),
-        (["bumper", "--scan", "x"], "--scan 'x' is not known; take one of: raster, adaptive"),
+        (["bumper", "--labeller", "x"], "--labeller 'x' is not known; take one of: single; projection; serial; run"),
+        (["bumper", "--scan", "x"], "--scan 'x' is not known; take one of: raster; adaptive"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(arguments, message, capsys):
@@ -532,7 +532,7 @@ def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
 def test_the_page_is_up_to_date(name, monkeypatch):
     monkeypatch.undo()  # what was synthesised before is kept
     text = (ROOT / "docs" / "fit.md").read_text()
-    assert figures.update(text, {name: fit.TABLES[name]}) == text
+    assert writer.update(text, {name: fit_page.TABLES[name]}) == text
 
 
 @pytest.mark.campaign

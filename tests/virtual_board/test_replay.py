@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from contactfpga import cli
 from contactfpga_sim.board import replay
 from contactfpga_sim.scenes.shapes import variants
 
@@ -118,16 +119,31 @@ def test_json_lines(tmp_path):
     assert [line["frame"] for line in lines] == [0, 1, 2]
     assert lines[0]["zones"] == lines[2]["zones"] == []
     assert lines[0]["cycles"]["last_row_to_first_record"] is None
-    assert lines[1]["zones"] == [
-        {"area": 2, "sum_x": 4, "sum_y": 3, "x_mm": 5.0, "y_mm": 3.75},
-        {"area": 1, "sum_x": 0, "sum_y": 3, "x_mm": 0.0, "y_mm": 7.5},
-    ]
+    names = ("area_cells", "sum_x", "sum_y", "area_mm2", "x_mm", "y_mm")
+    found = [tuple(zone[name] for name in names) for zone in lines[1]["zones"]]
+    assert found == [(2, 4, 3, 12.5, 5.0, 3.75), (1, 0, 3, 6.25, 0.0, 7.5)]
     # Last row: the zone in column 0 is one step, the one in column 2 that ended a row before is the second.
     assert lines[1]["cycles"]["last_row_to_first_record"] == 3
     assert lines[1]["cycles"]["last_row_to_last_record"] == 4
     assert lines[1]["flags"] == []
     again = run(path, "--threshold", 30)
     assert "3 of 4x5" in again.stdout
+
+
+@pytest.mark.parametrize("options", [(), ("--barycenter-bits", "3")])
+def test_replay_and_zones_print_the_same_names(tmp_path, capsys, options):
+    cells = np.zeros((1, 16, 16), bool)
+    cells[0, 3, 5:7] = True
+    np.save(tmp_path / "frames.npy", cells)
+    assert cli.main(["replay", str(tmp_path / "frames.npy"), "--json", *options]) == 0
+    replayed = json.loads(capsys.readouterr().out)
+    skin = tmp_path / "skin.toml"
+    skin.write_text('report = "barycenter"\nbarycenter_bits = 3\n' if options else "")
+    port = f"sim://?scene={tmp_path / 'frames.npy'}&skin={skin}"
+    assert cli.main(["zones", port, "--once", "--json"]) == 0
+    live = json.loads(capsys.readouterr().out)
+    assert list(replayed) == ["frame", *live, "cycles"]
+    assert replayed["zones"] == live["zones"] != []
 
 
 @pytest.mark.parametrize(

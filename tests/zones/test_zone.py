@@ -151,13 +151,13 @@ def test_a_frame_flagged_mismatch_reaches_the_user_whatever_it_holds():
 @pytest.mark.parametrize("moments", [[(0, 3, 3)], [(1, 31, 15)], [(1, 200, 3)], [(255, 0, 0), (0, 0, 0)]])
 def test_a_frame_flagged_mismatch_can_be_shown(moments):
     """Whatever the records hold: zones beyond the sheet are not drawn."""
-    from contactfpga.commands.live import Room
-    from contactfpga.commands.zones import render
+    from contactfpga.console.live import Room
+    from contactfpga.console.views import zones_view
 
     zones = zones_of(moments, cells=9, flags=["mismatch"])
     board = SimpleNamespace(port="x", stats=Stats(), skin=SKIN)
     console = Console(file=io.StringIO(), width=200)
-    console.print(render(board, zones, Room(console, 200, None, True)))
+    console.print(zones_view(board, zones, Room(console, 200, None, True)))
     assert "mismatch" in console.file.getvalue()
 
 

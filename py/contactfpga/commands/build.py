@@ -5,12 +5,26 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from contactfpga.console import outputs
+from contactfpga.console import numbers, outputs
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 
+HELP = "Build a bitstream for a board."
+EXTRA = "boards"
 
-def main(args: argparse.Namespace) -> int:
+BOARD = "One of icebreaker, icestick, ulx3s-12f and ulx3s-85f."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("board", metavar="BOARD", help=BOARD)
+    parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board).")
+    parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
+    start = "Seed of place and route (default: 1)."
+    parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
+
+
+def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga_hdl.board import boards, build
 

@@ -8,11 +8,14 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga.console import terminal
+from contactfpga.console import flags, numbers, terminal
 from contactfpga.driver import driver, ports
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError, ReplayEnded
-from contactfpga.skin.mismatch import report_of
+from contactfpga.wire.mismatch import report_of
+
+HELP = "Find out what is wrong between this computer and the board."
+EXTRA = None
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
@@ -29,7 +32,14 @@ Finding = tuple[str, str]
 """("ok", "note" or "fault", sentence)."""
 
 
-def main(args: argparse.Namespace) -> int:
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    flags.connection(parser)
+    long = "Seconds of device time over which frames are counted (default: 1)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, default=1.0, help=long)
+
+
+def run(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
     faults = 0
     for verdict, sentence in _findings(args):

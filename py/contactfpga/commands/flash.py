@@ -7,11 +7,20 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from contactfpga.commands.build import default_folder
+from contactfpga.commands.build import BOARD, default_folder
 from contactfpga.errors import ContactFPGAError, MissingTool
 
+HELP = "Write a bitstream to a board."
+EXTRA = None
 
-def main(args: argparse.Namespace) -> int:
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("board", metavar="BOARD", help=BOARD)
+    parser.add_argument("file", nargs="?", metavar="FILE", help="Bitstream (default: the one in build/BOARD).")
+
+
+def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga_hdl.board import boards  # the pin tables; nothing that needs more than the host
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from rich import box
 from rich.cells import cell_len
@@ -11,15 +12,24 @@ from rich.console import JustifyMethod
 from rich.markup import escape
 from rich.table import Table
 
+from contactfpga.console import terminal
+
 GAP = 3
 """Characters from a column to the next."""
 
 FOLDED = 24
 """A column of sentences is given at least this width."""
 
-
 HEADING = 8
 """Headings are not broken into lines shorter than this."""
+
+
+def show(rows: Sequence[Sequence[str]], **options: Any) -> None:
+    """Print :func:`tables` as wide as the terminal, with a blank line after each."""
+    console = terminal.console()
+    for table in tables(rows, console.width, **options):
+        console.print(table)
+        console.print()
 
 
 def tables(

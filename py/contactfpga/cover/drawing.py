@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from contactfpga.console import picture_style as style
-from contactfpga.console.picture_style import save
+from contactfpga import picture_style as style
 from contactfpga.cover import elastic, impact, line, medium, motion, point
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.hertz import Ball
@@ -21,6 +20,7 @@ from contactfpga.cover.paper import FIRST_DESIGN, WORST_M
 from contactfpga.cover.solve import Floats
 from contactfpga.cover.switch import Switch
 from contactfpga.cover.task import Task
+from contactfpga.picture_style import save
 
 COLORS = {"halfspace": style.BLUE, "bonded": style.VERMILLION, "frictionless": style.GREEN}
 LIMIT: dict[str, Any] = {"color": style.SOFT, "linewidth": 1.0, "linestyle": style.DASHES[2]}

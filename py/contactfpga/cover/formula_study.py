@@ -1,6 +1,4 @@
-"""Speed against accuracy of the cover's formulas, and the tables and pictures of docs/cover.md.
-
-    python -m contactfpga.cover.formula_study docs/cover.md docs/images
+"""Speed against accuracy of the cover's formulas.
 
 Errors are the same everywhere; times are those of the machine on which it runs. The rules that fail are here and
 nowhere else.
@@ -8,24 +6,17 @@ nowhere else.
 
 from __future__ import annotations
 
-import argparse
 import math
-import re
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.console import interrupt
-from contactfpga.cover import elastic, impact, motion, paper
+from contactfpga.cover import elastic, impact, motion
 from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.design import thinning
-from contactfpga.cover.foams import FOAMS
+from contactfpga.cover.arm import Arm, slowness, speed2
 from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Arm
 from contactfpga.cover.sense import LADDER, Model, Sheet
 from contactfpga.cover.solve import Floats, gauss, legendre
 from contactfpga.cover.switch import Switch
@@ -50,7 +41,7 @@ class Blow(NamedTuple):
         return impact.compression_m(self.arm, self.speed_m_s, self.stiffness)
 
     def square(self, depth: np.ndarray) -> Floats:
-        return impact.speed2(self.arm, self.speed_m_s, self.stiffness, depth)
+        return speed2(self.arm, self.speed_m_s, self.stiffness, depth)
 
 
 _SPRING = elastic.stiffness(Ball(0.019, elastic.effective_modulus_pa(3.65e5, 0.5)))
@@ -136,9 +127,7 @@ def _euler(step_share: float) -> Rule:
 def _sine(nodes: int) -> Callable[..., float]:
     def rule(blow: Blow, depth: float | None = None) -> float:
         end = blow.depth_m if depth is None else depth
-        return gauss(
-            lambda phi: impact.slowness(blow.arm, blow.speed_m_s, blow.stiffness, end, phi), 0.0, math.pi / 2, nodes
-        )
+        return gauss(lambda phi: slowness(blow.arm, blow.speed_m_s, blow.stiffness, end, phi), 0.0, math.pi / 2, nodes)
 
     return rule
 
@@ -208,32 +197,6 @@ def seconds(call: Callable[[], object], repeats: int = 5) -> float:
     return min(runs) / count
 
 
-def _cell(error: float) -> str:
-    if math.isnan(error):
-        return "none"
-    if math.isinf(error) or abs(error) > 1e6:
-        return "infinite"
-    if abs(error) < FLOOR:
-        return "< 1e-13"
-    if abs(error) >= 1e-3:
-        return f"{100 * error:+.1f} %"
-    return f"{abs(error):.0e}"
-
-
-def _rule_table(rules: dict[str, Rule]) -> str:
-    lines = [
-        "| rule | " + " | ".join(blow.name for blow in BLOWS) + " | time |",
-        "|---|" + "---|" * (len(BLOWS) + 1),
-    ]
-    for name, rule in rules.items():
-        errors = relative_errors(rule)
-        with np.errstate(all="ignore"):
-            takes = 1e6 * seconds(lambda rule=rule: rule(BLOWS[0]))  # type: ignore[misc]
-        told = f"{takes:.1f}" if takes < 10 else f"{takes:,.0f}"
-        lines.append(f"| {name} | " + " | ".join(map(_cell, errors)) + f" | {told} µs |")
-    return "\n".join(lines)
-
-
 # ---- sensitivity
 
 SWITCH = Switch()
@@ -253,91 +216,3 @@ def sense_errors(model: Model, ball: Ball) -> list[float]:
         gone = isinstance(one, NoSolution) or isinstance(reference, NoSolution)
         found.append(math.nan if gone else one / reference - 1)  # type: ignore[operator]
     return found
-
-
-def sense_table() -> str:
-    """Models of sensitivity: error against the reference, and time."""
-    lines = [
-        "| model | ball | " + " | ".join(f"ρ/h = {place:g}" for place in PLACES) + " | time |",
-        "|---|---|" + "---|" * (len(PLACES) + 1),
-    ]
-    for model in LADDER:
-        for name, ball in BALLS.items():
-            sheet = Sheet(SWITCH, THICKNESS_M, ball)
-            takes = 1e6 * seconds(lambda sheet=sheet, model=model: sheet.force_n(model, 3e-3))  # type: ignore[misc]
-            errors = ["0" if error == 0 else f"{100 * error:+.1f} %" for error in sense_errors(model, ball)]
-            lines.append(f"| {model} | {name} | " + " | ".join(errors) + f" | {takes:,.0f} µs |")
-    return "\n".join(lines)
-
-
-def paper_table() -> str:
-    """What is printed, what we get, and the verdict."""
-    lines = ["| paper says | we get | verdict |", "|---|---|---|"]
-    return "\n".join(lines + [f"| {row.printed} | {row.ours} | {row.verdict} |" for row in paper.rows()])
-
-
-def thinning_table() -> str:
-    """The first design as the reaction gets faster."""
-    lines = [
-        "| reaction after | foam that lasts 4/3 of it | pressed in | peak force | the paper's foam: by then | in all |",
-        "|---|---|---|---|---|---|",
-    ]
-    for one in thinning(paper.FIRST_DESIGN, paper.FIRST_DESIGN.foams[0]):
-        assert one.modulus_pa is not None
-        assert one.compression_m is not None
-        assert one.pressed_m is not None
-        assert one.stopped_m is not None
-        lines.append(
-            f"| {1e3 * one.latency_s:.3g} ms | {1e-6 * one.modulus_pa:,.4g} MPa | {1e3 * one.compression_m:.3g} mm | "
-            f"{one.force_n:.4g} N | {1e3 * one.pressed_m:.3g} mm | {1e3 * one.stopped_m:.3g} mm |"
-        )
-    return "\n".join(lines)
-
-
-def foam_table() -> str:
-    """Every foam with its source."""
-    lines = ["| foam | E | density | Y | pressed up to | source |", "|---|---|---|---|---|---|"]
-    for one in FOAMS:
-        density = "" if one.density_kg_m3 is None else f"{one.density_kg_m3:g} kg/m³"
-        strength = "" if one.yield_pa is None else f"{1e-3 * one.yield_pa:g} kPa"
-        known = f"{1e-3 * one.modulus_pa:g} kPa | {density} | {strength} | {100 * one.strain:g} %"
-        lines.append(f"| {one.name} | {known} | {one.source} |")
-    return "\n".join(lines)
-
-
-TABLES: dict[str, Callable[[], str]] = {
-    "paper": paper_table,
-    "rules": lambda: _rule_table(RULES),
-    "failing": lambda: _rule_table(FAILING),
-    "sense": sense_table,
-    "thinning": thinning_table,
-    "foams": foam_table,
-}
-
-
-def update(text: str) -> str:
-    """The page with each `<!-- figures: NAME -->` section that is in :data:`TABLES` written anew."""
-
-    def written(match: re.Match[str]) -> str:
-        return f"{match[1]}\n{TABLES[match[2]]()}\n{match[3]}" if match[2] in TABLES else match[0]
-
-    return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", written, text, flags=re.DOTALL)
-
-
-def main() -> int:
-    """Write the tables into the page and the pictures into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Chart the cover's formulas, their error against their time.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    from contactfpga.cover import drawing, study_drawing  # matplotlib, which only drawing needs
-
-    args.page.write_text(update(args.page.read_text(encoding="utf-8")), encoding="utf-8")
-    print(f"wrote {args.page}")
-    for file in (*drawing.draw(args.folder, "svg"), study_drawing.study(args.folder / "cover-study.svg")):
-        print(f"drew {file}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.cover.answer import CoverError, not_negative, positive
-from contactfpga.cover.impact import Arm, slowness, speed2
+from contactfpga.cover.arm import Arm, slowness, speed2
 from contactfpga.cover.solve import Floats, gauss
 
 State = tuple[float, float]

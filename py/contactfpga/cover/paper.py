@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from contactfpga.cover import elastic, impact, medium, point
 from contactfpga.cover.answer import NoSolution
+from contactfpga.cover.arm import GRAVITY, Arm
 from contactfpga.cover.foams import find
 from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Arm, Impact
+from contactfpga.cover.impact import Impact
 from contactfpga.cover.switch import Switch
 from contactfpga.cover.task import Task
 
@@ -54,7 +55,7 @@ def rows() -> list[Row]:
 
 
 def _equations() -> list[Row]:
-    weight = 0.6 * impact.GRAVITY * 0.15
+    weight = 0.6 * GRAVITY * 0.15
     dropped = 2 * 0.2**2 * weight / ARM.inertia_kgm2
     return [
         Row("δ̇(0) = −v₀", "+v₀, as θ − θ₀ = δ/d; with the printed sign δ^1.5 has no real value", "misprint"),

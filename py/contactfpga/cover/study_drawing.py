@@ -10,7 +10,7 @@ import matplotlib
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from contactfpga.console import picture_style as style
+from contactfpga import picture_style as style
 from contactfpga.cover import formula_study as measured
 
 LEAST_SHARE = 1e-3

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
+from contactfpga.cover.arm import Arm
 from contactfpga.cover.elastic import THICKNESS_RULES
 from contactfpga.cover.foams import FOAMS, Foam, find
-from contactfpga.cover.impact import Arm
 from contactfpga.cover.medium import MEDIA
 from contactfpga.cover.sense import CONTACTS, TOLERANCE, Model
 from contactfpga.cover.switch import Switch

@@ -15,11 +15,11 @@ from contactfpga.driver.stats import Stats
 from contactfpga.driver.timeline import MOST_S, Timeline
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
-from contactfpga.skin.mismatch import describe, difference
 from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.hello import Hello
+from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.zones.zone import Zones
 

@@ -6,7 +6,7 @@ import contextlib
 import threading
 import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.transport import Transport
@@ -15,17 +15,21 @@ from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.zone import Zones
 
-if TYPE_CHECKING:
-    from contactfpga.driver.subscription import Subscription
-
 TURN_S = 0.05
-"""The reader looks this often whether the board was closed."""
+"""How often the reader checks whether the board was closed."""
 
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
 
 Found = Zones | ContactFPGAError | Hello | bool
 """What is waited for."""
+
+
+class Listener(Protocol):
+    """Takes what comes over a port."""
+
+    def put(self, item: Zones | ContactFPGAError) -> None:
+        """Add what came; the lock :attr:`Link.changed` is held."""
 
 
 class _Waiter:
@@ -52,7 +56,7 @@ class Link:
         self.conversation = Conversation(transport.name, skin, transport.live)
         self.changed = threading.Condition()
         """To be held while any state is looked at."""
-        self.subscriptions: weakref.WeakSet[Subscription] = weakref.WeakSet()
+        self.listeners: weakref.WeakSet[Listener] = weakref.WeakSet()
         self._sending = threading.Lock()
         self._waiters: list[_Waiter] = []
         self._failure: BaseException | None = None
@@ -151,8 +155,8 @@ class Link:
         if isinstance(event, Hello):
             return
         item = event.zones if isinstance(event, Arrival) else event
-        for subscription in self.subscriptions:
-            subscription.put(item)
+        for listener in self.listeners:
+            listener.put(item)
         for waiter in self._waiters:
             if waiter.found is not None:
                 continue

@@ -6,16 +6,12 @@ import asyncio
 import collections
 import contextlib
 from collections.abc import AsyncIterator, Iterator
-from typing import TYPE_CHECKING
 
+from contactfpga.driver.link import Link
 from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
-
-if TYPE_CHECKING:
-    from contactfpga.driver.board import Board
-    from contactfpga.driver.link import Link
 
 
 class Subscription:
@@ -24,7 +20,7 @@ class Subscription:
     ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`.
     """
 
-    def __init__(self, link: Link, maxsize: int, board: Board | None = None):
+    def __init__(self, link: Link, maxsize: int, board: object = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
         self.maxsize = maxsize
@@ -35,7 +31,7 @@ class Subscription:
         self._items: collections.deque[Zones | ContactFPGAError] = collections.deque()
         self._closed = False
         with link.changed:
-            link.subscriptions.add(self)
+            link.listeners.add(self)
 
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order; errors as for :meth:`Board.next`."""
@@ -60,7 +56,7 @@ class Subscription:
         """Take no more frames."""
         with self._link.changed:
             self._closed = True
-            self._link.subscriptions.discard(self)
+            self._link.listeners.discard(self)
             self._items.clear()
             self._link.changed.notify_all()
 

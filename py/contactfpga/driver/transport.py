@@ -6,9 +6,9 @@ import contextlib
 import math
 import time
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import BinaryIO, Protocol
 
-from contactfpga.cover import load_cover
+from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
@@ -128,9 +128,7 @@ class SimTransport:
         skin = Skin.load(asked.skin) if asked.skin is not None else None
         cover = load_cover(asked.skin) if asked.skin is not None else None
         try:
-            from contactfpga_sim.board.virtual import VirtualBoard
-
-            return cls(name, VirtualBoard(skin=skin, scene=_scene(asked), cover=cover))
+            return cls(name, _virtual_board(asked, skin, cover))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -263,15 +261,11 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     return SerialTransport(name, baud)
 
 
-def _scene(asked: sim_address.SimAddress) -> Any:
-    """What :class:`~contactfpga_sim.board.virtual.VirtualBoard` takes as its scene."""
-    if asked.threshold is None:
-        return asked.scene
-    from contactfpga_sim.scenes.recordings import Recording
+def _virtual_board(asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None) -> SimulatedPort:
+    """The one place at which the host loads the simulation, which need not be installed."""
+    from contactfpga_sim.board import virtual
 
-    if asked.scene is None or not asked.scene.endswith((".npy", ".npz")):
-        raise ValueError(f"threshold is {asked.threshold:g}; only numbers of a .npy or .npz file are compared with it")
-    return Recording.load(asked.scene, asked.threshold)
+    return virtual.board_for(asked.scene, skin, asked.threshold, cover)
 
 
 def _reason(error: Exception) -> str:

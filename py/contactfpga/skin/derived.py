@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from contactfpga.choices import debounces, labellers, scans
 from contactfpga.choices.labellers import Labeller
 from contactfpga.choices.scans import Scan
+from contactfpga.skin.widths import CHECK_BYTES as CHECK_BYTES
 from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
 from contactfpga.skin.widths import TIME_BITS as TIME_BITS
 from contactfpga.skin.widths import Widths
-from contactfpga.wire.framing import CHECK_BYTES as CHECK_BYTES
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

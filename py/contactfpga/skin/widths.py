@@ -8,8 +8,8 @@ import math
 from contactfpga.choices.reports import REPORTS, Report
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.skin.sheet import Sheet
-from contactfpga.wire.framing import CHECK_BYTES
 
+CHECK_BYTES = 3
 TIME_BITS = 24
 SEQUENCE_BITS = 8
 HEARD_BITS = 3

@@ -6,10 +6,10 @@ from __future__ import annotations
 import binascii
 
 from contactfpga.choices.reports import REPORTS
+from contactfpga.skin.widths import CHECK_BYTES
 
 VERSION = 2
 DELIMITER = 0
-CHECK_BYTES = 3
 
 FLAG_BITS = 4
 KIND_BITS = 4

@@ -1,30 +1,26 @@
-"""Recorded frames through the compiled gateware: ``contactfpga replay``."""
+"""Recorded frames through the compiled gateware."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
-import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
 from contactfpga_sim.board import native
 from contactfpga_sim.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.board.received import Receiver
 from contactfpga_sim.scenes.recordings import Recording
-
-if TYPE_CHECKING:
-    import argparse
 
 CHUNK = 256
 """Frames that are simulated while those before are decoded."""
@@ -49,6 +45,21 @@ class Replayed:
     """The same to its last record."""
     duration: int
     """Clocks from the transfer of the frame's first row to the end of its last byte on the line."""
+
+
+def load(
+    path: str | Path,
+    threshold: float | None = None,
+    connectivity: int = 8,
+    pitch_mm: float = 10.0,
+    barycenter_bits: int | None = None,
+) -> tuple[np.ndarray, Skin]:
+    """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled."""
+    frames = Recording.load(path, threshold).pressed
+    _, rows, columns = frames.shape
+    skin = skin_for(rows, columns, connectivity, zones_bound(frames, connectivity), pitch_mm, barycenter_bits)
+    native.load(model_of(skin))
+    return frames, skin
 
 
 def zones_bound(frames: np.ndarray, connectivity: int) -> int:
@@ -152,7 +163,7 @@ class _Collector:
         self._scan = 0
         self._row_scan = 0
         self._pending: list[int] = []
-        self._packet = bytearray()
+        self._receiver = Receiver(board.skin)
         self._next = 0
 
     def simulate(self, frames: np.ndarray, scans: range) -> _Events:
@@ -168,16 +179,9 @@ class _Collector:
     def collect(self, events: _Events) -> Iterator[Replayed]:
         """The input frames whose last byte is among the events."""
         self._note_times(events)
-        for cycle, value in zip(events.received["cycle"].tolist(), events.received["data"].tolist()):
-            if value != protocol.DELIMITER:
-                self._packet.append(value)
-                continue
-            if not self._packet:  # in front of a hello
-                continue
-            plain = protocol.unseal(bytes(self._packet), protocol.check_prefix(self._board.skin))
-            self._packet.clear()
-            if protocol.kind_of(plain) != protocol.KIND_HELLO:
-                yield from self._place(protocol.decode_frame(plain, self._derived), cycle)
+        stream = zip(events.received["cycle"].tolist(), events.received["data"].tolist())
+        for got in self._receiver.take(stream):
+            yield from self._place(got.frame, got.last)
 
     def _note_times(self, events: _Events) -> None:
         rows = self._board.skin.rows
@@ -218,49 +222,12 @@ class _Collector:
             raise ReplayError(f"{left} frames of the input did not reach the host")
 
 
-def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, Any]:
-    """One input frame as ``contactfpga replay --json`` prints it."""
-    zones: list[dict[str, Any]] = []
-    for area, sum_x, sum_y in result.frame.moments.tolist():
-        x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
-        zones.append({"area": area, "sum_x": sum_x, "sum_y": sum_y, "x_mm": x_mm, "y_mm": y_mm})
-    if result.frame.barycenters is not None:
-        steps = 1 << skin.barycenter_bits
-        for area, x, y in result.frame.barycenters.tolist():
-            zones.append({"area": area, "x_mm": x * skin.pitch_x_mm / steps, "y_mm": y * skin.pitch_y_mm / steps})
-    zones.sort(key=lambda zone: (zone["y_mm"], zone["x_mm"], zone["area"]))
+def to_json(index: int, result: Replayed, skin: Skin) -> dict[str, object]:
+    """One input frame as ``contactfpga replay --json`` prints it: as ``contactfpga zones --json`` does, with its number
+    in the input and, under ``cycles``, the clocks of :class:`Replayed`."""
     cycles = {
         "last_row_to_first_record": result.first_record,
         "last_row_to_last_record": result.last_record,
         "frame": result.duration,
     }
-    return {"frame": index, "zones": zones, "flags": sorted(result.frame.flags), "cycles": cycles}
-
-
-def main(args: argparse.Namespace) -> int:
-    """``contactfpga replay``: args.frames, args.connectivity, args.threshold, args.pitch_mm, args.barycenter_bits,
-    args.json."""
-    frames = Recording.load(args.frames, args.threshold).pressed
-    _, rows, columns = frames.shape
-    bound = zones_bound(frames, args.connectivity)
-    skin = skin_for(rows, columns, args.connectivity, bound, args.pitch_mm, args.barycenter_bits)
-    native.load(model_of(skin))  # which is no part of the speed
-    started = time.monotonic()
-    counts, late = [0], [0]
-    for index, result in enumerate(replay(frames, skin)):
-        if args.json:
-            sys.stdout.write(json.dumps(to_json(index, result, skin)) + "\n")
-        else:
-            counts.append(result.frame.zones)
-            late.append(result.last_record or 0)
-    if not args.json:
-        seconds = time.monotonic() - started
-        for title, what in (
-            ("frames", f"{len(frames)} of {rows}x{columns}, {args.connectivity}-connectivity"),
-            ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
-            ("last record", f"at most {max(late)} clocks after a frame's last row"),
-            ("speed", f"{len(frames) / seconds:,.0f} frames a second, once compiled"),
-        ):
-            terminal.say(f"{title:20}{what}", hang=20)
-        terminal.say("Every frame came back exactly once. One JSON object a frame: --json")
-    return 0
+    return {"frame": index, **Zones(result.frame, skin.sheet).to_dict(), "cycles": cycles}

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from contactfpga.cover import Cover, load_cover
+from contactfpga.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import Source
 from contactfpga_sim.scenes.scene import scene as make_scene
-
-if TYPE_CHECKING:
-    import argparse
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -67,10 +63,10 @@ class VirtualBoard:
         self.close()
 
 
-def main(args: argparse.Namespace) -> int:
-    """``contactfpga board``: args.skin (path or None), args.scene (name, path or None), args.link (path or None)."""
-    from contactfpga_sim.board.pty_board import PtyBoard
-
-    skin = Skin.load(args.skin) if args.skin else Skin()
-    cover = load_cover(args.skin) if args.skin else None
-    return PtyBoard(skin, args.scene, link=args.link, cover=cover).serve()
+def board_for(scene: str | None, skin: Skin | None, threshold: float | None, cover: Cover | None) -> VirtualBoard:
+    """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed."""
+    if threshold is None:
+        return VirtualBoard(skin, scene, cover)
+    if scene is None or not scene.endswith((".npy", ".npz")):
+        raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
+    return VirtualBoard(skin, Recording.load(scene, threshold))

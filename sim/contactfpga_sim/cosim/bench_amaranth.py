@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from amaranth.hdl import Cat
 from amaranth.sim import Simulator
@@ -31,7 +31,7 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
     above = len(getattr(top, stimulus.drives[0]))
     deadline = time.monotonic() + limit_s
 
-    async def bench(ctx):
+    async def bench(ctx: Any) -> None:
         for cycle in range(cycles):
             sheet, rx = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
             ctx.set(drives, sheet | rx << above)

@@ -17,6 +17,8 @@ from contactfpga_sim.cosim.record import OutOfTime
 from contactfpga_sim.golden.trace import Timeline, Trace
 
 if TYPE_CHECKING:
+    from amaranth.lib import wiring
+
     from contactfpga.skin import Skin
 
 _BUILD_ARGS = {
@@ -114,7 +116,7 @@ def _build_and_simulate(job: Path) -> None:
     )
 
 
-def _ports(top) -> list[str]:
+def _ports(top: wiring.Component) -> list[str]:
     return ["clk", "rst", *(path[0] for path, _, _ in top.signature.flatten(top))]
 
 

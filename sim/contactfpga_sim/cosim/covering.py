@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,9 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import request
 from contactfpga_sim.golden.trace import Timeline
+
+Pair = tuple[int, int, int, int]
+"""Two choices, each with one of its values, as indices."""
 
 CHOICES: dict[str, tuple[Any, ...]] = {
     "sheet": ((1, 1), (1, 9), (9, 1), (5, 7), (12, 4), (16, 16), (3, 33)),
@@ -65,7 +68,9 @@ def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[st
     return rows
 
 
-def _candidate(choices, names, open_pairs, pick) -> list[int]:
+def _candidate(
+    choices: dict[str, tuple[Any, ...]], names: list[str], open_pairs: set[Pair], pick: random.Random
+) -> list[int]:
     """One open pair, then value by value what closes most of the rest."""
     row: list[int | None] = [None] * len(names)
     a, i, b, j = pick.choice(sorted(open_pairs))
@@ -78,15 +83,15 @@ def _candidate(choices, names, open_pairs, pick) -> list[int]:
     return row  # type: ignore[return-value]
 
 
-def _pairs(row, place=None, value=None) -> set[tuple[int, int, int, int]]:
+def _pairs(row: Sequence[Any], place: int | None = None, value: int | None = None) -> set[Pair]:
     """The pairs in a row, or those that ``value`` at ``place`` would add."""
     if place is None:
         return {(a, row[a], b, row[b]) for a, b in itertools.combinations(range(len(row)), 2)}
     given = [(other, chosen) for other, chosen in enumerate(row) if chosen is not None]
-    return {tuple(itertools.chain(*sorted([(place, value), pair]))) for pair in given}  # type: ignore[misc]
+    return {tuple(itertools.chain(*sorted([(place, value), pair]))) for pair in given}
 
 
-def pairs_in(rows: list[list[int]]) -> set[tuple[int, int, int, int]]:
+def pairs_in(rows: list[list[int]]) -> set[Pair]:
     """All pairs (choice, value, choice, value), as indices, that occur in the rows of a covering set."""
     return set().union(*map(_pairs, rows))
 

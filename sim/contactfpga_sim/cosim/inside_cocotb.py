@@ -6,6 +6,7 @@ import os
 import pickle
 import time
 from pathlib import Path
+from typing import Any
 
 import cocotb
 from cocotb.clock import Clock
@@ -15,7 +16,7 @@ from contactfpga_sim.cosim.record import LEVELS, PAYLOADS, Stimulus, TraceRecord
 
 
 @cocotb.test()
-async def record(dut) -> None:
+async def record(dut: Any) -> None:
     """Every cycle is looked at in its second half, when all of the design has settled."""
     job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
     recorder = TraceRecorder(job["cycles"])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -20,14 +19,13 @@ from contactfpga.skin import Skin
 from contactfpga_sim.mutants import netlist, proof, trial
 from contactfpga_sim.mutants.netlist import STAGES, Mutant
 from contactfpga_sim.mutants.stimuli import SKINS, Stimulus, quick, thorough, until_time_wraps
+from contactfpga_sim.pages import writer
 
 BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
 
 CHECKED = 2
 """So many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
-
-_SECTION = re.compile(r"(<!-- mutants -->).*?(<!-- end -->)", re.DOTALL)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,16 +82,13 @@ def _proved(skin: Skin, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
 
 def table(results: Sequence[Result]) -> str:
     """Counts by stage, as Markdown; the share is that of the mutants not proved equivalent."""
-    lines = [
-        "| stage | mutants | killed | equivalent, proved | alive | killed of the rest |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = [["stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest"]]
     for stage in [*dict.fromkeys(STAGES.values()), "all"]:
         fates = [result.fate for result in results if stage in ("all", result.mutant.stage)]
         killed, equivalent, alive = (fates.count(fate) for fate in ("killed", "equivalent", "alive"))
         share = f"{100 * killed / (killed + alive):.1f} %" if killed + alive else ""
-        lines.append(f"| {stage} | {len(fates):,} | {killed:,} | {equivalent} | {alive} | {share} |")
-    return "\n".join(lines)
+        rows.append([stage, f"{len(fates):,}", f"{killed:,}", str(equivalent), str(alive), share])
+    return writer.table_of(rows)
 
 
 def share_killed(results: Iterable[Result]) -> float:
@@ -120,8 +115,7 @@ def main() -> int:
     results = _run(args.skin or list(SKINS), args.each, args.seed, args.jobs)
     print(f"{listed(results)}\n\n{table(results)}")
     if args.page:
-        text = _SECTION.sub(lambda found: f"{found[1]}\n{table(results)}\n{found[2]}", args.page.read_text())
-        args.page.write_text(text)
+        writer.write(args.page, {"mutants": lambda: table(results)})
         print(f"wrote {args.page}")
     return 0
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from contactfpga.console import interrupt, outputs
-from contactfpga_sim.pages import figures
+from contactfpga_sim.pages import writer
 from contactfpga_sim.studies.arm import comply, latency_charts, report, run_pictures, sweep
 from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.command import SHARES
 from contactfpga_sim.studies.arm.run import Result, run
 from contactfpga_sim.studies.arm.sweep import Point, Task
 from contactfpga_sim.studies.arm.world import Faults
@@ -60,7 +59,7 @@ FAILURES = (
 
 def set_table(found: Mapping[str, Result]) -> str:
     """What ``contactfpga arm`` prints."""
-    return report.markdown(report.table(dict(found), True))
+    return writer.table_of(report.table(dict(found), True))
 
 
 def failure_table() -> str:
@@ -73,14 +72,12 @@ def failure_table() -> str:
         deep = f"{1e3 * found.peak_indentation_m:.2f}{flat}"
         numbers = [f"{found.peak_force_n:.1f}", deep, str(found.reversals), rest]
         lines.append([failure.name, failure.way, reacts, found.reason, *numbers])
-    return report.markdown(lines)
+    return writer.table_of(lines)
 
 
 def push_table() -> str:
     """Pushes up to the fastest that the arm yields to, and a faster one."""
-    case = Case.load("push")
-    fastest = comply.fastest_m_s(case)
-    return report.markdown(report.push_lines([comply.pushed(case, share * fastest)[0] for share in SHARES]))
+    return writer.table_of(report.push_lines(comply.pushes(Case.load("push"))[1]))
 
 
 def step_table() -> str:
@@ -95,7 +92,7 @@ def step_table() -> str:
             shown = [f"{row.scale * value:.4g}" for row, value in zip(report.ROWS, values) if row.field in STEPPED]
             lines.append([f"{step:g}", way, *shown, change])
             before = values
-    return report.markdown(lines)
+    return writer.table_of(lines)
 
 
 def sheet_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
@@ -108,7 +105,7 @@ def sheet_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
         forces = np.array([point.peak_force_n for point in points])
         both = [f"{np.median(values):.2f} / {values.max():.2f}" for values in (takes, forces)]
         lines.append([name, str(len(points)), both[0], f"{1e3 * bounds[name]:.2f}", both[1]])
-    return report.markdown(lines)
+    return writer.table_of(lines)
 
 
 def speed_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
@@ -125,12 +122,12 @@ def speed_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
         lines.append(
             [f"{limit:g}", *cells, f"{sweep.naive_speed(Case.load('paper'), limit, latency_charts.PAPER_S):.2f}"]
         )
-    return report.markdown(lines)
+    return writer.table_of(lines)
 
 
 def main() -> int:
     """Write the tables into the page and the pictures into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on the arm anew.")
+    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on the arm.")
     parser.add_argument("page", type=Path)
     parser.add_argument("folder", type=Path)
     args = parser.parse_args()
@@ -141,7 +138,7 @@ def main() -> int:
     with executor() as workers, progress() as step:
         points = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step)))
     found = report.columns(case, "paper", latency_charts.PAPER_S)
-    tables: dict[str, Callable[[], str]] = {
+    tables: writer.Tables = {
         "set": lambda: set_table(found),
         "sheet": lambda: sheet_table(tasks, points),
         "speeds": lambda: speed_table(tasks, points),
@@ -149,7 +146,7 @@ def main() -> int:
         "failures": failure_table,
         "steps": step_table,
     }
-    args.page.write_text(figures.update(args.page.read_text(encoding="utf-8"), tables), encoding="utf-8")
+    writer.write(args.page, tables)
     print(f"wrote {args.page}")
     drawn = (
         *run_pictures.pictures(found, args.folder, ("svg",)),

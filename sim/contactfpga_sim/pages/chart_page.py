@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bisect
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import figures
+from contactfpga_sim.pages import writer
 from contactfpga_sim.studies.chart import host, numbers, speed, steady
 from contactfpga_sim.studies.chart.study import Point, front
 
@@ -24,10 +23,8 @@ SHEETS = (16, 32, 64)
 
 def front_table() -> str:
     """The methods of each family that no other beats in the time and in the share of scenes miscounted."""
-    lines = [
-        "| family | method | touch to zones, median / worst | miscounted | barycenter | area | LUT4 |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    head = ("family", "method", "touch to zones, median / worst", "miscounted", "barycenter", "area", "LUT4")
+    lines: list[str] = []
     points = numbers.read(NUMBERS)
     for family in dict.fromkeys(point.task.family for point in points):
         some = [point for point in points if point.task.family == family]
@@ -35,7 +32,7 @@ def front_table() -> str:
             [(point.speed.median_us + point.host_us, point.errors["total"]["miscounted"].mean) for point in some]
         )
         lines += [_line(some[index]) for index in best]
-    return "\n".join(lines)
+    return writer.table(head, lines)
 
 
 def _line(point: Point) -> str:
@@ -51,15 +48,13 @@ def _line(point: Point) -> str:
         f"{100 * area.mean:.0f} %",
         f"{point.luts:,}" if point.luts else "",
     )
-    return f"| {' | '.join(cells)} |"
+    return writer.line(cells)
 
 
 def host_table() -> str:
     """Zones from the board against cells labelled on the host: by sheet and number of touched places."""
-    lines = [
-        "| sheet | contacts | zones from the board | cells to the host | labelled there in | faster |",
-        "|---|---|---|---|---|---|",
-    ]
+    head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
+    lines = []
     for size in SHEETS:
         skin = Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
         most = min(size * size // 4, Derived(skin).max_items)
@@ -67,7 +62,7 @@ def host_table() -> str:
         even = bisect.bisect_left(range(1, most + 1), 0.0, key=lambda count: _later(skin, count)) + 1
         for count in sorted({1, 5, even - 1, even, most} & set(range(1, most + 1))):
             lines.append(_rival_line(skin, count))
-    return "\n".join(lines)
+    return writer.table(head, lines)
 
 
 def _later(skin: Skin, count: int) -> float:
@@ -82,10 +77,8 @@ def _rival_line(skin: Skin, count: int) -> str:
     cells_us, cells_bytes = _frame(skin.replace(report="cells"), cells)
     label_us = host.label_us([cells], 8)
     faster = "board" if board_us < cells_us + label_us else "host"
-    return (
-        f"| {skin.rows}x{skin.columns} | {count} | {board_us:.0f} us, {board_bytes} bytes "
-        f"| {cells_us:.0f} us, {cells_bytes} bytes | {label_us:.0f} us | {faster} |"
-    )
+    times = (f"{board_us:.0f} us, {board_bytes} bytes", f"{cells_us:.0f} us, {cells_bytes} bytes", f"{label_us:.0f} us")
+    return writer.line((f"{skin.rows}x{skin.columns}", str(count), *times, faster))
 
 
 def _contacts(skin: Skin, count: int) -> np.ndarray:
@@ -103,8 +96,8 @@ def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
     return steady.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size
 
 
-TABLES: dict[str, Callable[[], str]] = {"front": front_table, "host": host_table}
+TABLES: writer.Tables = {"front": front_table, "host": host_table}
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

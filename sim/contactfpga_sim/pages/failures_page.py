@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from contactfpga_sim.pages import writer
 from contactfpga_sim.studies.failures.catalogue import STUDIES
 from contactfpga_sim.studies.failures.knob import Study, Turned
 
-HEAD = (
-    "| knob | method | holds until | breaks at | what breaks | what the system says | what helps |",
-    "|---|---|---|---|---|---|---|",
-)
+HEAD = ("knob", "method", "holds until", "breaks at", "what breaks", "what the system says", "what helps")
 
 
 def table(turned: Mapping[str, Mapping[str, Turned]]) -> str:
     """A row for each method of each study, by the study's name."""
-    lines = list(HEAD)
-    for name, methods in turned.items():
-        lines += rows(STUDIES[name], methods)
-    return "\n".join(lines)
+    return writer.table(HEAD, [line for name, methods in turned.items() for line in rows(STUDIES[name], methods)])
 
 
 def rows(study: Study, methods: Mapping[str, Turned]) -> list[str]:
@@ -27,7 +22,7 @@ def rows(study: Study, methods: Mapping[str, Turned]) -> list[str]:
     for number, (method, turned) in enumerate(methods.items()):
         knob = f"[{study.title}](#{study.name}): {study.knob}" if number == 0 else ""
         helps = study.helps if number == 0 else ""
-        lines.append(f"| {knob} | {method} | {' | '.join(_cells(study, turned))} | {helps} |")
+        lines.append(writer.line((knob, method, *_cells(study, turned), helps)))
     return lines
 
 

@@ -5,28 +5,26 @@
 
 from __future__ import annotations
 
-import argparse
-import contextlib
-import math
-import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.console import interrupt, outputs
-from contactfpga.skin import Skin, SkinError
+from contactfpga.console import interrupt
+from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.pages import writer
 from contactfpga_sim.pages.label_figures import labeller_table, recorded_table
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import CONTACTS
+from contactfpga_sim.studies.sheets import adaptive_skin
 
 INSTANTS = 96
 """Touch instants, spread evenly over a scan."""
@@ -113,15 +111,9 @@ def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, 
 def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
     """Cycles in which the start bit of a frame's first byte begins and the stop bit of its last one ends."""
     received = board.take("received")
-    ends = np.flatnonzero(received["data"] == protocol.DELIMITER)
-    start = 0
-    for end in map(int, ends):
-        packet = received[start:end]["data"].astype(np.uint8).tobytes()
-        plain = protocol.unseal(packet, protocol.check_prefix(skin)) if packet else b""  # in front of a hello
-        hello = not plain or protocol.kind_of(plain) == protocol.KIND_HELLO
-        if not hello and protocol.decode_frame(plain, Derived(skin)).cells:
-            return int(received[start]["cycle"]) - 10 * Derived(skin).bit_clocks, int(received[end]["cycle"])
-        start = end + 1
+    for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
+        if got.frame.cells:
+            return got.first - 10 * Derived(skin).bit_clocks, got.last
     raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
 
 
@@ -131,20 +123,14 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
     cells[1:3, 1:3] = True
     with CompiledBoard(skin) as board:
         board.hold(cells[None], scans * Derived(skin).frame_clocks)
-        packets = board.receive().split(b"\0")[:-1]
-        before = protocol.check_prefix(skin)
-        plains = [(packet, protocol.unseal(packet, before)) for packet in packets if packet]
-        frames = [packet for packet, plain in plains if protocol.kind_of(plain) != protocol.KIND_HELLO]
-        return len(frames) / (board.cycle / skin.clock_hz), len(frames[-1]) + 1
+        frames = list(frames_in(skin, enumerate(board.receive())))
+        return len(frames) / (board.cycle / skin.clock_hz), frames[-1].size
 
 
 def reference_table() -> str:
     """Latency, rate and size on the wire over some settings."""
-    lines = [
-        "| sheet | scan | touch to `contact` pin | touch to last byte | frames a second | bytes, one zone |",
-        "|---|---|---|---|---|---|",
-    ]
-    return "\n".join(lines + [reference_row(name, skin) for name, skin in SETTINGS.items()])
+    head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames a second", "bytes, one zone")
+    return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
 
 
 def reference_row(name: str, skin: Skin) -> str:
@@ -152,26 +138,24 @@ def reference_row(name: str, skin: Skin) -> str:
     latency = touch_latencies(skin)
     rate, size = frame_rate(skin)
     scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
-    return f"| {name} | {scan:g} us | {latency['contact']} us | **{latency['last byte']} us** | {rate:,.0f} | {size} |"
+    times = (f"{scan:g} us", f"{latency['contact']} us", f"**{latency['last byte']} us**")
+    return writer.line((name, *times, f"{rate:,.0f}", str(size)))
 
 
 def report_table() -> str:
     """What dividing on the board saves on the wire, and what it costs, over some sheets."""
-    lines = [
-        "| sheet | report | bytes a zone | first row | last row | every other switch of the last row |",
-        "|---|---|---|---|---|---|",
-    ]
+    head = ("sheet", "report", "bytes a zone", "first row", "last row", "every other switch of the last row")
     names = ("reference", "32x32", "64x64")
-    return "\n".join(
-        lines + [report_row(name, SETTINGS[name].replace(report=report)) for name in names for report in REPORTS]
+    return writer.table(
+        head, [report_row(name, SETTINGS[name].replace(report=report)) for name in names for report in REPORTS]
     )
 
 
 def report_row(name: str, skin: Skin) -> str:
     """One line of :func:`report_table`."""
     scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
-    times = " | ".join(f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes)
-    return f"| {name} | `{skin.report}` | {Derived(skin).record_bytes} | {times} |"
+    times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
+    return writer.line((name, f"`{skin.report}`", str(Derived(skin).record_bytes), *times))
 
 
 def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
@@ -179,11 +163,8 @@ def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
 
     ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, which the gateware keeps in every clock.
     """
-    lines = [
-        "| scene | sheet | clock | active rows, mean | raster scan | adaptive, mean / worst | gain |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    return "\n".join(lines + [gain_row(name, frames) for name, frames in scenes.items()])
+    head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
+    return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
 
 
 def gain_row(name: str, frames: np.ndarray) -> str:
@@ -203,21 +184,8 @@ def gain_row(name: str, frames: np.ndarray) -> str:
     scan_us = known.scan_clocks / known.clocks_per_us
     mean = (us**2).sum() / us.sum()
     active = frames.any(axis=2).sum(axis=1).mean()
-    return (
-        f"| {name} | {rows}x{columns} | {known.clocks_per_us} MHz | {active:.1f} | {scan_us:.0f} us | "
-        f"{mean:.1f} / {us.max():.1f} us | {scan_us / mean:.1f} |"
-    )
-
-
-def adaptive_skin(rows: int, columns: int) -> Skin:
-    """A sheet with 5 us settle and 1 us release a row, and the slowest clock that an adaptive scan of it can have."""
-    zones = min(64, math.ceil(rows / 2) * math.ceil(columns / 2))
-    for megahertz in (12, 24, 36, 48):
-        with contextlib.suppress(SkinError):
-            return Skin(
-                rows=rows, columns=columns, scan="adaptive", zone_capacity=zones, clock_hz=megahertz * 1_000_000
-            )
-    raise AssertionError("no clock is fast enough")
+    times = (f"{scan_us:.0f} us", f"{mean:.1f} / {us.max():.1f} us", f"{scan_us / mean:.1f}")
+    return writer.line((name, f"{rows}x{columns}", f"{known.clocks_per_us} MHz", f"{active:.1f}", *times))
 
 
 def built_in_scenes() -> dict[str, np.ndarray]:
@@ -240,39 +208,19 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     return {name: frames[:: max(1, len(frames) // RECORDED)][:RECORDED] for name, frames in recordings(folder).items()}
 
 
-TABLES: dict[str, Callable[[], str]] = {
+TABLES: writer.Tables = {
     "reference": reference_table,
     "labeller": labeller_table,
     "report": report_table,
     "gain": lambda: gain_table(built_in_scenes()),
 }
 if RECORDINGS.is_dir():  # else their tables stay as they are
-    TABLES["recorded"] = lambda: gain_table(recorded_scenes())
-    TABLES["labeller_recorded"] = lambda: recorded_table(recordings())
-
-
-def update(text: str, tables: Mapping[str, Callable[[], str]] = TABLES) -> str:
-    """The text of a page with each `<!-- figures: NAME -->` section that is in ``tables`` measured anew."""
-
-    def measured(match: re.Match[str]) -> str:
-        return f"{match[1]}\n{tables[match[2]]()}\n{match[3]}" if match[2] in tables else match[0]
-
-    return re.sub(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", measured, text, flags=re.DOTALL)
-
-
-def main(tables: Mapping[str, Callable[[], str]] = TABLES) -> int:
-    """Update the files named on the command line."""
-    parser = argparse.ArgumentParser(description="Measure the tables in these pages anew.")
-    parser.add_argument("pages", type=Path, nargs="+")
-    pages = [outputs.file(page, "page") for page in parser.parse_args().pages]
-    for page in pages:
-        for name, table in tables.items():  # each is in the page as soon as it is measured
-            before = page.read_text(encoding="utf-8")
-            if f"<!-- figures: {name} -->" in before:
-                page.write_text(update(before, {name: table}), encoding="utf-8")
-        print(f"measured {page}")
-    return 0
+    TABLES = {
+        **TABLES,
+        "recorded": lambda: gain_table(recorded_scenes()),
+        "labeller_recorded": lambda: recorded_table(recordings()),
+    }
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

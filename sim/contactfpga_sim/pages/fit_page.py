@@ -7,12 +7,11 @@ import shlex
 import sys
 from collections.abc import Callable
 
-from contactfpga.commands import fit_flags
+from contactfpga.commands.fit import add_flags, asked
 from contactfpga.console import interrupt
-from contactfpga_sim.pages import figures
+from contactfpga_sim.pages import writer
 from contactfpga_sim.studies import pool
 from contactfpga_sim.studies.fit import show
-from contactfpga_sim.studies.fit.command import asked
 from contactfpga_sim.studies.fit.search import fit
 
 EXAMPLES = {
@@ -28,18 +27,13 @@ def section(arguments: str) -> str:
     command = f"contactfpga fit {arguments}"
     print(command, file=sys.stderr)
     parser = argparse.ArgumentParser()
-    fit_flags.add(parser)
+    add_flags(parser)
     task, tried = asked(parser.parse_args(shlex.split(arguments)))
     with pool.executor(None, None) as executor, pool.progress() as step:
         found = fit(task, tried, executor, step)
     tables = (show.rows(found, impossible=False), show.reported(found))
     none = f"Skin itself refuses {len(found.impossible)} more settings."
-    return "\n\n".join((f"    {command}", *map(_markdown, tables), " ".join((*show.notes(found), none))))
-
-
-def _markdown(rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
+    return "\n\n".join((f"    {command}", *map(writer.table_of, tables), " ".join((*show.notes(found), none))))
 
 
 def _table(arguments: str) -> Callable[[], str]:
@@ -50,4 +44,4 @@ TABLES = {name: _table(arguments) for name, arguments in EXAMPLES.items()}
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -13,6 +13,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import volume
+from contactfpga_sim.pages import writer
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.scenes.families import FAMILIES, placements
 from contactfpga_sim.scenes.scene import CONTACTS
@@ -28,39 +29,30 @@ SEED = 20
 
 def labeller_table() -> str:
     """Over touches, over the shapes that break labellers, and the bound."""
-    lines = [
-        "| labeller | cells | connectivity | touches at every place: median / 99 % / worst "
-        "| shapes that break labellers, worst | bound |",
-        "|---|---|---|---|---|---|",
-    ]
+    place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
+    lines = []
     for size in (16, 32, 64):
         places = every_place(touches(Skin(rows=size, columns=size, settle_us=15.0)))
         for labeller in EXACT:
             for connectivity in (8, 4):
                 skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
                 lines.append(labeller_row(skin, places))
-    return "\n".join(lines[:2] + sorted(lines[2:], key=lambda line: line.split("|")[1]))
+    head = ("labeller", "cells", "connectivity", place, worst, "bound")
+    return writer.table(head, sorted(lines, key=lambda line: line.split("|")[1]))
 
 
 def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
     """One line of :func:`labeller_table`; ``places``: of :func:`every_place`."""
     worst = worst_last_record_clocks(skin)
-    return (
-        f"| `{skin.labeller}` | {skin.rows}x{skin.columns} | {skin.connectivity} "
-        f"| {spread(*places, skin.connectivity, skin.labeller)} clocks | {worst} clocks "
-        f"| {bound(skin.columns, skin.connectivity, skin.labeller)} |"
-    )
+    found = f"{spread(*places, skin.connectivity, skin.labeller)} clocks"
+    most = str(bound(skin.columns, skin.connectivity, skin.labeller))
+    sheet = f"{skin.rows}x{skin.columns}"
+    return writer.line((f"`{skin.labeller}`", sheet, str(skin.connectivity), found, f"{worst} clocks", most))
 
 
 def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
     """Over all (n, R, C) bool frames of each recording, as if the sheet ended after any of its rows."""
-    heads = (
-        "recording",
-        "sheet",
-        "connectivity",
-        *(f"`{labeller.name}`: median / 99 % / worst, bound" for labeller in EXACT),
-    )
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    lines = []
     for name, frames in recordings.items():
         _, rows, columns = frames.shape
         places = counted(last_rows(frames), columns)
@@ -69,8 +61,9 @@ def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
                 f"{spread(*places, connectivity, labeller)}, {bound(columns, connectivity, labeller)}"
                 for labeller in EXACT
             )
-            lines.append(f"| {name} | {rows}x{columns} | {connectivity} | {' | '.join(found)} |")
-    return "\n".join(lines)
+            lines.append(writer.line((name, f"{rows}x{columns}", str(connectivity), *found)))
+    spreads = (f"`{labeller.name}`: median / 99 % / worst, bound" for labeller in EXACT)
+    return writer.table(("recording", "sheet", "connectivity", *spreads), lines)
 
 
 def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:

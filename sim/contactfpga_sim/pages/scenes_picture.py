@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga import picture_style as style
 from contactfpga.console import interrupt
-from contactfpga.console import picture_style as style
 from contactfpga.cover import Cover, Ellipse, Part
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import contacts

@@ -13,7 +13,7 @@ from pathlib import Path
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import boards, build, sizes
-from contactfpga_sim.pages import figures
+from contactfpga_sim.pages import writer
 from contactfpga_sim.studies import size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
@@ -80,4 +80,4 @@ TABLES: dict[str, Callable[[], str]] = {
 
 
 if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: figures.main(TABLES)))
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

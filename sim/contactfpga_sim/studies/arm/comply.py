@@ -15,6 +15,9 @@ BACK_M = 1e-3
 FASTEST_M_S = 5.0
 """No faster push is looked for."""
 
+SHARES = (0.25, 0.5, 0.75, 1.0, 1.25)
+"""Of the fastest push that the arm yields to."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Push:
@@ -69,3 +72,9 @@ def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
         middle = (low + high) // 2
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low * resolution
+
+
+def pushes(case: Case) -> tuple[float, list[Push]]:
+    """The fastest push in m/s that the arm yields to, and what comes of pushes up to it and of a faster one."""
+    fastest = fastest_m_s(case)
+    return fastest, [pushed(case, share * fastest)[0] for share in SHARES]

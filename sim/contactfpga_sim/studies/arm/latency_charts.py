@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import dataclasses
 from collections.abc import Sequence
@@ -14,14 +13,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from contactfpga.console import outputs
-from contactfpga.console import picture_style as style
-from contactfpga.console.interrupt import Interrupted
+from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.arm import sweep
 from contactfpga_sim.studies.arm.case import Case, CaseError
 from contactfpga_sim.studies.arm.sweep import Point, Task
-from contactfpga_sim.studies.pool import executor, progress
 
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))
@@ -47,7 +43,7 @@ class Plan:
 
     @property
     def all(self) -> list[Task]:
-        """In the order in which :meth:`split` takes the points."""
+        """All of them."""
         groups = [self.force, self.limited, *self.sheet.values(), *self.speed.values(), *self.thick.values()]
         return [task for group in groups for task in group]
 
@@ -77,33 +73,12 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
     )
 
 
-def main(args: argparse.Namespace, case: Case) -> int:
-    """``contactfpga arm --charts``."""
+def check(case: Case) -> None:
+    """Raise :class:`CaseError` for a case that has no charts."""
     if case.control.behaviour != "reverse" or not case.link.speed_m_s:
         raise CaseError(
             f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
         )
-    folder = outputs.folder(args.output)
-    tasks = plan(case)
-    so_far: dict[Task, Point] = {}
-    try:
-        with executor(args.jobs, args.dask) as workers, progress() as step:
-            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
-    except KeyboardInterrupt:
-        raise Interrupted(_kept(so_far, len(tasks.all), folder)) from None
-    print(write_csv(found, folder / "arm-charts.csv"), flush=True)
-    for path in draw(case, tasks, found, folder):
-        print(path)
-    return 0
-
-
-def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
-    """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
-    again = "the same command goes on from there"
-    if not found:
-        return f"interrupted before the first of {of} runs was finished; {again}"
-    path = write_csv(found, folder / "arm-charts-so-far.csv")
-    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"
 
 
 def draw(

@@ -131,9 +131,3 @@ def push_lines(pushes: list[Push]) -> list[list[str]]:
             [f"{push.speed_m_s:.3f}", *(f"{value:.2f}" for value in numbers), f"{1e3 * push.yields_m:.1f}", back, ends]
         )
     return lines
-
-
-def markdown(lines: list[list[str]]) -> str:
-    """Headings and lines as a table of a page."""
-    ruled = [lines[0], ["---"] * len(lines[0]), *lines[1:]]
-    return "\n".join("| " + " | ".join(line) + " |" for line in ruled)

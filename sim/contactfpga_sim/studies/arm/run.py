@@ -10,7 +10,7 @@ from contactfpga.driver import driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.usb import PlantTransport
+from contactfpga_sim.studies.arm.plant_transport import PlantTransport
 from contactfpga_sim.studies.arm.world import WAYS, Faults, Moment, World
 
 AFTER_S = 0.25e-3

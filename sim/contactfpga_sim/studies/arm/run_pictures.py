@@ -9,7 +9,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from contactfpga.console import picture_style as style
+from contactfpga import picture_style as style
 from contactfpga_sim.studies.arm.run import Result
 
 LOOKS: tuple[dict[str, Any], ...] = (

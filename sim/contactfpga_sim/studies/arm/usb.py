@@ -1,15 +1,11 @@
-"""The way of the bytes: a USB serial chip, and a transport for the real driver on which time is that of the plant."""
+"""The USB serial chip between the board and the host."""
 
 from __future__ import annotations
 
 import collections
 import math
-from typing import TYPE_CHECKING
 
 from contactfpga_sim.studies.arm.parts import Usb
-
-if TYPE_CHECKING:
-    from contactfpga_sim.studies.arm.world import World
 
 
 class Chip:
@@ -36,28 +32,3 @@ class Chip:
     def frame_at(self, seconds: float) -> int:
         """Number of the host's frame at a time."""
         return math.floor(seconds / self._usb.frame_s + 1e-9)
-
-
-class PlantTransport:
-    """A :class:`contactfpga.driver.transport.Transport`: while the driver waits, arm and gateware go on."""
-
-    live, threaded = True, False
-    name = "arm://"
-
-    def __init__(self, world: World):
-        self._world = world
-
-    def read(self, timeout_s: float) -> bytes:
-        until = self._world.clock() + timeout_s
-        while not (data := self._world.delivered()) and self._world.clock() < until:
-            self._world.step()
-        return data
-
-    def write(self, data: bytes) -> None:
-        self._world.send(data)
-
-    def clock(self) -> float:
-        return self._world.clock()
-
-    def close(self) -> None:
-        pass

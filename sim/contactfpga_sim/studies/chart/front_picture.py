@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from contactfpga.console import picture_style as style
+from contactfpga import picture_style as style
 from contactfpga_sim.studies.chart.picture import LENGTHS_MM, ends, error, markers, reached_us
 from contactfpga_sim.studies.chart.study import Point, front
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 
@@ -11,7 +13,7 @@ EXTENT_MM = 160.0
 PITCHES_MM = (5.0, 10.0, 20.0)
 
 
-def sheet(pitch_mm: float, **settings) -> Skin:
+def sheet(pitch_mm: float, **settings: Any) -> Skin:
     """A square sheet of :data:`EXTENT_MM` with switches ``pitch_mm`` apart."""
     lines = round(EXTENT_MM / pitch_mm)
     return Skin(rows=lines, columns=lines, pitch_x_mm=pitch_mm, pitch_y_mm=pitch_mm, **settings)

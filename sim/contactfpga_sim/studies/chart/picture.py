@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
+from contactfpga import picture_style as style
 from contactfpga.choices import labellers, scans
-from contactfpga.console import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.chart.methods import METHODS
 from contactfpga_sim.studies.chart.study import Point, front

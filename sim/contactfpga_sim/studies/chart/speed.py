@@ -11,6 +11,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, Trace, predict
@@ -49,11 +50,11 @@ def touch_cycle(skin: Skin, share: float) -> int:
 
 
 def last_byte(skin: Skin, trace: Trace, cells: int) -> tuple[int, int] | None:
-    """Cycle in which the stop bit ends of the first frame that holds so many cells, and the frame's bytes; None where
+    """Cycle in which the stop bit ends of the first frame that holds this many cells, and the frame's bytes; None where
     the trace ends before."""
-    for frame in steady.frames(skin, trace):
-        if frame.cells == cells:
-            return frame.end, frame.bytes
+    for got in frames_in(skin, trace.bytes):
+        if got.frame.cells == cells:
+            return got.last + 10 * Derived(skin).bit_clocks, got.size
     return None
 
 

@@ -22,6 +22,9 @@ from contactfpga_sim.studies.chart import errors, speed
 from contactfpga_sim.studies.chart.errors import METRICS, Interval
 from contactfpga_sim.studies.chart.speed import Speed
 
+FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
+"""Those of the chart unless others are asked for."""
+
 PIECE = 125
 """Placements that are worked out together."""
 

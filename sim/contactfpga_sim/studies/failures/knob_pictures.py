@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contactfpga.console import picture_style as style
+from contactfpga import picture_style as style
 from contactfpga_sim.studies.failures.axes import Span, placed, rounded_up, shown
 from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
 from contactfpga_sim.studies.failures.rig import plural

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from contactfpga.console import tables, terminal
 from contactfpga.cover import table
 from contactfpga_sim.studies.chart.errors import METRICS, Interval
 from contactfpga_sim.studies.fit.cost import DEVICE
@@ -17,6 +18,25 @@ HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "byte
 """Baud is left out where all have the same."""
 
 METRIC_HEADS = ("scenes miscounted", "contacts missed", "barycenter", "area")
+
+
+def printed(found: Fit) -> None:
+    """Print tables and notes for people."""
+    _print(rows(found), bold="the answer")
+    _print(reported(found), keys=1)
+    for line in notes(found):
+        terminal.say(line)
+
+
+def printed_so_far(trials: Iterable[Trial]) -> None:
+    """Print what is known when the search was interrupted."""
+    _print(rows_so_far(trials))
+
+
+def _print(lines: Sequence[Sequence[str]], keys: int = 4, bold: str | None = None) -> None:
+    """Of the Skins what tells them apart comes first, and the verdict last."""
+    styles = {number: "bold" for number, line in enumerate(lines[1:]) if line[-1] == bold}
+    tables.show(lines, keys=keys, texts=[len(lines[0]) - 1] if keys > 1 else [], styles=styles)
 
 
 def rows(fit: Fit, impossible: bool = True) -> list[list[str]]:

@@ -5,22 +5,32 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from contactfpga.console import outputs
+from contactfpga.console import flags, outputs
 from contactfpga.console.interrupt import Interrupted
-from contactfpga_sim.pages import failures_page, figures
-from contactfpga_sim.studies.failures import knob_pictures
-from contactfpga_sim.studies.failures.catalogue import STUDIES
-from contactfpga_sim.studies.failures.knob import Turned
-from contactfpga_sim.studies.pool import progress
+
+if TYPE_CHECKING:
+    from contactfpga_sim.studies.failures.knob import Turned
+
+HELP = "Turn one knob after another until something breaks."
+EXTRA = "sim"
 
 
-def main(args: argparse.Namespace) -> int:
-    """Run the command: args.study (names or None for all), args.page (a file whose table is written anew, with its
-    pictures beside it in images/failures, or None), args.output (a folder for pictures and table)."""
-    for name in args.study or ():
-        if name not in STUDIES:
-            raise ValueError(f"--study {name!r} is not known; take one of {', '.join(STUDIES)}")
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
+    page = "Rewrite the table in this page, and its pictures in images/failures beside it."
+    parser.add_argument("--page", metavar="FILE", help=page)
+    flags.output(parser, "build/failures")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.pages import failures_page, writer
+    from contactfpga_sim.studies.failures.catalogue import STUDIES
+
+    names = flags.known("--study", args.study, list(STUDIES))
     if args.page and args.study:
         raise ValueError("--page takes all studies; leave --study out")
     folder = outputs.folder(args.output)
@@ -28,12 +38,11 @@ def main(args: argparse.Namespace) -> int:
     pictures = outputs.folder(path.parent / "images" / "failures", "--page") if path else folder
     turned: dict[str, dict[str, Turned]] = {}
     try:
-        _turn(args.study or list(STUDIES), turned)
+        _turn(names, turned)
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
     if path:
-        tables = {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures}
-        path.write_text(figures.update(path.read_text(encoding="utf-8"), tables), encoding="utf-8")
+        writer.write(path, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
     else:
         path = _write(turned, folder / "failures.md")
     print(path, flush=True)
@@ -42,6 +51,8 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
+    from contactfpga_sim.pages import failures_page
+
     path.write_text(failures_page.table(turned) + "\n", encoding="utf-8")
     return path
 
@@ -56,13 +67,19 @@ def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
 
 
 def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
+    from contactfpga_sim.studies.failures import knob_pictures
+    from contactfpga_sim.studies.failures.catalogue import STUDIES
+
     for name, methods in turned.items():
         (folder / f"{name}.svg").write_text(knob_pictures.svg(STUDIES[name], methods), encoding="utf-8")
         print(folder / f"{name}.svg")
 
 
 def _turn(names: list[str], turned: dict[str, dict[str, Turned]]) -> None:
-    """Turn the knobs one after the other; each is in ``turned`` as soon as it is done."""
+    """Turn the knobs one after another; each is in ``turned`` as soon as it is done."""
+    from contactfpga_sim.studies.failures.catalogue import STUDIES
+    from contactfpga_sim.studies.pool import progress
+
     runs = sum(len(STUDIES[name].runs) for name in names)
     with progress() as step:
         for name in names:

@@ -1,4 +1,4 @@
-"""`contactfpga cover design` and `contactfpga cover figures`."""
+"""`contactfpga cover design`: foam, thickness and pitch for an arm, a switch and limits."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import argparse
 import dataclasses
 from typing import Any
 
-from contactfpga.commands.cover import KPA, MM, UNSOLVED, notes, say, table
-from contactfpga.console import outputs
+from contactfpga.commands.cover import units
+from contactfpga.commands.cover.printing import KPA, MM, notes, say, table
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.design import Candidate, Design, Thin, design, margin
 from contactfpga.cover.sense import Sense
 from contactfpga.cover.task import Task
+from contactfpga.errors import UNSOLVED
+
+HELP = "Find material, thickness and pitch for an arm, a switch and limits."
 
 HEADS = ("foam", "E kPa", "pressed mm", "for ms", "peak N", "thick mm", "kg/m2", "least N", "pitch mm", "binds")
 THIN_HEADS = (
@@ -25,12 +28,14 @@ THIN_HEADS = (
 )
 
 
-def main(args: argparse.Namespace) -> int:
-    """Run the command."""
-    return _design(args) if args.topic == "design" else _figures(args)
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument("file", metavar="FILE.toml", help="Arm, impact, switch and limits; see examples/.")
+    units.json_flag(parser)
 
 
-def _design(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
     found = design(Task.load(args.file))
     status = 0 if found.best else UNSOLVED
     if args.json:
@@ -141,23 +146,3 @@ def _candidate(one: Candidate) -> dict[str, Any]:
 
 def _number(sensed: Sense | None) -> float | None:
     return None if sensed is None or isinstance(sensed.value, NoSolution) else sensed.value
-
-
-def _figures(args: argparse.Namespace) -> int:
-    folder = outputs.folder(args.output)
-    from contactfpga.cover import drawing, line, paper  # matplotlib, which only drawing needs
-
-    task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
-    data = line.read(args.data) if args.data else None
-    files = drawing.draw(folder, args.format, task, data)
-    known: dict[str, Any] = {"files": [str(file) for file in files]}
-    fitted = line.fit(*data) if data else None
-    if fitted:
-        known |= {"stiffness_n_m": fitted.stiffness_n_m, "correlation": fitted.correlation}
-    if args.json:
-        return say(known)
-    for file in files:
-        print(f"drew {file}")
-    if fitted:
-        print(f"line: {fitted.stiffness_n_m / MM:.4g} N/mm, correlation {fitted.correlation:.5f}")
-    return 0

@@ -1,4 +1,4 @@
-"""A board opened from command-line arguments, and a display that follows it."""
+"""A display that follows a board."""
 
 from __future__ import annotations
 
@@ -12,17 +12,11 @@ from rich.console import Console, RenderableType
 from rich.live import Live
 
 from contactfpga.console import terminal
-from contactfpga.driver import driver
-from contactfpga.driver.driver import Board
+from contactfpga.driver.board import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.zones.zone import Zones
 
 REFRESH_US = 66_667
-
-
-def connect(args: argparse.Namespace, record: str | None = None) -> Board:
-    """The board that the arguments of a command name."""
-    return driver.open(args.port, args.skin, baud=args.baud, record=record, timeout=args.timeout)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +30,7 @@ class Room:
     unicode: bool
 
     def without(self, lines: int) -> Room:
-        """The room that is left when so many lines are taken."""
+        """The room that is left when this many lines are taken."""
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
@@ -51,7 +45,7 @@ def show(board: Board, args: argparse.Namespace, render: Render) -> int:
         return 0
     if not terminal.of().live:
         if sys.stdout.isatty():
-            what = "contactfpga: nothing can be drawn over here, so the last frame is shown at the end"
+            what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
             terminal.say(what, sys.stderr, hang=2)
         return _last(board, args, console, render)
     with Live(console=console, auto_refresh=False) as live:

@@ -1,0 +1,108 @@
+"""`contactfpga arm`: the experiment of the paper's Section IV, its table and its pictures."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactfpga.console import flags, numbers, outputs, terminal
+from contactfpga.console.interrupt import Interrupted
+from contactfpga.skin import Skin
+
+if TYPE_CHECKING:
+    from contactfpga_sim.studies.arm.case import Case
+    from contactfpga_sim.studies.arm.sweep import Point, Task
+
+HELP = "Run the robot arm into a human arm and see what force results."
+EXTRA = "sim"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
+    parser.add_argument("--case", default="paper", metavar="NAME", help=case)
+    late, usual = numbers.number(0, 10_000, "ms"), "Latency from the switch to the controller (default: the paper's 6)."
+    parser.add_argument("--latency", type=late, default=6.0, metavar="MS", help=usual)
+    parser.add_argument("--skin", metavar="FILE", help="Skin of the sheet (default: the reference Skin).")
+    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
+    charts = "Draw force, safe speed and thickness against latency instead."
+    parser.add_argument("--charts", action="store_true", help=charts)
+    flags.workers(parser)
+    flags.output(parser, "build/arm")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.studies.arm.case import Case
+
+    case = Case.load(args.case)
+    if args.charts:
+        return _charts(args, case)
+    return _pushes(args, case) if case.control.behaviour == "comply" else _contact(args, case)
+
+
+def _contact(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga.console import tables
+    from contactfpga_sim.studies.arm import report, run_pictures
+
+    skin = Skin.load(args.skin) if args.skin else None
+    folder = None if args.json else outputs.folder(args.output)
+    found = report.columns(case, args.case, 1e-3 * args.latency, skin)
+    if folder is None:
+        print(json.dumps(report.as_json(found, args.case), indent=2))
+        return 0
+    title = f"Case {args.case}: time counts from the touch, {case.link.speed_m_s:g} m/s"
+    tables.show(report.table(found, args.case == "paper"), title=title)
+    for note in report.NOTES if args.case == "paper" else ():
+        terminal.say(note)
+    for path in run_pictures.pictures(found, folder):
+        print(path)
+    return 0
+
+
+def _pushes(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga.console import tables
+    from contactfpga_sim.studies.arm import comply, report
+
+    fastest, pushes = comply.pushes(case)
+    if args.json:
+        known = {"case": args.case, "fastest_m_s": fastest, "pushes": [dataclasses.asdict(push) for push in pushes]}
+        print(json.dumps(known, indent=2))
+        return 0
+    title = f"Case {args.case}: pushed by {1e3 * case.touch[0].push_m:g} mm and let go"
+    tables.show(report.push_lines(pushes), title=title)
+    terminal.say(f"The torque stays below {case.control.torque_limit_nm:g} Nm up to a push of {fastest:.3f} m/s.")
+    return 0
+
+
+def _charts(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga_sim.studies.arm import latency_charts, sweep
+    from contactfpga_sim.studies.pool import executor, progress
+
+    latency_charts.check(case)
+    folder = outputs.folder(args.output)
+    tasks = latency_charts.plan(case)
+    so_far: dict[Task, Point] = {}
+    try:
+        with executor(args.jobs, args.dask) as workers, progress() as step:
+            found = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step, so_far)))
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(so_far, len(tasks.all), folder)) from None
+    print(latency_charts.write_csv(found, folder / "arm-charts.csv"), flush=True)
+    for path in latency_charts.draw(case, tasks, found, folder):
+        print(path)
+    return 0
+
+
+def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
+    """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
+    from contactfpga_sim.studies.arm import latency_charts
+
+    again = "run the same command again to go on from there"
+    if not found:
+        return f"interrupted before the first of {of} runs was finished; {again}"
+    path = latency_charts.write_csv(found, folder / "arm-charts-so-far.csv")
+    return f"interrupted; {len(found)} of {of} runs are in {path}; {again}"

@@ -1,0 +1,90 @@
+"""`contactfpga chart`: the picture of speed against accuracy, and its numbers."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactfpga.choices import labellers
+from contactfpga.console import flags, numbers, outputs
+from contactfpga.console.interrupt import Interrupted
+from contactfpga.skin import Skin
+
+if TYPE_CHECKING:
+    from contactfpga_sim.studies.chart.study import Point, Task
+
+HELP = "Chart what speed costs in accuracy."
+EXTRA = "chart"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("--method", action="append", metavar="NAME", help="Chart only this method; can be repeated.")
+    own = "Add this labeller, module:attribute of your own, to the methods; can be repeated."
+    parser.add_argument("--labeller", action="append", metavar="NAME", help=own)
+    parser.add_argument("--family", action="append", metavar="NAME", help="Use only these scenes; can be repeated.")
+    count, usual = numbers.whole(1, 1_000_000), "Number of scenes per point (default: 1000)."
+    parser.add_argument("--placements", type=count, default=1000, metavar="N", help=usual)
+    parser.add_argument("--seed", type=numbers.SEED, default=0, help="Seed of the placements (default: 0).")
+    flags.workers(parser)
+    parser.add_argument("--no-size", action="store_true", help="Leave out place and route.")
+    flags.output(parser, "build/chart")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.studies import pool
+    from contactfpga_sim.studies.chart import host, picture
+    from contactfpga_sim.studies.chart import numbers as table
+    from contactfpga_sim.studies.chart.study import study
+
+    tasks = _tasks(args)
+    folder = outputs.folder(args.output)
+    so_far: dict[Task, Point] = {}
+    try:
+        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+            points = [host.timed(point) for point in study(tasks, executor, not args.no_size, step, so_far)]
+    except KeyboardInterrupt:
+        raise Interrupted(_kept([so_far[task] for task in tasks if task in so_far], len(tasks), folder)) from None
+    path = folder / "chart.csv"
+    table.write(points, path)
+    print(path, flush=True)
+    picture.save(table.read(path, {task.method: task.skin for task in tasks}), folder)
+    for name in ("chart.png", "chart.svg"):
+        print(folder / name)
+    return 0
+
+
+def _tasks(args: argparse.Namespace) -> list[Task]:
+    from contactfpga_sim.scenes.families import FAMILIES
+    from contactfpga_sim.studies.chart.methods import METHODS
+    from contactfpga_sim.studies.chart.study import FAMILIES_DRAWN, Task
+
+    skins = METHODS | _own(args)
+    methods = flags.known("--method", args.method, list(skins))
+    flags.known("--family", args.family, list(FAMILIES))
+    return [
+        Task(method, skins[method], family, args.placements, args.seed)
+        for family in args.family or FAMILIES_DRAWN
+        for method in methods
+    ]
+
+
+def _own(args: argparse.Namespace) -> dict[str, Skin]:
+    """The methods of the labellers that are not built in."""
+    from contactfpga_sim.studies.chart.methods import by
+
+    return {name: skin for one in args.labeller or () for name, skin in by(labellers.find(one)).items()}
+
+
+def _kept(points: list[Point], of: int, folder: Path) -> str:
+    """Where the points are that were finished, in a file of their own: a whole chart from before stays."""
+    from contactfpga_sim.studies.chart import numbers as table
+
+    again = "run the same command again to go on from there"
+    if not points:
+        return f"interrupted before the first of {of} points was finished; {again}"
+    path = folder / "chart-so-far.csv"
+    table.write(points, path)
+    return f"interrupted; {len(points)} of {of} points are in {path}, without sizes and the host's times; {again}"

@@ -1,0 +1,44 @@
+"""`contactfpga cover figures`: the paper's curves, the impact over time and the design map."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from contactfpga.commands.cover.printing import MM, say
+from contactfpga.console import flags, outputs
+from contactfpga.cover import line, paper
+from contactfpga.cover.task import Task
+
+HELP = "Draw the paper's curves, the impact over time and the design map."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument("--design", metavar="FILE.toml", help="Case to draw (default: the paper's).")
+    data = "Forces in N and deformations in m; draw their line too."
+    parser.add_argument("--data", metavar="FILE.csv", help=data)
+    flags.output(parser, "build/cover")
+    parser.add_argument("--format", choices=("png", "svg"), default="png", help="Format (default: png).")
+    parser.add_argument("--json", action="store_true", help="Print in JSON what was drawn.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    folder = outputs.folder(args.output)
+    from contactfpga.cover import drawing  # matplotlib, which only drawing needs
+
+    task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
+    data = line.read(args.data) if args.data else None
+    files = drawing.draw(folder, args.format, task, data)
+    known: dict[str, Any] = {"files": [str(file) for file in files]}
+    fitted = line.fit(*data) if data else None
+    if fitted:
+        known |= {"stiffness_n_m": fitted.stiffness_n_m, "correlation": fitted.correlation}
+    if args.json:
+        return say(known)
+    for file in files:
+        print(f"drew {file}")
+    if fitted:
+        print(f"line: {fitted.stiffness_n_m / MM:.4g} N/mm, correlation {fitted.correlation:.5f}")
+    return 0

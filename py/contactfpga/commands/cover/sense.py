@@ -1,0 +1,141 @@
+"""`contactfpga cover sense`: the force that closes a switch under the cover, or how far a force reaches."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from contactfpga.commands.cover import units
+from contactfpga.commands.cover.printing import MM, notes, say, table
+from contactfpga.cover import elastic, sense
+from contactfpga.cover.answer import CoverError, NoSolution
+from contactfpga.cover.hertz import Ball
+from contactfpga.cover.sense import Model, Sense, Sheet
+from contactfpga.cover.switch import Switch
+from contactfpga.errors import UNSOLVED
+
+HELP = "Compute the force that closes a switch under the cover, or how far a force reaches."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    asked = parser.add_argument_group("what is asked")
+    offset = "Distance from the contact to the switch: find the force."
+    asked.add_argument("--offset", type=units.LENGTH_FROM_0, metavar="M", help=offset)
+    asked.add_argument("--force", type=units.NEWTON, metavar="N", help="Force: find its reach and the pitch.")
+    pitch = "Pitch of a square sheet: find its smallest force."
+    asked.add_argument("--pitch", type=units.LENGTH, metavar="M", help=pitch)
+    thickness = "Thickness of the cover; without it, find the best one."
+    asked.add_argument("--thickness", type=units.LENGTH, metavar="M", help=thickness)
+    switch, usual = parser.add_argument_group("switch"), Switch()
+    closing = f"Force that closes the switch (default: {usual.force_n:g})."
+    switch.add_argument("--switch-force", type=units.NEWTON, default=usual.force_n, metavar="N", help=closing)
+    face = f"Area of its face (default: {usual.area_m2:g})."
+    switch.add_argument("--switch-area", type=units.FACE, default=usual.area_m2, metavar="M2", help=face)
+    ball = parser.add_argument_group("what touches, if known")
+    ball.add_argument("--modulus", type=units.PASCAL, metavar="PA", help="Young's modulus of the cover.")
+    ball.add_argument("--poisson", type=units.POISSON, default=0.5, help="Poisson's ratio of the cover (default: 0.5).")
+    ball.add_argument("--effective-radius", type=units.LENGTH, metavar="M", help="R* with 1/R* = 1/R + 1/R'.")
+    model = parser.add_argument_group("model (default: the simplest within the tolerance)")
+    within = "What the cover is: a half-space, or a layer on a rigid base."
+    model.add_argument("--model", choices=("halfspace", "bonded", "frictionless"), help=within)
+    model.add_argument("--contact", choices=("point", "patch"), help="Contact of --model (default: point).")
+    share = "Largest share by which the answer may be off (default: 0.05); refuse --model beyond it."
+    model.add_argument("--tolerance", type=units.SHARE, help=share)
+    units.json_flag(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    model = Model(args.model, args.contact or "point") if args.model else None
+    if args.contact and not args.model:
+        raise CoverError(
+            f"--contact is {args.contact!r}; name the model, too: --model halfspace, bonded or frictionless"
+        )
+    if args.offset is None and args.force is None and args.pitch is None:
+        raise CoverError("nothing is asked; give --offset, --force or --pitch")
+    switch = Switch(args.switch_force, args.switch_area)
+    if args.thickness is None:
+        return _best_thickness(args, switch)
+    sheet = Sheet(switch, args.thickness, _touching(args))
+    found: dict[str, Any] = {}
+    lines: list[tuple[str, str]] = []
+    judged: list[Sense] = []
+    if args.offset is not None:
+        one = sheet.detects(args.offset, model, args.tolerance)
+        _answer(found, lines, one, "force_n", f"force that closes a switch {MM * args.offset:.4g} mm away", 1, "N")
+        judged.append(one)
+    if args.pitch is not None:
+        one = sheet.detects(sense.worst_offset_m(args.pitch), model, args.tolerance)
+        name = "sheet_force_n" if args.offset is not None else "force_n"
+        _answer(found, lines, one, name, f"smallest force sure to be felt, pitch {MM * args.pitch:.4g} mm", 1, "N")
+        judged.append(one)
+    if args.force is not None:
+        one = sheet.reaches(args.force, model, args.tolerance)
+        _answer(found, lines, one, "reach_m", f"reach of {args.force:.4g} N", MM, "mm")
+        judged.append(one)
+        if not isinstance(one.value, NoSolution):
+            found["pitch_m"] = sense.pitch_m(one.value)
+            lines.append(("pitch that reach allows", f"{MM * found['pitch_m']:.4g} mm"))
+    last = judged[0]
+    found |= {
+        "model": last.model.within,
+        "contact": last.model.contact,
+        "reference": str(sheet.reference),
+        "error": last.error,
+        "dropped": list(last.dropped),
+        "notes": list(dict.fromkeys(note for one in judged for note in one.notes)),
+    }
+    unsolved = any(isinstance(one.value, NoSolution) for one in judged)
+    if args.json:
+        return say(found) or (UNSOLVED if unsolved else 0)
+    lines.append(("model", str(last.model)))
+    if last.error is not None and last.model != sheet.reference:
+        lines.append(("off from the reference by", f"{100 * last.error:+.1f} % ({sheet.reference})"))
+    if last.dropped:
+        lines.append(("left out", ", ".join(last.dropped)))
+    table(*lines)
+    return notes(found["notes"]) or (UNSOLVED if unsolved else 0)
+
+
+def _answer(
+    found: dict[str, Any], lines: list[tuple[str, str]], one: Sense, name: str, title: str, scale: float, unit: str
+) -> None:
+    if isinstance(one.value, NoSolution):
+        found[name] = None
+        found["no_solution"] = one.value.reason
+        lines.append((title, str(one.value)))
+        return
+    found[name] = one.value
+    lines.append((title, f"{scale * one.value:.5g} {unit}"))
+    if not isinstance(one.reference, NoSolution):
+        found[f"reference_{name}"] = one.reference
+
+
+def _best_thickness(args: argparse.Namespace, switch: Switch) -> int:
+    if args.force is not None or (args.offset is None) == (args.pitch is None):
+        raise CoverError("thickness is missing; the best one is found for --offset or --pitch alone")
+    if args.contact == "patch":
+        raise CoverError("thickness is missing; the best one is found for a point force only")
+    offset = args.offset if args.offset is not None else sense.worst_offset_m(args.pitch)
+    within = args.model or "bonded"
+    thickness = sense.best_thickness_m(offset, within)
+    force = Sheet(switch, thickness).force_n(Model(within, "point"), offset)
+    known = {"thickness_m": thickness, "force_n": force, "offset_m": offset, "model": within, "contact": "point"}
+    if args.json:
+        return say(known)
+    table(
+        (f"best thickness, {MM * offset:.4g} mm from a switch", f"{MM * thickness:.5g} mm"),
+        ("force that closes it", f"{force:.5g} N"),
+        ("model", f"{within}, point"),
+    )
+    return 0
+
+
+def _touching(args: argparse.Namespace) -> Ball | None:
+    if args.modulus is None and args.effective_radius is None:
+        return None
+    if args.modulus is None or args.effective_radius is None:
+        missing = "--modulus" if args.modulus is None else "--effective-radius"
+        raise CoverError(f"{missing} is missing; a patch needs the modulus and R*")
+    return Ball(args.effective_radius, elastic.effective_modulus_pa(args.modulus, args.poisson))

@@ -1,0 +1,169 @@
+"""`contactfpga fit`: the cheapest Skin that is good enough for given scenes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from contactfpga.choices import labellers
+from contactfpga.choices.scans import SCANS
+from contactfpga.console import flags, numbers, outputs
+from contactfpga.console.interrupt import Interrupted
+from contactfpga.cover import load_cover
+from contactfpga.errors import UNSOLVED
+from contactfpga.skin import Skin
+
+if TYPE_CHECKING:
+    from contactfpga_sim.studies.fit.candidates import Candidate
+    from contactfpga_sim.studies.fit.trial import SoFar, Task
+
+HELP = "Find the cheapest Skin that is good enough for given scenes."
+EXTRA = "chart"
+
+PERCENT = numbers.number(0, 100, "%", above=True)
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    what = "A .toml file of scenes, a .npz or .npy recording, or the name of a family or scene (docs/scenes.md)."
+    parser.add_argument("scenes", nargs="+", metavar="SCENES", help=what)
+    _goal_flags(parser.add_argument_group("what the Skin must meet for each of SCENES; none means no limit"))
+    _candidate_flags(parser.add_argument_group("what is tried"))
+    count, usual = numbers.whole(2, 1_000_000), "Number of scenes to choose with (default: the file's, or 500)."
+    parser.add_argument("--placements", type=count, metavar="N", help=usual)
+    above = "Count cells of recordings above this as pressed; needed for numbers."
+    parser.add_argument("--threshold", type=numbers.CELL, help=above)
+    parser.add_argument("--seed", type=numbers.SEED, help="Seed of the places (default: the file's, or 0).")
+    parser.add_argument("--quick", action="store_true", help="Do not look which of the refused Skins are cheaper.")
+    flags.workers(parser)
+    parser.add_argument("--output", metavar="FILE", help="Write the Skin to this TOML file.")
+    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+
+
+def _goal_flags(goals: argparse._ArgumentGroup) -> None:
+    far, late = numbers.number(0, 10_000, "mm", above=True), numbers.number(0, 1e9, "us", above=True)
+    area = numbers.number(0, 100_000, "%", above=True)
+    _limit(goals, "--miscounted", "PERCENT", PERCENT, 5.0, "Scenes whose number of zones is not that of contacts")
+    _limit(goals, "--missed", "PERCENT", PERCENT, 5.0, "Contacts without a zone")
+    _limit(goals, "--barycenter-mm", "MM", far, 5.0, "Mean distance of barycenters from those of the contacts")
+    _limit(goals, "--area", "PERCENT", area, None, "Mean error of a contact's area")
+    _limit(goals, "--latency-us", "US", late, 1000.0, "Worst time from the touch to the last byte")
+
+
+def _limit(
+    goals: argparse._ArgumentGroup,
+    flag: str,
+    unit: str,
+    kind: Callable[[str], float],
+    usual: float | None,
+    what: str,
+) -> None:
+    shown = "none" if usual is None else f"{usual:g}"
+    told = f"{what} (default: {shown}).".replace("%", "%%")
+    goals.add_argument(flag, type=numbers.or_none(kind), default=usual, metavar=unit, help=told)
+
+
+def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
+    fixed = "Skin that gives all settings but pitch, labeller and scan, which are chosen."
+    tried.add_argument("--skin", metavar="FILE", help=fixed)
+    pitch = "Try only this pitch; can be repeated."
+    tried.add_argument("--pitch-mm", type=numbers.PITCH_MM, action="append", metavar="MM", help=pitch)
+    labeller = "Try only this labeller, cells, or module:attribute of your own; can be repeated."
+    tried.add_argument("--labeller", action="append", metavar="NAME", help=labeller)
+    tried.add_argument("--scan", action="append", metavar="NAME", help="Try only this scan; can be repeated.")
+    baud = "Try this baud rate; can be repeated (default: the Skin's)."
+    tried.add_argument("--baud", type=numbers.BAUD, action="append", help=baud)
+    host = "Accept bitmaps too: the host finds their zones in this time."
+    tried.add_argument("--host-us", type=numbers.number(0, 1e9, "us"), metavar="US", help=host)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.studies import pool
+    from contactfpga_sim.studies.fit import show
+    from contactfpga_sim.studies.fit.search import fit
+
+    output = outputs.file(args.output) if args.output else None
+    task, tried = asked(args)
+    so_far: SoFar = {}
+    try:
+        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+            found = fit(task, tried, executor, step, so_far)
+    except KeyboardInterrupt:
+        raise Interrupted(_kept(so_far, len(tried), args.json)) from None
+    if args.json:
+        print(json.dumps(show.plain(found)), flush=True)
+    else:
+        show.printed(found)
+    if output and found.answer:
+        command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
+        output.write_text(show.toml(found, command), encoding="utf-8")
+        if not args.json:
+            print(f"Skin: {output}")
+    return 0 if found.answer and not found.broken else UNSOLVED
+
+
+def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
+    """The task, and all candidates; raises ValueError for what cannot be."""
+    from contactfpga_sim.studies.fit import candidates
+    from contactfpga_sim.studies.fit.goals import Goals
+    from contactfpga_sim.studies.fit.sources import default_count, source
+    from contactfpga_sim.studies.fit.trial import Task
+
+    base = Skin.load(args.skin) if args.skin else None
+    cover = load_cover(args.skin) if args.skin else None
+    sources = tuple(source(name, args.seed, args.threshold, cover) for name in args.scenes)
+    goals = Goals(
+        miscounted=_share(args.miscounted),
+        missed=_share(args.missed),
+        barycenter_mm=args.barycenter_mm,
+        area=_share(args.area),
+        latency_us=args.latency_us,
+    )
+    count = default_count(sources) if args.placements is None else args.placements
+    for one in sources:
+        goals.check_count(one.most(count))
+    tried = candidates.candidates(
+        base or Skin(),
+        candidates.pitches_for(base, sources, args.pitch_mm),
+        candidates.size_for(base, sources),
+        _methods(args.labeller),
+        flags.known("--scan", args.scan, list(SCANS)),
+        args.baud,
+    )
+    return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover), tried
+
+
+def _methods(names: list[str] | None) -> list[dict[str, Any]]:
+    """Those of the labellers named, or of ``cells``: the host labels them."""
+    from contactfpga_sim.studies.fit.candidates import METHODS, by
+
+    if not names:
+        return list(METHODS)
+    return [
+        method
+        for name in dict.fromkeys(names)
+        for method in ([{"report": "cells"}] if name == "cells" else by(labellers.find(name)))
+    ]
+
+
+def _share(percent: float | None) -> float | None:
+    return None if percent is None else percent / 100
+
+
+def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
+    """Print what is known of the candidates; what is to be said of that."""
+    from contactfpga_sim.studies.fit import show
+
+    again = "run the same command again to go on from there"
+    if not so_far:
+        return f"interrupted before the first of {of} candidates was measured; {again}"
+    if as_json:
+        print(json.dumps(show.plain_so_far(so_far.values())), flush=True)
+    else:
+        show.printed_so_far(so_far.values())
+    return f"interrupted; of {of} candidates {len(so_far)} were measured, and no answer was chosen; {again}"

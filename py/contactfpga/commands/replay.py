@@ -1,0 +1,54 @@
+"""`contactfpga replay`: recorded frames through the compiled gateware."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+
+from contactfpga.console import numbers, terminal
+from contactfpga.skin import limits
+
+HELP = "Send recorded frames through the compiled gateware."
+EXTRA = "sim"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("frames", metavar="FRAMES.npy", help="Array (frames, rows, columns) of bool or numbers.")
+    joined = "Neighbors of a cell: 8 with corners, 4 without (default: 8)."
+    parser.add_argument("--connectivity", type=int, choices=(4, 8), default=8, help=joined)
+    above = "Count cells above this as pressed; needed for numbers."
+    parser.add_argument("--threshold", type=numbers.CELL, help=above)
+    pitch = "Distance between rows and between columns in mm (default: 10)."
+    parser.add_argument("--pitch-mm", type=numbers.PITCH_MM, default=10.0, help=pitch)
+    bits = numbers.whole(0, limits.MAX_BARYCENTER_BITS)
+    divided = "Divide barycenters on the board, to 1/2^K cell."
+    parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
+    parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.board import replay
+
+    frames, skin = replay.load(args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits)
+    started = time.monotonic()
+    if args.json:
+        for index, result in enumerate(replay.replay(frames, skin)):
+            print(json.dumps(replay.to_json(index, result, skin)))
+        return 0
+    counts, late = [0], [0]
+    for result in replay.replay(frames, skin):
+        counts.append(result.frame.zones)
+        late.append(result.last_record or 0)
+    seconds = time.monotonic() - started
+    for title, what in (
+        ("frames", f"{len(frames)} of {skin.rows}x{skin.columns}, {skin.connectivity}-connectivity"),
+        ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
+        ("last record", f"at most {max(late)} clocks after a frame's last row"),
+        ("speed", f"{len(frames) / seconds:,.0f} frames per second, once compiled"),
+    ):
+        terminal.say(f"{title:20}{what}", hang=20)
+    terminal.say("Every frame came back exactly once. Use --json for one JSON object per frame.")
+    return 0

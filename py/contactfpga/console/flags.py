@@ -1,0 +1,52 @@
+"""Flags that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.console import numbers
+from contactfpga.driver import driver
+from contactfpga.driver.driver import Board
+
+PORT = "Device path, sim:// or replay://FILE (default: the one supported board that is plugged in)."
+
+
+def connection(parser: argparse.ArgumentParser) -> None:
+    """What :func:`opened` takes."""
+    parser.add_argument("port", nargs="?", metavar="PORT", help=PORT)
+    skin = "Require a board built from this Skin, and use its baud rate."
+    parser.add_argument("--skin", metavar="FILE", help=skin)
+    parser.add_argument("--baud", type=numbers.BAUD, help="Bits per second (default: the Skin's, or 3000000).")
+    wait = "Seconds to wait for the board (default: 1)."
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
+
+
+def once(parser: argparse.ArgumentParser) -> None:
+    """Of commands that follow a board."""
+    parser.add_argument("--once", action="store_true", help="Ask for one frame, show it, and exit.")
+
+
+def opened(args: argparse.Namespace, record: str | None = None) -> Board:
+    """The board that the arguments of a command name."""
+    return driver.open(args.port, args.skin, baud=args.baud, record=record, timeout=args.timeout)
+
+
+def workers(parser: argparse.ArgumentParser) -> None:
+    """Where the pieces of a long computation run."""
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")
+    dask = "Send the work to the Dask cluster with this scheduler."
+    parser.add_argument("--dask", metavar="ADDRESS", help=dask)
+
+
+def output(parser: argparse.ArgumentParser, folder: str) -> None:
+    """A folder for results."""
+    usual = f"Folder for the results (default: {folder})."
+    parser.add_argument("--output", metavar="DIR", default=folder, help=usual)
+
+
+def known(option: str, names: list[str] | None, choices: list[str]) -> list[str]:
+    """The names given, or all there are; raises ValueError for one that is not among them."""
+    for name in names or ():
+        if name not in choices:
+            raise ValueError(f"{option} {name!r} is not known; take one of: {'; '.join(choices)}")
+    return names or choices

@@ -1,0 +1,111 @@
+"""Frames as rich shows them: the sheet drawn as large as there is room for, and what is known besides."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from contactfpga.console import drawn_sheet, terminal
+from contactfpga.console.live import Room
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
+from contactfpga.zones.zone import Zones
+
+BESIDE = 3
+"""Characters between the sheet and the table."""
+
+LEGEND_LINES = 2
+
+TABLE_LINES = 6
+"""Of a table: title, head, rules and caption."""
+
+NAMED = 12
+"""Pressed cells whose places are written out."""
+
+
+def zones_view(board: Board, zones: Zones, room: Room) -> RenderableType:
+    """The sheet, with the table of its zones beside it or below."""
+    below = status(board, zones, room.width)
+    left = room.without(below.count("\n") + 1 + LEGEND_LINES)
+    listed = table(zones, left.height)
+    across = listed.__rich_measure__(room.console, room.console.options).maximum
+    scale, beside = _layout(zones, left, across)
+    drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
+    shown: list[RenderableType]
+    if beside:
+        both = Table.grid(padding=(0, BESIDE))
+        both.add_row(_styled(drawing), listed)
+        shown = [both]
+    else:
+        high = drawn_sheet.size(zones, scale)[1]
+        shown = [_styled(drawing), table(zones, left.without(high).height)]
+    return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+
+
+def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
+    """The sheet, with the places of its pressed cells below; for a board that sends cells."""
+    assert zones.cells is not None
+    places = [f"({row}, {column})" for row, column in zip(*zones.cells.nonzero())]
+    named = [*places[:NAMED], *([f"and {len(places) - NAMED} more"] if len(places) > NAMED else [])]
+    pressed = terminal.listed("pressed (row, column): ", named or ["none"], room.width)
+    below = f"{pressed}\n{status(board, zones, room.width)}"
+    left = room.without(below.count("\n") + 1 + LEGEND_LINES)
+    scale = drawn_sheet.scales(zones, left.width, left.height)[0]
+    drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
+    return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+
+
+def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
+    """The scale of the drawing, and whether the table stands beside it. Beside it is better than large: it is read
+    with the sheet, and stays in sight."""
+    for scale in drawn_sheet.scales(zones, room.width - BESIDE - table_wide, room.height):
+        if drawn_sheet.size(zones, scale)[0] + BESIDE + table_wide <= room.width:
+            return scale, True
+    return drawn_sheet.scales(zones, room.width, room.height)[0], False
+
+
+def table(zones: Zones, lines: int | None = None) -> Table:
+    """The zones, the first of them where there are lines for no more."""
+    most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
+    left_out = len(zones) - most
+    title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
+    caption = f"and {left_out} more" if left_out > 0 else None
+    made = Table(title=title, caption=caption)
+    for heading in ("cells", "mm²", "x mm", "y mm"):
+        made.add_column(heading, justify="right", no_wrap=True)
+    for zone in zones[:most]:
+        place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
+        made.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", *place)
+    return made
+
+
+def _mask(board: Board) -> drawn_sheet.Mask:
+    """The switches that the board's Skin leaves out; none where only its hello is known."""
+    try:
+        return board.skin.mask
+    except ContactFPGAError:
+        return ()
+
+
+def _styled(drawing: drawn_sheet.Drawing) -> Text:
+    text = Text(no_wrap=True)
+    for number, (characters, kinds) in enumerate(zip(drawing.characters, drawing.kinds.tolist())):
+        if number:
+            text.append("\n")
+        for character, kind in zip(characters, kinds):
+            text.append(character, drawn_sheet.STYLES[kind])
+    return text
+
+
+def status(board: Board, zones: Zones, width: int) -> str:
+    """The lines below a frame: which one it is, and what went wrong so far."""
+    stats = board.stats
+    parts = [
+        f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",
+        f"{zones.pressed} cells pressed",
+        *sorted(zones.flags - {"fault"}),
+        *sorted(zones.faults),
+        f"{stats.frames} frames, {stats.lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
+    ]
+    return terminal.listed("", [part for part in parts if part], width, " · ")

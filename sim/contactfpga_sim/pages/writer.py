@@ -1,0 +1,58 @@
+"""Writes tables into pages: each stands between markers, ``<!-- figures: NAME -->`` and ``<!-- end -->``."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from contactfpga.console import outputs
+
+Tables = Mapping[str, Callable[[], str]]
+"""What makes each table, by its name."""
+
+_SECTION = re.compile(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", re.DOTALL)
+
+
+def line(cells: Iterable[str]) -> str:
+    """A line of a table."""
+    return f"| {' | '.join(cells)} |"
+
+
+def table(head: Sequence[str], lines: Iterable[str]) -> str:
+    """A whole table; ``lines``: as :func:`line` makes them."""
+    return "\n".join([line(head), "|---" * len(head) + "|", *lines])
+
+
+def table_of(rows: Sequence[Sequence[str]]) -> str:
+    """The same from cells; the first row is the head."""
+    return table(rows[0], map(line, rows[1:]))
+
+
+def update(text: str, tables: Tables) -> str:
+    """The text of a page with those of its sections measured that are among ``tables``."""
+
+    def measured(match: re.Match[str]) -> str:
+        return f"{match[1]}\n{tables[match[2]]()}\n{match[3]}" if match[2] in tables else match[0]
+
+    return _SECTION.sub(measured, text)
+
+
+def write(page: Path, tables: Tables) -> None:
+    """Write the tables into a page; each is there as soon as it is measured."""
+    for name, measure in tables.items():
+        before = page.read_text(encoding="utf-8")
+        if f"<!-- figures: {name} -->" in before:
+            page.write_text(update(before, {name: measure}), encoding="utf-8")
+
+
+def main(tables: Tables) -> int:
+    """Update the pages named on the command line."""
+    parser = argparse.ArgumentParser(description="Measure the tables in these pages and write them there.")
+    parser.add_argument("pages", type=Path, nargs="+")
+    pages = [outputs.file(page, "page") for page in parser.parse_args().pages]
+    for page in pages:
+        write(page, tables)
+        print(f"measured {page}")
+    return 0
