@@ -1,7 +1,7 @@
 """From a power-up at which nothing is known, every output is known after the reset, and the golden model's."""
 
 import pytest
-from amaranth.hdl import Fragment, Mux, Signal
+from amaranth.hdl import Fragment
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
