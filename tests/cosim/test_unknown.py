@@ -1,7 +1,7 @@
 """From a power-up at which nothing is known, every output is known after the reset, and the golden model's."""
 
 import pytest
-from amaranth.hdl import Mux, Signal
+from amaranth.hdl import Fragment
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
@@ -12,6 +12,7 @@ from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.covering import stimulus
 from contactfpga_sim.golden import predict
 from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.proofs.inside import Inside
 
 SMALL = Skin(rows=8, columns=8)
 SKINS = {
@@ -59,16 +60,14 @@ def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing, nam
 
 @with_icarus
 def test_a_register_without_a_reset_is_seen(monkeypatch):
-    def watch(self, m):
-        seen = Signal(reset_less=True)
-        with m.If(self._sampled):
-            now = self._pressed.any()
-            m.d.sync += [
-                seen.eq(~self._last & (seen | now)),
-                self.contact.eq(now | Mux(self._last, seen, self.contact)),
-            ]
+    elaborate = Scanner.elaborate
 
-    monkeypatch.setattr(Scanner, "_watch_contact", watch)
+    def without_reset(self, platform):
+        fragment = Fragment.get(elaborate(self, platform), platform)
+        Inside(fragment)["seen"]._reset_less = True
+        return fragment
+
+    monkeypatch.setattr(Scanner, "elaborate", without_reset)
     cycles = 3 * facts(SMALL).scan_clocks
     with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx [01], contact x"):
         bench_unknown.run(SMALL, stimulus(SMALL, cycles, seed=3), cycles)

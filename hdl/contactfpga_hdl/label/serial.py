@@ -64,7 +64,7 @@ class _Group:
         self.has_run = Signal()  # in the new row
         self.first = Signal(place_bits)  # place of the first of them, or of the column to the left
         self.end = Signal(place_bits)  # place of the last one
-        self.top = Signal(place_bits)  # of the groups that wait, the one to go on next
+        self.innermost = Signal(place_bits)  # of the groups that wait, the one to go on next
         self.moments = Signal(moments_layout(derived))
 
 
@@ -220,9 +220,9 @@ class SerialLabeller(wiring.Component):
             with m.If(acts.joins & (earlier ^ later)):
                 m.d.sync += outermost.eq(Mux(later, Cat(group.whole, outermost), outermost >> 1))
             with m.If(acts.closes & ~group.whole):
-                m.d.sync += group.top.eq(group.first)
+                m.d.sync += group.innermost.eq(group.first)
             with m.Elif(acts.joins & earlier & group.whole):
-                m.d.sync += group.top.eq(below)
+                m.d.sync += group.innermost.eq(below)
 
     def _read_group(
         self, m: Module, walk: _Walk, acts: _Acts, group: _Group, groups: memory.Memory, earlier: Value
@@ -232,7 +232,7 @@ class SerialLabeller(wiring.Component):
         wanted = Signal()
         m.d.comb += [
             wanted.eq(acts.begins & ~walk.second & (~earlier | group.whole)),
-            read.addr.eq(Cat(Mux(earlier, group.top, walk.place), ~wanted)),
+            read.addr.eq(Cat(Mux(earlier, group.innermost, walk.place), ~wanted)),
         ]
         return read.data
 
@@ -268,7 +268,7 @@ class SerialLabeller(wiring.Component):
             write.data.has_run.eq(group.has_run & ~group.whole),
             write.data.first.eq(group.first),
             write.data.end.eq(group.end),
-            write.data.below.eq(group.top),
+            write.data.below.eq(group.innermost),
         ]
 
     def _let_out(self, m: Module, walk: _Walk, acts: _Acts, group: _Group) -> None:
