@@ -1,13 +1,16 @@
-"""What board and host send, written from docs/protocol.md for the tests alone; shares no code with the product."""
+"""Packets as a board sends them, and as none does, by the golden model's encoder; shares no code with the product."""
 
-import json
 import struct
 import zlib
-from dataclasses import asdict
-from dataclasses import fields as dataclass_fields
-from hashlib import sha256
 
 from cobs import cobs
+
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.frame import join
+from contactfpga_sim.golden.packet import check, crc16, stuff
+from contactfpga_sim.golden.request import request
+
+__all__ = ["check", "crc16", "request"]  # some tests take apart what others take whole
 
 HELLO, ZONES, CELLS, BARYCENTERS, REQUEST = 4, 5, 6, 7, 5
 FLAGS = {"overflow": 1, "mismatch": 2, "fault": 4}
@@ -15,37 +18,15 @@ SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3
 EPOCH_US = 2**22
 
 
-def crc16(data: bytes) -> int:
-    """CRC-16/MCRF4XX, bit by bit in the order of the line."""
-    crc = 0xFFFF
-    for byte in data:
-        for index in range(8):
-            feedback = (crc ^ byte >> index) & 1
-            crc = crc >> 1 ^ (0x8408 if feedback else 0)
-    return crc
-
-
-def check(stuffed: bytes, before: bytes = b"") -> bytes:
-    """The three bytes after the stuffed ones; ``before``: what is covered and not sent."""
-    bits = format(crc16(before + stuffed), "016b")[::-1]
-    return bytes(0x80 | int(part[::-1], 2) for part in (bits[:7], bits[7:14], bits[14:]))
-
-
 def seal(plain: bytes, before: bytes = b"") -> bytes:
-    stuffed = cobs.encode(plain)
+    stuffed = stuff(plain)
     return stuffed + check(stuffed, before) + b"\0"
-
-
-def bits_for(largest: int) -> int:
-    return max(1, largest.bit_length())
 
 
 def fields(*pairs) -> bytes:
     """(value, bits) pairs without gaps, lowest first, filled up to whole bytes."""
-    text = "".join(format(value, f"0{bits}b")[::-1] for value, bits in pairs)
-    assert len(text) == sum(bits for _, bits in pairs), "a value does not fit its field"
-    text += "0" * (-len(text) % 8)
-    return bytes(int(text[start : start + 8][::-1], 2) for start in range(0, len(text), 8))
+    word, width = join(pairs)
+    return word.to_bytes(-(-width // 8), "little")
 
 
 def last_byte(kind, flags=()) -> bytes:
@@ -62,24 +43,6 @@ def digits(value, count) -> bytes:
 
 def undigits(data) -> int:
     return sum((byte - 128) * 128**place for place, byte in enumerate(data))
-
-
-def fingerprint(skin) -> bytes:
-    """Of the fields that differ from their defaults, but for the name and a capacity that is the sheet's default."""
-    values = asdict(skin)
-    changed = {
-        field.name: values[field.name]
-        for field in dataclass_fields(skin)
-        if field.name not in ("name", "zone_capacity") and values[field.name] != field.default
-    }
-    if skin.zone_capacity != skin.replace(zone_capacity=None).zone_capacity:
-        changed["zone_capacity"] = skin.zone_capacity
-    return sha256(json.dumps(changed, sort_keys=True).encode()).digest()[:8]
-
-
-def request(number, hello=False) -> bytes:
-    """A request as the host sends it."""
-    return b"\0" + seal(digits(number, 3) + bytes([16 * REQUEST + hello]))
 
 
 def requests_in(packets) -> list:
@@ -106,35 +69,26 @@ class Wire:
 
     def __init__(self, skin):
         self.skin = skin
-        self.prefix = fingerprint(skin)[:2]
-        rows, columns = skin.rows, skin.columns
-        self.area_bits = bits_for(rows * columns)
-        self.sum_x_bits = bits_for(rows * sum(range(columns)))
-        self.sum_y_bits = bits_for(columns * sum(range(rows)))
-        if skin.connectivity == 8:
-            self.zones_bits = bits_for(-(-rows // 2) * -(-columns // 2))
-        else:
-            self.zones_bits = bits_for(-(-rows * columns // 2))
-        self.overwritten_bits = 4
-        while (24 + 8 + 3 + self.area_bits + self.zones_bits + self.overwritten_bits) % 8:
-            self.overwritten_bits += 1
+        self.known = facts(skin)
+        self.prefix = self.known.fingerprint[:2]
+        counted = 24 + 8 + 3 + self.known.area_bits + self.known.zones_bits
+        self.overwritten_bits = -(-(counted + 4) // 8) * 8 - counted
 
     def record(self, area, sum_x, sum_y) -> bytes:
         """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell."""
-        if self.skin.report == "barycenter":
-            step = 2**self.skin.barycenter_bits
-            area_bits = bits_for(self.skin.rows * self.skin.columns - 1)
-            x_bits, y_bits = (bits_for((lines - 1) * step) for lines in (self.skin.columns, self.skin.rows))
+        known = self.known
+        if known.divided:
+            area_bits, x_bits, y_bits = known.barycenter_bits
             return fields((area % (1 << area_bits), area_bits), (sum_x, x_bits), (sum_y, y_bits))
-        return fields((area, self.area_bits), (sum_x, self.sum_x_bits), (sum_y, self.sum_y_bits))
+        return fields((area, known.area_bits), (sum_x, known.sum_x_bits), (sum_y, known.sum_y_bits))
 
     def trailer(self, *, time=0, sequence=0, overwritten=0, heard=1, cells=0, zones=0) -> bytes:
         return fields(
             (time % (1 << 24), 24),
             (sequence % 256, 8),
             (heard % 8, 3),
-            (cells, self.area_bits),
-            (zones, self.zones_bits),
+            (cells, self.known.area_bits),
+            (zones, self.known.zones_bits),
             (overwritten % (1 << self.overwritten_bits), self.overwritten_bits),
         )
 
@@ -146,7 +100,7 @@ class Wire:
         body = b"".join(self.record(*row) for row in moments)
         cells = sum(row[0] for row in moments) if cells is None else cells
         zones = len(moments) if zones is None else zones
-        kind = BARYCENTERS if self.skin.report == "barycenter" else ZONES
+        kind = BARYCENTERS if self.known.divided else ZONES
         return body + self.trailer(cells=cells, zones=zones, **trailer) + last_byte(kind, flags)
 
     def zones(self, moments, **options) -> bytes:
@@ -174,7 +128,7 @@ class Wire:
         }
         if skin.radius_mm is not None:
             facts[RADIUS] = struct.pack("<d", skin.radius_mm)
-        facts[FINGERPRINT] = fingerprint(skin)
+        facts[FINGERPRINT] = self.known.fingerprint
         facts[RATES] = struct.pack("<II", skin.clock_hz, skin.baud)
         if skin.name:
             facts[NAME] = skin.name.encode()
