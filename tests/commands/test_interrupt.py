@@ -123,7 +123,7 @@ def test_place_and_route_ends_too(keys, tmp_path):
 
 WAITS = """
 import sys, time
-from contactfpga import interrupt
+from contactfpga.console import interrupt
 
 def body():
     print("waits", flush=True)
@@ -151,7 +151,7 @@ def test_a_command_listens_even_where_its_shell_would_have_it_ignore_the_signal(
 
 WORKERS = """
 import os, subprocess, sys, time
-from contactfpga_sim import pool
+from contactfpga_sim.studies import pool
 
 def work(number):
     subprocess.run(["sleep", "60"])

@@ -141,7 +141,7 @@ def test_the_encoding_decides_on_characters(encoding, unicode):
 
 
 def test_what_an_encoding_lacks_is_written_as_what_is_nearest():
-    code = "from contactfpga import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
+    code = "from contactfpga.console import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, env=environment(PYTHONIOENCODING="ascii")
     )
