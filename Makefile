@@ -51,7 +51,7 @@ verification: $(VENV)/.stamp-test ## write docs/verification.md from the results
 # Said before anything is installed.
 ifneq ($(filter bitstream,$(MAKECMDGOALS)),)
 ifeq ($(strip $(BOARD)),)
-$(error BOARD is missing: make bitstream BOARD=icebreaker, icestick, ulx3s-12f or ulx3s-85f)
+$(error BOARD is missing: make bitstream BOARD=icebreaker, or another one that docs/boards.md names)
 endif
 endif
 

@@ -6,11 +6,12 @@ import sys
 import numpy as np
 import pytest
 
+from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import bitstream_path
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import build
-from contactfpga_hdl.board.boards import BOARDS, bitstream_path
 from contactfpga_sim.board import native
 from contactfpga_sim.board.compiled import model_of
 from contactfpga_sim.cosim.compare import Mismatch

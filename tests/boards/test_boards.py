@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from contactfpga import cli
+from contactfpga.boards import BOARDS, find
+from contactfpga.boards.spec import Bridge
 from contactfpga.driver import ports
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import build, placed
-from contactfpga_hdl.board.boards import BOARDS, Bridge, find
 from contactfpga_hdl.board.build import LOG, BitstreamFailed, _why, plan_for
 from contactfpga_hdl.board.constraints import FOLDER, PAGE, connector_sites, constraints, page_with_tables
 from contactfpga_hdl.scan.pins import column_pins, row_pins
@@ -24,6 +25,16 @@ every_board = pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS)
 
 
 # ---- pin tables
+
+
+def test_a_board_of_your_own_is_named_by_where_it_is():
+    assert find("contactfpga.boards.ulx3s:ULX3S_85F") is BOARDS["ulx3s-85f"]
+    for name, message in (
+        ("no_such:BOARD", "the board 'no_such:BOARD' cannot be loaded: No module named 'no_such'"),
+        ("contactfpga.boards:BOARDS", "'contactfpga.boards:BOARDS' is a dict; it must be a BoardSpec"),
+    ):
+        with pytest.raises(SkinError, match=message):
+            find(name)
 
 
 @every_board
@@ -197,7 +208,7 @@ def test_unknown_board_is_named_with_the_known_ones():
     [(12_000_000, 12e6), (8_000_000, 8e6), (6_000_000, 6e6), (3_000_000, 3e6), (7_500_000, 8e6), (115_200, 115_246.1)],
 )
 def test_rates_of_the_bridge(asked, made):
-    assert Bridge("FT2232H", (0, 0), 12_000_000).nearest(asked) == pytest.approx(made, abs=0.1)
+    assert Bridge("FT2232H", (0, 0), None, 12_000_000).nearest(asked) == pytest.approx(made, abs=0.1)
 
 
 # ---- what is generated

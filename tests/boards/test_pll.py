@@ -5,9 +5,8 @@ tests/test_bitstream.py compares with the makers' calculators and builds bitstre
 
 import pytest
 
+from contactfpga.boards import BOARDS, pll
 from contactfpga.skin import SkinError
-from contactfpga_hdl.board import pll
-from contactfpga_hdl.board.boards import BOARDS
 from contactfpga_hdl.board.build import plan_for
 from contactfpga_hdl.board.clock import HeldReset
 

@@ -38,7 +38,7 @@ def plug_in(monkeypatch, *devices):
 
 def test_no_board_plugged_in(monkeypatch):
     plug_in(monkeypatch)
-    with pytest.raises(contactfpga.PortNotFound, match=r"0403:6015 \(ULX3S\).*sim://"):
+    with pytest.raises(contactfpga.PortNotFound, match=r"0403:6015 \(ULX3S 12F, ULX3S 85F\).*sim://"):
         contactfpga.read_zones()
 
 

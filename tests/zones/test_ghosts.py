@@ -10,10 +10,10 @@ from scipy import ndimage
 from wire import Wire
 
 from contactfpga import Skin
+from contactfpga.boards import BOARDS
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import HelloReader
-from contactfpga_hdl.board.boards import BOARDS
 from contactfpga_hdl.board.build import plan_for
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare

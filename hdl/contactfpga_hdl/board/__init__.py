@@ -1,1 +1,1 @@
-"""Boards, and the way from a Skin to a bitstream. Only `boards` and `pll` load without Amaranth."""
+"""The way from a Skin to a bitstream on a board (contactfpga.boards)."""

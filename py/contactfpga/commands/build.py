@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from contactfpga.boards import BOARDS, find
+from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.console import numbers, outputs
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
@@ -12,7 +14,7 @@ from contactfpga.skin import Skin
 HELP = "Build a bitstream for a board."
 EXTRA = "boards"
 
-BOARD = "One of icebreaker, icestick, ulx3s-12f and ulx3s-85f."
+BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec."
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -26,20 +28,20 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_hdl.board import boards, build
+    from contactfpga_hdl.board import build
 
-    board = boards.find(args.board)
+    board = find(args.board)
     skin = Skin.load(args.skin) if args.skin else board.skin
-    folder = outputs.folder(args.output or default_folder(args.board))
+    folder = outputs.folder(args.output or default_folder(board))
     try:
         report = build.build(skin, board, folder, args.seed)
     except build.BitstreamFailed as error:
         raise ContactFPGAError(str(error)) from None
     print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
-    print(f"{'bitstream':12} {boards.bitstream_path(board, folder).resolve()}")
+    print(f"{'bitstream':12} {bitstream_path(board, folder).resolve()}")
     return 0
 
 
-def default_folder(board: str) -> Path:
+def default_folder(board: BoardSpec) -> Path:
     """Where the bitstream of a board is put and looked for."""
-    return Path("build") / board
+    return Path("build") / board.name

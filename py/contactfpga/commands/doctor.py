@@ -133,7 +133,7 @@ def hello(board: Board) -> Iterator[Finding]:
 
 
 def clock(board_s: float, host_s: float) -> Iterator[Finding]:
-    """Whether the board's clock goes like this computer's, as far as that can be told in this time."""
+    """Whether the board's clock agrees with this computer's, as far as this much time can show."""
     if host_s > 0 and abs(off := board_s / host_s - 1) > CLOCK_ERROR + JITTER_S / host_s:
         yield (
             "note",

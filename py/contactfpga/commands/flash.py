@@ -7,6 +7,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from contactfpga.boards import find
+from contactfpga.boards.spec import bitstream_path
 from contactfpga.commands.build import BOARD, default_folder
 from contactfpga.errors import ContactFPGAError, MissingTool
 
@@ -22,10 +24,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_hdl.board import boards  # the pin tables; nothing that needs more than the host
-
-    board = boards.find(args.board)
-    file = Path(args.file) if args.file else boards.bitstream_path(board, default_folder(args.board))
+    board = find(args.board)
+    file = Path(args.file) if args.file else bitstream_path(board, default_folder(board))
     if not file.is_file():
         raise ContactFPGAError(f"there is no file {file}; build it with: contactfpga build {args.board}")
     programmer = board.programmer

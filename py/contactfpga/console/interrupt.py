@@ -22,8 +22,8 @@ class Interrupted(KeyboardInterrupt):
 def guarded(body: Callable[[], int | None]) -> int:
     """The status of ``body``; Ctrl-C ends it without a traceback.
 
-    A shell starts what runs in its background with Ctrl-C ignored, and so does everything below it. A command is told
-    to end by the same signal, so it listens all the same.
+    A shell starts what runs in its background with Ctrl-C ignored, and so does everything below it. A command is
+    ended by the same signal, so it listens all the same.
     """
     terminal.prepare()
     with _listening():

@@ -38,7 +38,7 @@ Render = Callable[[Zones, Room], RenderableType]
 
 
 def show(board: Board, args: argparse.Namespace, render: Render) -> int:
-    """Show one frame with ``--once``, else fifteen a second until interrupted or the recording ends."""
+    """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends."""
     console = terminal.console()
     if args.once:
         console.print(render(board.next(args.timeout), _room(console, endless=True)))

@@ -1,1 +1,1 @@
-"""From a port to frames: bytes in, a conversation with the board, subscribers told."""
+"""From a port to frames: bytes in, a conversation with the board, subscribers notified."""

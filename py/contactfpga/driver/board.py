@@ -49,7 +49,7 @@ class Board:
 
     @property
     def hello(self) -> Hello:
-        """What the board said of itself last; it does so twice a second."""
+        """What the board last said of itself; it does so twice per second."""
         self._link.check_open()
         if self._link.conversation.hello is None:
             raise ContactFPGAError(f"{self.port}: no hello has come yet")

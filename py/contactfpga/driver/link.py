@@ -1,4 +1,4 @@
-"""One port and everyone who waits for it: who reads, who is told, how it ends."""
+"""One port and everyone who waits for it: who reads, who is notified, how it ends."""
 
 from __future__ import annotations
 

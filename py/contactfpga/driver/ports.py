@@ -1,14 +1,13 @@
-"""Serial ports that may be a supported board, told by their USB ids."""
+"""Serial ports that may be a supported board, by their USB ids."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
+from contactfpga.boards import BOARDS
 from contactfpga.inputs.values import visible
-
-FTDI = 0x0403
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,10 +21,14 @@ class Usb:
     boards: str
 
 
-SUPPORTED = (
-    Usb(FTDI, 0x6010, 1, "iCEBreaker, iCEStick"),  # FT2232H: interface 0 programs the flash
-    Usb(FTDI, 0x6015, None, "ULX3S"),  # FT231X
-)
+def _supported() -> Iterator[Usb]:
+    """The boards by the chip that carries their UART."""
+    for bridge, boards in itertools.groupby(BOARDS.values(), lambda board: board.bridge):
+        vid, pid = bridge.usb
+        yield Usb(vid, pid, bridge.interface, ", ".join(board.title for board in boards))
+
+
+SUPPORTED = tuple(_supported())
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,7 +17,7 @@ class Stats:
     hello, which tells how many frames the board has sent."""
     unexplained: int = 0
     """Frames received whole and not passed on, as their times could not be known before the next hello: those after a
-    pause of the line, or of a board whose restart nothing has told of yet."""
+    pause of the line, or of a board whose restart has not shown yet."""
     dropped: int = 0
     """Frames passed on that were taken out of the queue of ``Board.next`` again, the oldest first, because it was
     full."""
@@ -38,7 +38,7 @@ class Stats:
     foreign_skin: int = 0
     """Frames of a board built from another Skin than the one asked for."""
     skin_changes: int = 0
-    """Hellos that told of another Skin than the one before."""
+    """Hellos of another Skin than the one before."""
     restarts: int = 0
     """How often the board was restarted, as its hellos tell."""
     bytes: int = 0

@@ -15,7 +15,7 @@ _EPOCH_US = 1 << EPOCH_BITS
 _SEQUENCES = 1 << SEQUENCE_BITS
 
 MOST_US = _EPOCH_US
-"""Hellos come twice a second, so that a frame is no later than this after the hello or the frame before it."""
+"""Hellos come twice per second, so that a frame is no later than this after the hello or the frame before it."""
 MOST_S = 8.0
 """Half the time in which a frame's time wraps: after a longer pause nobody knows how often it did."""
 SETTLED_S = 1.0

@@ -205,7 +205,7 @@ class _Pace:
         return data
 
     def _schedule(self, time_us: int) -> None:
-        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins anew
+        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins again
             self._begun = time.monotonic(), time_us
         moment_s, begun_us = self._begun
         self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor

@@ -112,7 +112,7 @@ def seal(plain: bytes, before: bytes = b"") -> bytes:
 
 
 def unreadable(packet: bytes) -> bool:
-    """Whether a packet from the board may be whole and cannot be told to be without the board's fingerprint."""
+    """Whether a packet from the board may be whole, which only the board's fingerprint can show."""
     marked = all(byte & 0x80 for byte in packet[-CHECK_BYTES:]) and packet[-1] < 0x84
     return len(packet) >= SHORTEST_PACKET and marked and not _bare(packet[-CHECK_BYTES - 1])
 

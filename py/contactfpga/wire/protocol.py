@@ -133,7 +133,7 @@ class Frame:
 
 
 def decode_frame(plain: bytes, widths: Widths) -> Frame:
-    """Read an unsealed frame of the sheet behind ``widths``.
+    """Read an unsealed frame of the sheet that ``widths`` are of.
 
     Raises :class:`PacketError` unless its length agrees with its zone count and, where the board does not itself
     flag a mismatch, its cells with its zones.

@@ -35,7 +35,7 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 
 @dataclasses.dataclass(frozen=True)
 class Batch:
-    """Some frames in a row and all of their zones."""
+    """Consecutive frames and all of their zones."""
 
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""

@@ -3,7 +3,7 @@
 Without diodes a current takes every way through pressed switches: a selected row reads pressed in all columns that it
 is joined with, over other rows as well. In a frame during which nothing changes the rows and columns that are joined so
 read pressed in all of their crossings, a *block*; blocks have no row and no column in common. What of a block is really
-pressed cannot be told: it may be any of its crossings that join it. So
+pressed cannot be known: it may be any of its crossings that join it. So
 
 - a cell may be a ghost if its block has another row and another column, that is, if it is a corner of a rectangle whose
   other corners are pressed, too;
@@ -12,7 +12,7 @@ pressed cannot be told: it may be any of its crossings that join it. So
   never do, as two runs with one middle would overlap; likewise columns and x.
 
 Both hold exactly, in both directions. Zones of one block may also have grown, or have been joined, by ghosts; they are
-found by their common x or y. What cannot be told is a block that is one zone: contacts may hide in it whose rows and
+found by their common x or y. What cannot be recognized is a block that is one zone: contacts may hide in it whose rows and
 columns, taken together, have no gap.
 
 If a switch changes during the scan, the rows before it do not show it yet, and

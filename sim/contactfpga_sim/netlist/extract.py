@@ -9,11 +9,12 @@ from pathlib import Path
 
 from amaranth.lib.wiring import Out
 
+from contactfpga.boards import pll
+from contactfpga.boards.spec import NAME, BoardSpec, bitstream_path
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin, SkinError
-from contactfpga_hdl.board import build, pll, synthesis
+from contactfpga_hdl.board import build, synthesis
 from contactfpga_hdl.board.board_top import platform_for
-from contactfpga_hdl.board.boards import NAME, BoardSpec, bitstream_path
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_sim.board import native
 from contactfpga_sim.board.native import Netlist

@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga.boards import BOARDS, find
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.console import interrupt
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import build
-from contactfpga_hdl.board.boards import BOARDS, BoardSpec, find
 from contactfpga_sim.board import native
 from contactfpga_sim.board.compiled import model_of
 from contactfpga_sim.board.replay import skin_for

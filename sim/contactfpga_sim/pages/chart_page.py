@@ -66,7 +66,7 @@ def host_table() -> str:
 
 
 def _later(skin: Skin, count: int) -> float:
-    """Microseconds by which the zones of so many contacts come later from the board than from the host."""
+    """Microseconds by which the zones of this many contacts come later from the board than from the host."""
     cells = _contacts(skin, count)
     return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
 

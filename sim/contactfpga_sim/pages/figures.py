@@ -36,7 +36,7 @@ RECORDED = 100
 """Frames of a recording that are looked at."""
 
 HELD_SCANS = 4
-"""Scan periods for which a frame is held; a sheet that is recorded a hundred times a second holds it for more."""
+"""Scan periods for which a frame is held; a sheet that is recorded a hundred times per second holds it for more."""
 
 SETTINGS = {
     "reference": Skin(),
@@ -118,7 +118,7 @@ def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]
 
 
 def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
-    """Frames a second that reach the host with one zone on the sheet, and the bytes of such a frame."""
+    """Frames per second that reach the host with one zone on the sheet, and the bytes of such a frame."""
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[1:3, 1:3] = True
     with CompiledBoard(skin) as board:

@@ -10,9 +10,11 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
-from contactfpga_hdl.board import boards, build, sizes
+from contactfpga_hdl.board import build, sizes
 from contactfpga_sim.pages import writer
 from contactfpga_sim.studies import size
 
@@ -46,14 +48,14 @@ def boards_table() -> str:
         "| board | FPGA | clock | sheet | LUT4 | flip-flops | block RAMs | logic cells | Fmax |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for board in boards.BOARDS.values():
+    for board in BOARDS.values():
         lines.append(board_row(board, board.skin))
         if board.name in EXAMPLES:
             lines.append(board_row(board, Skin.load(EXAMPLES[board.name])))
     return "\n".join(lines)
 
 
-def board_row(board: boards.BoardSpec, skin: Skin) -> str:
+def board_row(board: BoardSpec, skin: Skin) -> str:
     """What the bitstream of a Skin takes of the board's FPGA."""
     print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
     with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp

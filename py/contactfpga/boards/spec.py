@@ -1,4 +1,4 @@
-"""The supported boards, each described once: clock, pins, bridge, programmer. Loads no Amaranth.
+"""What describes a board: clock, pins, bridge, programmer. Loads no Amaranth.
 
 Sheet lines sit on two rows of header pins. Rows take the first one from its start, columns the second one, and
 whichever runs out goes on at the far end of the other: row k and column k are on the same pin in every sheet. Where a
@@ -12,8 +12,8 @@ import itertools
 from collections.abc import Mapping
 from pathlib import Path
 
+from contactfpga.boards import pll
 from contactfpga.skin import Skin, SkinError
-from contactfpga_hdl.board import pll
 
 NAME = "contactfpga"
 """Of the files that a build leaves."""
@@ -28,6 +28,9 @@ class Bridge:
 
     chip: str
     usb: tuple[int, int]
+    """Vendor and product."""
+    interface: int | None
+    """That carries the UART where the chip has several; None: it has one."""
     max_baud: int
 
     def nearest(self, baud: int) -> float:
@@ -148,108 +151,8 @@ def column_wires(skin: Skin) -> dict[str, int]:
     return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}
 
 
-def _pins(connector: str, numbers: str) -> tuple[str, ...]:
+def pins_of(connector: str, numbers: str) -> tuple[str, ...]:
     return tuple(f"{connector}:{number}" for number in numbers.split())
-
-
-def _pairs(first: int, last: int) -> tuple[str, ...]:
-    return tuple(f"gpio_0:{number}{sign}" for number in range(first, last + 1) for sign in "+-")
-
-
-_PMOD = "1 2 3 4 7 8 9 10"
-_FT2232H = Bridge("FT2232H", (0x0403, 0x6010), 12_000_000)
-_FT231X = Bridge("FT231X", (0x0403, 0x6015), 3_000_000)
-# iceprog comes with IceStorm, is what both boards' makers name, and finds the FT2232H by itself.
-_ICEPROG = Programmer("iceprog", (), "sudo apt install fpga-icestorm")
-# fujprog is the maker's, but distributions package openFPGALoader. Without -f the bitstream is lost at power-off.
-_LOADER = Programmer("openFPGALoader", ("-b", "ulx3s", "-f"), "sudo apt install openfpgaloader")
-_ICE40_PULLS: dict[str, dict[str, object]] = {"col2row": {"PULLUP": 1}, "row2col": {}}
-_ECP5_PULLS: dict[str, dict[str, object]] = {"col2row": {"PULLMODE": "UP"}, "row2col": {"PULLMODE": "DOWN"}}
-
-_ICEBREAKER = BoardSpec(
-    name="icebreaker",
-    title="iCEBreaker",
-    fpga="iCE40UP5K",
-    platform="amaranth_boards.icebreaker:ICEBreakerPlatform",
-    clock_hz=12_000_000,
-    pll="SB_PLL40_PAD",
-    connectors={"pmod_0": "PMOD1A", "pmod_1": "PMOD1B", "pmod_2": "PMOD2"},
-    row_side=_pins("pmod_0", _PMOD) + _pins("pmod_1", "1 2 3 4"),
-    column_side=_pins("pmod_2", "1 2 3 4 7 8 9") + _pins("pmod_1", "7 8 9 10"),
-    contact="pmod_2:10",
-    standard={"IO_STANDARD": "SB_LVCMOS"},
-    pulls=_ICE40_PULLS,
-    bridge=_FT2232H,
-    programmer=_ICEPROG,
-    bitstream="bin",
-    constraints="icebreaker.pcf",
-    skin=Skin(row_drive="74hc595", release_us=2.0),  # a switched-off row has to be lifted by the pull-ups
-)
-
-_ICESTICK = BoardSpec(
-    name="icestick",
-    title="iCEStick",
-    fpga="iCE40HX1K",
-    platform="amaranth_boards.icestick:ICEStickPlatform",
-    clock_hz=12_000_000,
-    pll="SB_PLL40_CORE",
-    connectors={"j_1": "J1", "j_3": "J3", "pmod_0": "J2"},
-    row_side=_pins("j_1", "3 4 5 6 7 8 9 10") + _pins("pmod_0", "1 2 3 4"),
-    column_side=_pins("j_3", "3 4 5 6 7 8 9 10") + _pins("pmod_0", "7 8 9"),
-    contact="pmod_0:10",
-    standard={"IO_STANDARD": "SB_LVCMOS"},
-    pulls=_ICE40_PULLS,
-    bridge=_FT2232H,
-    programmer=_ICEPROG,
-    bitstream="bin",
-    constraints="icestick.pcf",
-    skin=Skin(rows=8, columns=8, labeller="serial"),  # `run` takes 1,422 logic cells of 1,280
-)
-
-_ULX3S_12F = BoardSpec(
-    name="ulx3s-12f",
-    title="ULX3S 12F",
-    fpga="LFE5U-12F",
-    platform="amaranth_boards.ulx3s:ULX3S_12F_Platform",
-    clock_hz=25_000_000,
-    pll="EHXPLLL",
-    connectors={"gpio_0": "GPIO"},
-    row_side=_pairs(0, 10),  # 11 to 13 lead to the ESP32, 14 to 17 to the ADC
-    column_side=_pairs(18, 27)[:-1],
-    contact="gpio_0:27-",
-    standard={"IO_TYPE": "LVCMOS33"},
-    pulls=_ECP5_PULLS,
-    bridge=_FT231X,
-    programmer=_LOADER,
-    bitstream="bit",
-    constraints="ulx3s.lpf",
-    skin=Skin(rows=16, columns=16, clock_hz=25_000_000, baud=1_000_000),  # 3 Mbaud is 4 % off at 25 MHz
-    held_high=("L2",),  # GPIO0 of the ESP32: low puts it into its boot loader
-)
-
-BOARDS = {
-    board.name: board
-    for board in (
-        _ICEBREAKER,
-        _ICESTICK,
-        _ULX3S_12F,
-        dataclasses.replace(
-            _ULX3S_12F,
-            name="ulx3s-85f",
-            title="ULX3S 85F",
-            fpga="LFE5U-85F",
-            platform="amaranth_boards.ulx3s:ULX3S_85F_Platform",
-        ),
-    )
-}
-
-
-def find(name: str) -> BoardSpec:
-    """The board of that name."""
-    try:
-        return BOARDS[name]
-    except KeyError:
-        raise SkinError(f"no board is called {name!r}; known are {', '.join(BOARDS)}") from None
 
 
 def bitstream_path(board: BoardSpec, folder: Path) -> Path:

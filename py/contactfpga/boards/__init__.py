@@ -1,0 +1,28 @@
+"""The supported boards, each described once. A new one is a file here and a place in :data:`BOARDS`."""
+
+from contactfpga.boards.ice40 import ICEBREAKER, ICESTICK
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.boards.ulx3s import ULX3S_12F, ULX3S_85F
+from contactfpga.choices.choice import load
+from contactfpga.skin import SkinError
+
+__all__ = ["BOARDS", "find"]
+
+BOARDS: dict[str, BoardSpec] = {board.name: board for board in (ICEBREAKER, ICESTICK, ULX3S_12F, ULX3S_85F)}
+"""By name."""
+
+
+def find(name: str) -> BoardSpec:
+    """The board of that name, or ``module:attribute`` of your own. Raises SkinError that lists the names."""
+    if name in BOARDS:
+        return BOARDS[name]
+    if ":" not in name:
+        known = ", ".join(BOARDS)
+        raise SkinError(f"no board is called {name!r}; known are {known}, and 'module:attribute' of your own")
+    try:
+        board = load(name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SkinError(f"the board {name!r} cannot be loaded: {error}") from error
+    if not isinstance(board, BoardSpec):
+        raise SkinError(f"{name!r} is a {type(board).__name__}; it must be a BoardSpec")
+    return board

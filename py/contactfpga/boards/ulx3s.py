@@ -1,0 +1,47 @@
+"""ULX3S, with an ECP5 of either size."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from contactfpga.boards.spec import BoardSpec, Bridge, Programmer
+from contactfpga.skin import Skin
+
+_FT231X = Bridge("FT231X", (0x0403, 0x6015), None, 3_000_000)
+# fujprog is the maker's, but distributions package openFPGALoader. Without -f the bitstream is lost at power-off.
+_LOADER = Programmer("openFPGALoader", ("-b", "ulx3s", "-f"), "sudo apt install openfpgaloader")
+_PULLS: dict[str, dict[str, object]] = {"col2row": {"PULLMODE": "UP"}, "row2col": {"PULLMODE": "DOWN"}}
+
+
+def _pairs(first: int, last: int) -> tuple[str, ...]:
+    return tuple(f"gpio_0:{number}{sign}" for number in range(first, last + 1) for sign in "+-")
+
+
+ULX3S_12F = BoardSpec(
+    name="ulx3s-12f",
+    title="ULX3S 12F",
+    fpga="LFE5U-12F",
+    platform="amaranth_boards.ulx3s:ULX3S_12F_Platform",
+    clock_hz=25_000_000,
+    pll="EHXPLLL",
+    connectors={"gpio_0": "GPIO"},
+    row_side=_pairs(0, 10),  # 11 to 13 lead to the ESP32, 14 to 17 to the ADC
+    column_side=_pairs(18, 27)[:-1],
+    contact="gpio_0:27-",
+    standard={"IO_TYPE": "LVCMOS33"},
+    pulls=_PULLS,
+    bridge=_FT231X,
+    programmer=_LOADER,
+    bitstream="bit",
+    constraints="ulx3s.lpf",
+    skin=Skin(rows=16, columns=16, clock_hz=25_000_000, baud=1_000_000),  # 3 Mbaud is 4 % off at 25 MHz
+    held_high=("L2",),  # GPIO0 of the ESP32: low puts it into its boot loader
+)
+
+ULX3S_85F = dataclasses.replace(
+    ULX3S_12F,
+    name="ulx3s-85f",
+    title="ULX3S 85F",
+    fpga="LFE5U-85F",
+    platform="amaranth_boards.ulx3s:ULX3S_85F_Platform",
+)
