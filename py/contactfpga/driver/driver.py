@@ -34,8 +34,9 @@ def open(
     ``port``: a device path, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own
     time, else as fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which
     is closed with the board), or None for the one supported board that is plugged in. ``skin``: the Skin (or its
-    file) the board must be built from; None takes what the board says. ``baud``: bits per second; by
-    default that of ``skin``, or 3,000,000. ``record``: a file that gets every byte received; ``replay://`` reads it. ``timeout`` in seconds, for the hello.
+    file) the board must be built from; None takes what the board says. ``baud``: bits per second; by default that of
+    ``skin``, or 3,000,000. ``record``: a file that gets every byte received; ``replay://`` reads it.
+    ``timeout`` in seconds, for the hello.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
     :class:`SkinMismatch`, :class:`VersionMismatch`.

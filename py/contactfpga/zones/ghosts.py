@@ -12,7 +12,7 @@ pressed cannot be known: it may be any of its crossings that join it. So
   never do, as two runs with one middle would overlap; likewise columns and x.
 
 Both hold exactly, in both directions. Zones of one block may also have grown, or have been joined, by ghosts; they are
-found by their common x or y. What cannot be recognized is a block that is one zone: contacts may hide in it whose rows and
+found by their common x or y. What cannot be seen is a block that is one zone: contacts may hide in it whose rows and
 columns, taken together, have no gap.
 
 If a switch changes during the scan, the rows before it do not show it yet, and

@@ -86,8 +86,8 @@ def skin_for(
 ) -> Skin:
     """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
 
-    With ``barycenter_bits`` the board divides, and reports this many fraction bits. Steps of the capacity are a third at
-    most, so that recordings of one sheet share few builds.
+    With ``barycenter_bits`` the board divides, and reports that many fraction bits. Steps of the capacity are a third
+    at most, so that recordings of one sheet share few builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
     if barycenter_bits is not None:
