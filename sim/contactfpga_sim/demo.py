@@ -121,7 +121,7 @@ VERDICT = HEADS.index("verdict")
 
 
 def rows_of(outcomes: list[Outcome]) -> list[list[str]]:
-    """The head, and a line a scene and engine."""
+    """The head, and a line per scene and engine."""
     rows = [list(HEADS)]
     for out in outcomes:
         zones = "-" if out.frame is None else str(out.frame.zones)

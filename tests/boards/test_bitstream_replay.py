@@ -26,25 +26,25 @@ SMALL = ULX3S.skin.replace(rows=3, columns=3, report="cells", settle_us=20.0, cl
 
 
 @pytest.fixture(scope="module")
-def synthesised(tmp_path_factory):
-    return extract.synthesised(ULX3S, SMALL, tmp_path_factory.mktemp("ulx3s"))
+def synthesized(tmp_path_factory):
+    return extract.synthesized(ULX3S, SMALL, tmp_path_factory.mktemp("ulx3s"))
 
 
-def test_the_synthesised_netlist_does_what_the_golden_model_says(synthesised, record_property):
+def test_the_synthesized_netlist_does_what_the_golden_model_says(synthesized, record_property):
     frames = stimulus(SMALL, 700, [])
-    out = replay(SMALL, model_of(SMALL, synthesised), frames)
+    out = replay(SMALL, model_of(SMALL, synthesized), frames)
     assert out.frames == 700
     assert out.packets > 100
     assert out.changes > 10 * out.packets
     record_property("cases", out.frames)
 
 
-def test_one_wrong_table_in_the_netlist_is_seen(synthesised):
-    text = synthesised.files["chip.v"]
+def test_one_wrong_table_in_the_netlist_is_seen(synthesized):
+    text = synthesized.files["chip.v"]
     table = re.search(r"\.INIT\(16'h([0-9a-f]{4})\)\s*\) \\core\.transmitter", text)
     planted = text[: table.start(1)] + f"{int(table[1], 16) ^ 0xFFFF:04x}" + text[table.end(1) :]
-    broken = native.Netlist(synthesised.files | {"chip.v": planted}, synthesised.read)
-    assert broken.key != synthesised.key
+    broken = native.Netlist(synthesized.files | {"chip.v": planted}, synthesized.read)
+    assert broken.key != synthesized.key
     with pytest.raises(Mismatch):
         replay(SMALL, model_of(SMALL, broken), stimulus(SMALL, 50, []))
 
@@ -55,7 +55,7 @@ def test_the_gateware_itself_passes_with_no_reset_before_cycle_0():
     assert replay(skin, model_of(skin), stimulus(skin, 3 * bitstream_replay.BATCH // 2, [])).packets > 300
 
 
-@pytest.mark.parametrize("made", [extract.synthesised, extract.from_bitstream])
+@pytest.mark.parametrize("made", [extract.synthesized, extract.from_bitstream])
 def test_rows_that_float_are_refused(made, tmp_path):
     with pytest.raises(SkinError, match=r"diodes is 'none'; rows that float are not simulated"):
         made(ULX3S, SMALL.replace(diodes="none"), tmp_path)
@@ -116,7 +116,7 @@ def test_a_difference_or_a_failed_build_is_a_failure(monkeypatch, capsys):
         def fails(*_, error=error):
             raise error
 
-        monkeypatch.setattr(extract, "synthesised", fails)
+        monkeypatch.setattr(extract, "synthesized", fails)
         assert bitstream_replay.main() == 1
         assert f"FAILED       {error}" in capsys.readouterr().out
 

@@ -34,7 +34,7 @@ SHEET = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=5.0, report="barycen
 
 
 def nearest(total, area, bits):
-    """The nearest step of 1/2^bits, half a step upwards."""
+    """The nearest step of 1/2^bits, half a step upward."""
     return math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2))
 
 

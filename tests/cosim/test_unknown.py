@@ -7,7 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.cosim import bench_unknown
-from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialised
+from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialized
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.covering import stimulus
 from contactfpga_sim.golden import predict
@@ -53,7 +53,7 @@ def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
 def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing, name):
     skin = SKINS[name]
     cycles = 20 * facts(skin).scan_clocks
-    kept = [pattern for pattern in initialised(skin) if missing not in pattern]
+    kept = [pattern for pattern in initialized(skin) if missing not in pattern]
     with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx x"):
         bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles, kept)
 
@@ -94,6 +94,6 @@ def test_a_bracket_that_is_read_while_it_is_written_is_seen(monkeypatch):
 def test_only_what_is_named_keeps_its_value():
     first = hello_words(SMALL).start
     hello, frame = rf"  reg [7:0] \link.store[{first}] ", rf"  reg [7:0] \link.store[{first - 1}] "
-    text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", initialised(SMALL))
+    text, known = forget(f"{hello} = 8'h41;\n{frame} = 8'h00;\n  reg busy = 1'h0;\n  wire x = y;\n", initialized(SMALL))
     assert known == {rf"\link.store[{first}]": "8'h41"}
     assert text == f"{hello};\n{frame};\n  reg busy ;\n  wire x = y;\n"

@@ -99,7 +99,7 @@ def run(bench, dut, plan, sheet, rng, ready=None):
     lasts = [cycle for cycle, (_, last) in plan.rows.items() if last]
     summaries = []
     for end, last, following in zip(ends, lasts, [*ends[1:], None]):
-        # What is counted may hold up to a clock a zone, and the zones are before the end mark.
+        # What is counted may hold up to a clock per zone, and the zones are before the end mark.
         since = dict.fromkeys(AT_END, end + 1) | {name: max(last + 7, end + 2) + end - last for name in COUNTED}
         summaries.append({name: watch[since[name]] for name, watch in fields.items()})
         for name, watch in fields.items():

@@ -67,7 +67,7 @@ class Oracle:
         return [math.floor(Fraction(total * 2**self.bits, area) + Fraction(1, 2)) for total in sums]
 
     def every_zone(self):
-        """(area, sum x, sum y) of every set of cells that is not empty: all that a labeller can let out."""
+        """(area, sum x, sum y) of every set of cells that is not empty: all that a labeller can emit."""
         found = {(0, 0, 0)}
         for y, x in itertools.product(range(self.rows), range(self.columns)):
             found |= {(area + 1, sum_x + x, sum_y + y) for area, sum_x, sum_y in found}
@@ -75,7 +75,7 @@ class Oracle:
 
 
 def run(bench, rng, oracle, zones, dut=None, gap=0.0, **sink):
-    """Through a divider, an end mark behind every fifth zone; returns (cycle of transfer, record or item) of both."""
+    """Through a divider, an end mark after every fifth zone; returns (cycle of transfer, record or item) of both."""
     words = []
     for index, zone in enumerate(zones):
         words += [oracle.record(*zone), *([oracle.end] * (index % 5 == 4))]
@@ -209,7 +209,7 @@ def test_a_queue_and_a_division_take_their_clocks_before_a_packer_of_any_speed(b
 
 
 def test_an_area_of_0_which_only_a_faulty_labeller_lets_out_takes_the_same_clocks(bench):
-    """The frame says `mismatch`; whatever is sent for its barycenter, the zones behind it are right."""
+    """The frame says `mismatch`; whatever is sent for its barycenter, the zones after it are right."""
     oracle = Oracle(4, 5, 2)
     dut = Divider(skin_of(4, 5, 2))
     sim = bench(dut)

@@ -211,7 +211,7 @@ def replay(skin, frames, delimiters, cycles, asked=(), keep_alive=None):
 
 
 def hello_sent(skin, sink, begun, sent, number=lambda cycle: 0, stuck=lambda cycle: 0):
-    """The hello whose first byte was offered in a cycle, after so many frames. Each digit is taken in the clock after
+    """The hello whose first byte was offered in a cycle, after this many frames. Each digit is taken in the clock after
     the transfer of the byte before it."""
     first = sink.offered.index(begun)
     taken = [sink.transfers[first + 15 + place][0] + 1 for place in range(16)]

@@ -64,7 +64,7 @@ def sealed(plain):
 
 
 def moment(bytes_before):
-    """When the last of so many bytes is received."""
+    """When the last of this many bytes is received."""
     return (bytes_before - 1) * BYTE + 2 + BIT // 2 + 9 * BIT
 
 

@@ -1,4 +1,4 @@
-"""Other people's labellers behind our bench: the sources are those that are stated, and a wrong record is seen."""
+"""Other people's labellers on our bench: the sources are those that are stated, and a wrong record is seen."""
 
 import dataclasses
 import re

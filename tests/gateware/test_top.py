@@ -81,7 +81,7 @@ def shortest(**fields):
 @pytest.mark.parametrize("debounce", ["none", "sym_defer_pk", "asym_eager_defer_pk"])
 @pytest.mark.parametrize(("rows", "columns"), [(2, 16), (3, 12)])
 def test_a_frame_carries_its_own_time_at_the_shortest_row_time(bench, report, debounce, rows, columns):
-    """Behind a debounce the next frame's rows are sampled before this frame's trailer is packed."""
+    """After a debounce the next frame's rows are sampled before this frame's trailer is packed."""
     skin, clocks = shortest(
         rows=rows,
         columns=columns,

@@ -97,7 +97,7 @@ def test_last_byte_of_a_one_zone_frame_keeps_the_stated_bound():
         trace = predict(skin, Timeline([(closes, cells_at((row, 5)), None)]), 44 * SCAN)
         ends = [cycle for cycle, value in trace.bytes if value == 0]
         with_zone = [frame.zones for frame in sent_frames(skin, trace)].index(1)
-        wire = 40 * 18  # 14 bytes a frame, 4 a zone
+        wire = 40 * 18  # 14 bytes per frame, 4 per zone
         last_byte_out = ends[2 + with_zone] + 40  # after both delimiters of the hello
         assert SCAN < last_byte_out - closes <= 2 * SCAN + wire + 3 * 12
 
@@ -275,7 +275,7 @@ def holds(skin: Skin, frame: protocol.Frame, cells: np.ndarray) -> bool:
 
 
 def rounded(zone: tuple[int, int, int], bits: int) -> tuple[int, int, int]:
-    """Area, and both sums over it, to the nearest step of 1/2^bits, half a step upwards."""
+    """Area, and both sums over it, to the nearest step of 1/2^bits, half a step upward."""
     area, *sums = zone
     x, y = (math.floor(Fraction(total * 2**bits, area) + Fraction(1, 2)) for total in sums)
     return area, x, y

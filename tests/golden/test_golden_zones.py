@@ -167,9 +167,9 @@ def test_known_shapes(art, connectivity, zones):
 @pytest.mark.parametrize(
     ("art", "connectivity", "steps", "departures"),
     [
-        # one run above, none below: a step lets it out with the next row
+        # one run above, none below: a step emits it with the next row
         ("#.. ... ...", 8, (1, 1, 0), [(1, 1)]),
-        # the last row lets out what it touches too
+        # the last row emits what it touches, too
         ("... ... #.#", 8, (0, 0, 2), [(2, 1), (2, 2)]),
         # two runs joined by one: max(2, 1) steps, and the zone leaves with the last of them
         ("#.# ###", 8, (2, 2), [(1, 2)]),
@@ -195,15 +195,15 @@ def test_step_rule_by_hand(art, connectivity, steps, departures):
 @pytest.mark.parametrize(
     ("art", "connectivity", "busy", "departures"),
     [
-        # a clock a column and two more; the run above costs one, and the zone leaves behind its column
+        # a clock per column and two more; the run above costs one, and the zone leaves after its column
         ("#.. ... ...", 8, (5, 6, 5), [(1, 3)]),
         ("... ... #.#", 8, (5, 5, 5), [(2, 2), (2, 4)]),
         ("#.# ###", 8, (5, 7), [(1, 6)]),
-        # corners join with 8; with 4 a cluster right behind another costs a clock, but only one with its run above
+        # corners join with 8; with 4 a cluster right after another costs a clock, but only one with its run above
         ("#. .#", 8, (4, 5), [(1, 4)]),
         ("#. .#", 4, (4, 6), [(1, 3), (1, 5)]),
         (".# #.", 4, (4, 5), [(1, 2), (1, 4)]),
-        # a zone in two clusters of the last strip leaves behind the one on the right
+        # a zone in two clusters of the last strip leaves after the one on the right
         ("##### #...# #....", 8, (7, 8, 9), [(2, 8)]),
     ],
 )

@@ -82,7 +82,7 @@ def equals(graph, bits, value):
 
 @pytest.mark.parametrize("highest", [2, 4, 6])
 def test_a_counter_reaches_what_it_counts_to_and_nothing_above(highest, tmp_path):
-    """Three latches that count while an input is high, and begin anew behind ``highest``."""
+    """Three latches that count while an input is high, and begin again after ``highest``."""
     graph = aig.Graph(4)
     bits, counts = [2, 4, 6], 8
     ends = equals(graph, bits, highest)

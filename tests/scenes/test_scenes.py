@@ -178,7 +178,7 @@ def test_place_and_angle_follow_the_time():
     assert np.ptp(np.nonzero(cells)[1]) == 8
 
 
-def test_angles_turn_from_x_towards_y():
+def test_angles_turn_from_x_toward_y():
     cells = one(contacts.edge(40, 4), 30, 30, angle_deg=30.0).pressed(0.0, sheet_of(1.0, size=64))
     for along in (-18, -9, 0, 9, 18):
         row, column = (30 + along * ratio for ratio in (math.sin(math.pi / 6), math.cos(math.pi / 6)))
@@ -279,7 +279,7 @@ def test_a_disc_on_a_grid_has_its_reference_values(ratio, rms):
 
 
 def test_cells_come_to_the_truth_as_the_pitch_goes_to_nothing():
-    # For smooth shapes the centre rule is off by pitch^1.5 in area and barycenter: 32 times finer, 181 times less.
+    # For smooth shapes the center rule is off by pitch^1.5 in area and barycenter: 32 times finer, 181 times less.
     rng = np.random.default_rng(3)
     errors = {}
     for pitch in (4.0, 0.5, 0.125):

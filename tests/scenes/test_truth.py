@@ -1,4 +1,4 @@
-"""What touches: number, area and centroid of contacts, against closed forms and against a fine raster."""
+"""What touches: number, area and barycenter of contacts, against closed forms and against a fine raster."""
 
 import itertools
 import math

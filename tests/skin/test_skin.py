@@ -87,7 +87,7 @@ REFUSED = [
     ),
     (
         {"diodes": "none", "report": "cells", "mask": [(1, 2)]},
-        "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be told",
+        "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be known",
     ),
     ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster', 'adaptive', or 'module:attribute' of your own"),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
@@ -96,17 +96,17 @@ REFUSED = [
     ({"release_us": 10_001}, "release_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
     (
         {"settle_us": 0.5},
-        "settle_us + release_us is 18 clocks; 16 columns and 64 zones a frame need 22 clocks (1.83333 us) with "
+        "settle_us + release_us is 18 clocks; 16 columns and 64 zones per frame need 22 clocks (1.83333 us) with "
         "labeller = 'run'",
     ),
     (
         {"settle_us": 1.0, "labeller": "serial"},
-        "settle_us + release_us is 24 clocks; 16 columns and 64 zones a frame need 27 clocks (2.25 us) with labeller = "
+        "settle_us + release_us is 24 clocks; 16 columns and 64 zones per frame need 27 clocks (2.25 us) with labeller = "
         "'serial'",
     ),
     (
         {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
-        "settle_us + release_us is 48 clocks; 24 columns and 1 zones a frame need 51 clocks (4.25 us) with labeller = "
+        "settle_us + release_us is 48 clocks; 24 columns and 1 zones per frame need 51 clocks (4.25 us) with labeller = "
         "'serial'",
     ),
     (
@@ -136,12 +136,12 @@ REFUSED = [
     ),
     (
         {"scan": "adaptive", "settle_us": 2.0},
-        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones a frame need 43 clocks (3.58333 us) "
+        "settle_us + release_us is 36 clocks; 16 rows, 16 columns and 64 zones per frame need 43 clocks (3.58333 us) "
         "with labeller = 'run'",
     ),
     (
         {"scan": "adaptive", "rows": 64, "columns": 64},
-        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones a frame need 185 clocks (15.4167 us) "
+        "settle_us + release_us is 72 clocks; 64 rows, 64 columns and 256 zones per frame need 185 clocks (15.4167 us) "
         "with labeller = 'run'",
     ),
     (
@@ -157,7 +157,7 @@ REFUSED = [
     ({"report": "cells", "barycenter_bits": 5}, "barycenter_bits is 5; leave it out, or set report = 'barycenter'"),
     (
         {"report": "barycenter", "rows": 32, "columns": 32, "zone_capacity": 256},
-        "settle_us + release_us is 72 clocks; 32 columns and 256 zones a frame need 90 clocks (7.5 us) "
+        "settle_us + release_us is 72 clocks; 32 columns and 256 zones per frame need 90 clocks (7.5 us) "
         "with labeller = 'run' and report = 'barycenter'",
     ),
     ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),

@@ -145,7 +145,7 @@ def test_a_frame_of_an_adaptive_scan_takes_at_most_2_percent_more_than_the_bound
 
 def test_a_steady_frame_takes_its_scan_and_its_bytes():
     """A raster scan: 8 rows of 72 clocks and the bytes. The stages between take 22 clocks, 12 of which the last row is
-    released in, behind its sample."""
+    released in, after its sample."""
     cells = np.zeros((8, 8), bool)
     cells[7, 7] = True
     _, size = speed.touch(SMALL, cells, 0.1)
@@ -324,7 +324,7 @@ def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
     monkeypatch.setattr(chart_page, "SHEETS", (16,))
     monkeypatch.setattr(chart_page.host, "label_us", lambda frames, connectivity: 13.0)
     faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in chart_page.host_table().splitlines()[2:]}
-    # 4 bytes a zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
+    # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
     assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
 
 

@@ -76,7 +76,7 @@ TOLD = {
     ("noise", "half a bit to two bits long"): {"lost", "damaged"},
     ("host", "every frame of `contactfpga.open()`"): {"lost"},
 }
-"""What is wrong here is told at every value, by nothing else than these."""
+"""What is wrong here is reported at every value, by nothing but these."""
 
 NOT_NOTICED = {
     ("ghosts", "zones, random places"): (8, 8),
@@ -172,7 +172,7 @@ def between(found, value):
 
 
 def test_settle_times_are_those_of_the_closed_form(turned):
-    """A neighbour is read, or a switch missed, where the exponentials cross the threshold of a half."""
+    """A neighbor is read, or a switch missed, where the exponentials cross the threshold of a half."""
     for method, pull, path in (
         ("4.7 kΩ pull-up, `release_us = 1`", 4700.0, 50.0),
         ("40 kΩ pull-up, the same", 40_000.0, 50.0),

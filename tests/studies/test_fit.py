@@ -148,7 +148,7 @@ def test_what_is_called_hands_is_no_hand(file, shortcuts):
 
 
 def test_the_answer_is_the_cheapest_of_all_that_pass(file, shortcuts):
-    """Counted and placed by OpenCV, on scenes drawn anew."""
+    """Counted and placed by OpenCV, on newly drawn scenes."""
     found = chosen(file(HANDS), miscounted=0.1, barycenter_mm=2.2, pitches=(8.0, 10.0, 16.0))
     given = source(file(HANDS))
     passing = []
@@ -315,7 +315,7 @@ def test_a_share_that_so_few_scenes_cannot_show_is_refused():
 # ---- what it costs
 
 
-def test_no_more_is_synthesised_than_the_order_of_the_cheapest_needs(file, shortcuts):
+def test_no_more_is_synthesized_than_the_order_of_the_cheapest_needs(file, shortcuts):
     pitches = (5.0, 8.0, 10.0, 16.0, 20.0)
     found = chosen(file(BUMPER), pitches=pitches)
     asked = len(shortcuts.sized)
@@ -353,7 +353,7 @@ def test_wires_then_bytes_decide_between_equal_luts(file, shortcuts, monkeypatch
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: " ".join(map(str, method.values())))
 def test_no_method_needs_fewer_luts_on_a_finer_sheet(method, monkeypatch):
-    monkeypatch.undo()  # what was synthesised before is kept
+    monkeypatch.undo()  # what was synthesized before is kept
     for scan in ("raster", "adaptive"):
         tried = candidates(
             Skin(), [(p, p) for p in (32.0, 20.0, 16.0, 10.0, 8.0, 5.0)], (160.0, 160.0), [method], [scan]
@@ -530,7 +530,7 @@ def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("name", fit_page.EXAMPLES)
 def test_the_page_is_up_to_date(name, monkeypatch):
-    monkeypatch.undo()  # what was synthesised before is kept
+    monkeypatch.undo()  # what was synthesized before is kept
     text = (ROOT / "docs" / "fit.md").read_text()
     assert writer.update(text, {name: fit_page.TABLES[name]}) == text
 
@@ -539,7 +539,7 @@ def test_the_page_is_up_to_date(name, monkeypatch):
 @pytest.mark.timeout(3600)
 def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypatch):
     """With real sizes and times."""
-    monkeypatch.undo()  # what was synthesised before is kept
+    monkeypatch.undo()  # what was synthesized before is kept
     text = (ROOT / "examples" / "scenes-bumper.toml").read_text()
     limits = {"barycenter_mm": 3.0, "latency_us": 500.0, "pitches": None, "quick": True}
     one, two = chosen(file(text), **limits), chosen(file(APART + text + SECOND), **limits)

@@ -18,7 +18,7 @@ SKINS = {
     "cells": Skin(rows=12, columns=16, report="cells", settle_us=10.0),
 }
 HIT = 2
-"""The frame in which the line goes wrong; some come before it, more behind."""
+"""The frame in which the line goes wrong; some come before it, more after."""
 
 
 class Line:

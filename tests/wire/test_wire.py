@@ -143,7 +143,7 @@ TABLE = _crc_table()
 class Hunt:
     """Follows many variants of a stream at once and finds those in which a piece passes its check bytes.
 
-    They are followed through the bytes that differ. What comes behind is the same for all, so there the state of the
+    They are followed through the bytes that differ. What comes after is the same for all, so there the state of the
     CRC decides; which states pass is found by trying all 65,536.
     """
 

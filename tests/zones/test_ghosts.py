@@ -1,4 +1,4 @@
-"""A sheet without diodes: what may be a ghost is told, exactly while nothing changes, and never missed."""
+"""A sheet without diodes: what may be a ghost is reported, exactly while nothing changes, and never missed."""
 
 import collections
 import itertools

@@ -78,7 +78,7 @@ def test_points_of_a_cylinder_lie_on_it_with_normals_that_point_outwards():
         assert math.atan2(y, x) % (2 * math.pi) == pytest.approx(zone.x_mm / RADIUS_MM)
 
 
-def test_neighbours_on_a_cylinder_are_a_pitch_apart_along_the_surface():
+def test_neighbors_on_a_cylinder_are_a_pitch_apart_along_the_surface():
     """The barycenter is taken on the unwrapped sheet: a wide zone's point lies on the surface, not in the link."""
     (wide,) = zones_of([(20, sum(range(20)), 0)], CYLINDER)
     assert math.hypot(*wide.point_mm[:2]) == pytest.approx(RADIUS_MM)

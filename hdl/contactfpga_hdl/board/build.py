@@ -28,7 +28,7 @@ _TOOLS = {
 _NEXTPNR = f"--report {placed.FILE} --timing-allow-fail"
 
 LIMIT_S = 900
-"""For some seeds the router goes on for ever; builds that end take up to two minutes."""
+"""For some seeds the router goes on forever; builds that end take up to two minutes."""
 
 LOG = f"{NAME}.tim"
 """What nextpnr says."""

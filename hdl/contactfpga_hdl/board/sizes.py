@@ -67,7 +67,7 @@ DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
 } | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
 SEEDS = 5
 LIMIT_S = 200
-"""For some seeds the router goes on for ever: they are passed over. Runs that end take up to a minute of the
+"""For some seeds the router goes on forever: they are passed over. Runs that end take up to a minute of the
 processor's time, which is what counts where the system can limit it: a busy machine passes over the same seeds."""
 
 

@@ -38,7 +38,7 @@ def join_layout(derived: Derived) -> data.StructLayout:
             "run": moments_layout(derived),  # add the new run, a group from the stack, and a zone of the row before
             "pop": 1,
             "load": 1,
-            "push": 1,  # put what there is on the stack, or into the table, or let it out
+            "push": 1,  # put what there is on the stack, or into the table, or emit it
             "store": 1,
             "place": range(derived.open_zones),
             "leaves": 1,

@@ -1,4 +1,4 @@
-"""The moments of each zone: added up step by step, kept from row to row, let out when the zone is closed."""
+"""The moments of each zone: added up step by step, kept from row to row, emitted when the zone is closed."""
 
 from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import memory, stream, wiring

@@ -69,7 +69,7 @@ def draw(zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask 
     characters = np.full((high, wide), signs[FREE])
     kinds = np.full((high, wide), FREE)
     if scale == SCALES[0]:
-        characters[:, 1::2] = " "  # one dot a cell
+        characters[:, 1::2] = " "  # one dot per cell
     if zones.cells is not None:
         dots = _spread(zones.cells, scale)
         shown, kind = _cells(dots, scale, signs[CELL], unicode), CELL

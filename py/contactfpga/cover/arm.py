@@ -35,7 +35,7 @@ class Arm:
     weight_nm: float = 0.0
     """M g l in Nm; 0 leaves gravity out."""
     angle_rad: float = 0.0
-    """theta0, the joint's angle at the touch, from hanging down towards the obstacle, in rad."""
+    """theta0, the joint's angle at the touch, from hanging down toward the obstacle, in rad."""
 
     def __post_init__(self) -> None:
         positive("inertia_kgm2", self.inertia_kgm2, "kg m2")

@@ -6,7 +6,7 @@ and t = k h,
 
     g(s) = 1/(2 pi) int_0^inf t G(t) J0(t s) dt.
 
-``halfspace``: the cover goes on for ever below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t),
+``halfspace``: the cover goes on forever below the switches (paper (9), Johnson 3.2): G = (1 + t) exp(-t),
 g = 3/(2 pi) (1 + s^2)^(-5/2).
 
 ``bonded``: an incompressible cover of thickness h glued to a rigid base, the switches between them. The stream of an

@@ -1,6 +1,6 @@
 """Where something touches the cover: convex parts of a patch, and how their pressure is spread.
 
-Lengths in m, angles in rad from the x axis towards the y axis, all on the sheet laid flat.
+Lengths in m, angles in rad from the x axis toward the y axis, all on the sheet laid flat.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Part(Protocol):
 
     @property
     def x_m(self) -> float:
-        """Its middle, which is its centroid, along the columns in m."""
+        """Its middle, which is its barycenter, along the columns in m."""
 
     @property
     def y_m(self) -> float:

@@ -153,7 +153,7 @@ class Board:
         return Subscription(self._link, maxsize, self)
 
     def __iter__(self) -> Iterator[Zones]:
-        """Every frame, for ever; a recording ends."""
+        """Every frame, forever; a recording ends."""
         yield from self._frames
 
     async def __aiter__(self) -> AsyncIterator[Zones]:

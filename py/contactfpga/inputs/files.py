@@ -1,4 +1,4 @@
-"""Files that can be read to an end: a FIFO would be waited for, a device read for ever."""
+"""Files that can be read to an end: a FIFO would be waited for, a device read forever."""
 
 from __future__ import annotations
 

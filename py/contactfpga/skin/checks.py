@@ -177,7 +177,7 @@ def _check_ghosts(skin: Skin, mask: Mask) -> None:
     if mask:
         raise SkinError(
             f"mask lists {len(mask)} switches; diodes = 'none' takes none, as what a masked switch feeds "
-            "could not be told"
+            "could not be known"
         )
 
 
@@ -217,7 +217,7 @@ def check_timing(skin: Skin) -> None:
         divided = f" and report = {skin.report!r}" if derived.report.divided else ""
         raise SkinError(
             f"settle_us + release_us is {derived.row_clocks} clocks; {rows}{skin.columns} columns and "
-            f"{skin.zone_capacity} zones a frame need {derived.min_row_clocks} clocks "
+            f"{skin.zone_capacity} zones per frame need {derived.min_row_clocks} clocks "
             f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
         )
     if skin.send == "on_change" and derived.keep_alive_frames < 1:

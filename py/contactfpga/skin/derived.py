@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 HELLO_PERIOD_US = 500_000
-"""The board says hello this often, so that one can be late behind a frame and still come every second."""
+"""The board says hello this often, so that one can wait for a frame and still come every second."""
 
 EPOCH_BITS = 22
 """The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
@@ -56,7 +56,7 @@ class Derived(Widths):
         return self.skin.clock_hz // 1_000_000
 
     def clocks(self, us: float) -> int:
-        """Clocks that last at least so many microseconds."""
+        """Clocks that last at least this many microseconds."""
         return _whole(us * self.clocks_per_us)
 
     @property
@@ -143,7 +143,7 @@ class Derived(Widths):
         return 1 + self.debounce_clocks + self.label_clocks + 2 + 4
 
     def items_clocks(self, items: int) -> int:
-        """For a frame's items and trailer, a byte a clock; where items are divided that takes longer than packing."""
+        """For a frame's items and trailer, a byte per clock; where items are divided that takes longer than packing."""
         plain = items * self.item_bytes + self.trailer_bytes
         stuffing = math.ceil(plain / 254)
         if not self.report.divided:
@@ -189,7 +189,7 @@ class Derived(Widths):
 
     @functools.cached_property
     def slot_bits(self) -> int:
-        """Of a count of row times in which a debounce time, and two frames more, can be told."""
+        """Of a count of row times in which a debounce time, and two frames more, can be counted."""
         return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
 
     @property
@@ -244,7 +244,7 @@ class Derived(Widths):
 
         Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
         them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
-        are packed before the next one comes. An adaptive scan lets empty rows out, so that every row may close as many
+        are packed before the next one comes. An adaptive scan omits empty rows, so that every row may close as many
         zones, and bitmap rows of two frames may wait.
         """
         if not self.report.zones:
@@ -255,5 +255,5 @@ class Derived(Widths):
 
 
 def _whole(value: float) -> int:
-    """The next whole number upwards, not counting what a float's rounding added."""
+    """The next whole number upward, not counting what a float's rounding added."""
     return math.ceil(value - 1e-9)

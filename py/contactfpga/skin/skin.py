@@ -58,11 +58,11 @@ class Skin:
     release_us: float = 1.0
     """Time without a driven row before the next one, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
-    """``direct``: a pin a row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
+    """``direct``: a pin per row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
     row_chains: int = 1
     """Chains of 74HC595 that are shifted at once; chain j drives rows j n to j n + n - 1, n = ceil(rows / chains)."""
     column_read: Literal["direct", "74hc165"] = "direct"
-    """``direct``: a pin a column; ``74hc165``: columns on shift registers, which settle and release may have to wait
+    """``direct``: a pin per column; ``74hc165``: columns on shift registers, which settle and release may have to wait
     for."""
     column_chains: int = 1
     """Chains of 74HC165 that are shifted at once, with the columns spread over them as rows are."""
@@ -77,13 +77,13 @@ class Skin:
 
     labeller: LabellerName | Labeller = "run"
     """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
-    a cell a clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
+    a cell per clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
     cells are one zone."""
     report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
     rounded; ``cells``: the pressed cells as a bitmap."""
     barycenter_bits: int = limits.BARYCENTER_BITS
-    """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upwards."""
+    """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upward."""
     send: Literal["always", "on_change"] = "always"
     """``always``: every frame; ``on_change``: a frame whose cells differ from the last one, or a keep-alive."""
     keep_alive_ms: float = 100.0

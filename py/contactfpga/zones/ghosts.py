@@ -17,7 +17,7 @@ columns, taken together, have no gap.
 
 If a switch changes during the scan, the rows before it do not show it yet, and
 corners may be hidden in that frame. A row itself is read at once, so that a ghost's own row shows another cell. So in a
-frame that differs from the one received before it all is suspect that may have a neighbour in its row: no ghost is
+frame that differs from the one received before it all is suspect that may have a neighbor in its row: no ghost is
 missed as long as no switch changes twice between two frames.
 """
 

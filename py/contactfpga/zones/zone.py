@@ -254,7 +254,7 @@ def _line(zone: Zone) -> str:
 def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
     """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
 
-    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis towards the y axis, and y
+    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis toward the y axis, and y
     along it; ``x_mm`` is the arc length.
     """
     if radius_mm is None:

@@ -65,7 +65,7 @@ class CompiledBoard:
         self.hold(cells[None], 0)
 
     def restart(self, mutant: int = 0) -> None:
-        """Power up anew, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
+        """Power up again, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:

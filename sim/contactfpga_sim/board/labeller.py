@@ -88,7 +88,7 @@ class LabelBench:
             ctypes.c_uint64(limit),
         )
         if not finished:
-            raise RuntimeError(f"the labeller let out fewer than {count} end marks in {limit} clocks")
+            raise RuntimeError(f"the labeller emitted fewer than {count} end marks in {limit} clocks")
         return self._collect(count)
 
     def close(self) -> None:

@@ -1,5 +1,5 @@
 """The virtual board behind a pseudo-terminal: a serial client sees what a board would send, never faster than in real
-time, and slower where this machine cannot keep up, which is told.
+time, and slower where this machine cannot keep up, which it reports.
 """
 
 from __future__ import annotations

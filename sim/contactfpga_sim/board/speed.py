@@ -26,7 +26,7 @@ RUN_S = 0.02
 
 
 def cycles_per_second(skin: Skin, scene: str = "two_fingers") -> float:
-    """Clock cycles a second of the board alone, without a client."""
+    """Clock cycles per second of the board alone, without a client."""
     cycles = round(RUN_S * skin.clock_hz)
     with VirtualBoard(skin, scene) as board:
         board.advance(cycles)  # the first run finds cold caches
@@ -47,7 +47,7 @@ def row(name: str, skin: Skin) -> str:
 
 def main() -> int:
     """Print the table."""
-    print("| Skin | clock | cycles a second | of real time |")
+    print("| Skin | clock | cycles per second | of real time |")
     print("|---|---|---|---|")
     for name, skin in SKINS.items():
         print(row(name, skin), flush=True)

@@ -33,7 +33,7 @@ INITIALISED = (r"link\.odometer\.digits\[", r"debounce\.state\[")
 """Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the odometer's
 digits and the states of debounce. They are put there after the first clock: until then unknown registers may write
 anywhere. In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial`
-there are more zeros: :func:`initialised`."""
+there are more zeros: :func:`initialized`."""
 
 _GATES = (
     f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "
@@ -45,7 +45,7 @@ class Unknown(AssertionError):
     """An output is unknown after the first clock of the reset."""
 
 
-def initialised(skin: Skin) -> tuple[str, ...]:
+def initialized(skin: Skin) -> tuple[str, ...]:
     """:data:`INITIALISED`, the hello's bytes, and of the memory of the labeller `serial` the half that stays zero."""
     words = (*INITIALISED, rf"link\.store\[({'|'.join(map(str, hello_words(skin)))})\]")
     if skin.labeller != "serial" or skin.report == "cells":
@@ -65,7 +65,7 @@ def run(
 ) -> Trace:
     """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
 
-    ``known_words``: patterns of what is known at power-up, :func:`initialised` if left out. Raises :class:`Unknown`
+    ``known_words``: patterns of what is known at power-up, :func:`initialized` if left out. Raises :class:`Unknown`
     when a row, the transmit or the contact pin is not known, and :class:`OutOfTime`.
     """
     from contactfpga_hdl.top import Top
@@ -74,7 +74,7 @@ def run(
         folder = Path(name)
         (folder / "model.il").write_text(native.rtlil(Top(skin)))
         native.yosys(_GATES, folder)
-        patterns = initialised(skin) if known_words is None else known_words
+        patterns = initialized(skin) if known_words is None else known_words
         gates, known = forget((folder / "gates.v").read_text(), patterns)
         (folder / "gates.v").write_text(gates)
         (folder / "bench.v").write_text(_bench(skin, timeline, cycles, known))
@@ -93,12 +93,12 @@ def _run(folder: Path, limit_s: float, *command: str) -> str:
     return done.stdout
 
 
-def forget(gates: str, initialised: Sequence[str]) -> tuple[str, dict[str, str]]:
+def forget(gates: str, initialized: Sequence[str]) -> tuple[str, dict[str, str]]:
     """The Verilog without initial values, and those by the register's name whose declaration matches a pattern."""
     known: dict[str, str] = {}
 
     def declaration(found: re.Match) -> str:
-        if any(re.search(pattern, found[0]) for pattern in initialised):
+        if any(re.search(pattern, found[0]) for pattern in initialized):
             known[found[2]] = found[3]
         return f"{found[1]}{found[2]} ;"
 

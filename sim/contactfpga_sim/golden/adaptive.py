@@ -22,7 +22,7 @@ class Slot:
     begin: int
     rows: frozenset[int]
     strobe: int
-    """When its columns have come through the synchronisers."""
+    """When its columns have come through the synchronizers."""
     released: int
     """The first cycle without a driven row; the end of the slot if they stay driven."""
     end: int
@@ -102,7 +102,7 @@ class Scanner:
         return scan, counted
 
     def _strobe(self, begin: int, rows: frozenset[int]) -> int:
-        """When the slot's columns count: behind its settle time; of idle rows that stay driven, when one is seen."""
+        """When the slot's columns count: after its settle time; of idle rows that stay driven, when one is seen."""
         regular = begin + self._facts.settle + 1
         if not self._watched():
             return regular

@@ -26,7 +26,7 @@ def _rule(method: object) -> DebounceRule:
 
 
 def debounced(samples: np.ndarray, method: object, press: int, release: int) -> np.ndarray:
-    """Debounce (F, R, C) bool samples, one a scan and switch; ``press`` and ``release`` in scan periods.
+    """Debounce (F, R, C) bool samples, one per scan and switch; ``press`` and ``release`` in scan periods.
 
     Returns (F, R, C) bool: what each switch counts as from its sample of that scan on.
     """
@@ -71,10 +71,10 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 
 
 class Timed:
-    """The same where samples are not a scan apart; times are counted in slots, a row time each.
+    """The same where samples are not a scan apart; times are counted in slots, one per row time.
 
     ``press`` and ``release`` in scan periods of ``rows`` slots. A time is over at the first sample that comes later
-    than one scan period less behind its beginning: with samples a scan period apart, when it is over.
+    than one scan period less after its beginning: with samples a scan period apart, when it is over.
     """
 
     def __init__(self, method: object, press: int, release: int, rows: int):

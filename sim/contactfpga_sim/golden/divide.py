@@ -10,7 +10,7 @@ from contactfpga_sim.golden.trace import Trace
 
 
 def barycenter(total: int, area: int, fraction_bits: int) -> int:
-    """The nearest step of 1/2^fraction_bits to total / area, half a step upwards."""
+    """The nearest step of 1/2^fraction_bits to total / area, half a step upward."""
     return int(Fraction(total * 2**fraction_bits, area) + Fraction(1, 2))
 
 

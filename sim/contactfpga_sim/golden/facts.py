@@ -28,12 +28,12 @@ def exact(value: float) -> Fraction:
 
 
 def upwards(value: Fraction) -> int:
-    """The next whole number upwards. A billionth above one does not count: 37/12 us is 37 clocks of 12 MHz."""
+    """The next whole number upward. A billionth above one does not count: 37/12 us is 37 clocks of 12 MHz."""
     return math.ceil(value - Fraction(1, 10**9))
 
 
 def downwards(value: Fraction) -> int:
-    """The next whole number downwards. A billionth below one does not count."""
+    """The next whole number downward. A billionth below one does not count."""
     return math.floor(value + Fraction(1, 10**9))
 
 
@@ -65,7 +65,7 @@ class Facts:
 
     @functools.cached_property
     def shift_bit(self) -> int:
-        """E: clocks a bit takes in the shift registers; 0 where there are none."""
+        """E: clocks that a bit takes in the shift registers; 0 where there are none."""
         if self.skin.row_drive == "direct" and self.skin.column_read == "direct":
             return 0
         return max(2, -(-self.skin.clock_hz // self.skin.shift_hz))
@@ -148,7 +148,7 @@ class Facts:
 
     @functools.cached_property
     def keep_alive_slots(self) -> int:
-        """Row times after which an unchanged frame is sent: so many that one more frame could take too long."""
+        """Row times after which an unchanged frame is sent; with one more frame it could come too late."""
         if self.scan.even:
             return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)

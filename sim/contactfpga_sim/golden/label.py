@@ -1,4 +1,4 @@
-"""When a labeller lets its zones out: where zones end is geometry, how many clocks that takes is the labeller's rule in
+"""When a labeller emits its zones: where zones end is geometry, how many clocks that takes is the labeller's rule in
 docs/timing.md. The clocks of ``run``, clusters and steps, are here, those of ``serial`` in :mod:`label_serial`;
 labellers that are not exact have their own idea of a zone in :mod:`label_shadows`."""
 
@@ -50,7 +50,7 @@ def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks) -> La
 
 
 def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks behind the one in which the lower was handed over:
+    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
     when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
     """
     last_step, steps = cluster_steps(strip, connectivity)

@@ -1,4 +1,4 @@
-"""When the labeller that takes a cell a clock lets its zones out: the column rule of docs/timing.md."""
+"""When the labeller that takes a cell per clock emits its zones: the column rule of docs/timing.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contactfpga_sim.golden.zones import flood
 
 
 def cluster_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
-    """For the (2, C) cells of two adjacent rows, all in clocks behind the one in which the lower was handed over:
+    """For the (2, C) cells of two adjacent rows, all in clocks after the one in which the lower was handed over:
     when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
 
     The first is a (2, C) int array, 0 where nothing is pressed.

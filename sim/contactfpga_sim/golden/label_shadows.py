@@ -1,4 +1,4 @@
-"""What the labellers `projection` and `single` take for zones, and when they let them out (docs/timing.md)."""
+"""What the labellers `projection` and `single` take for zones, and when they emit them (docs/timing.md)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def single(cells: np.ndarray, connectivity: int = 8) -> Labelling:
 
 
 def _work(walks: list[bool], clocks: int, departures: list[Departure]) -> Labelling:
-    """A row that is walked takes so many clocks more; the end mark comes three clocks behind the last row's walk."""
+    """A row that is walked takes this many clocks more; the end mark comes three clocks after the last row's walk."""
     steps = [clocks if walk else 0 for walk in walks]
     return Labelling(tuple(step + 1 for step in steps), steps[-1] + 3, tuple(departures))
 

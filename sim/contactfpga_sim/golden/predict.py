@@ -50,7 +50,7 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
 
 
 class Labeller:
-    """Hands rows over and lets records out, noting both in a trace."""
+    """Hands rows over and emits records, noting both in a trace."""
 
     def __init__(self, facts: Facts, trace: Trace):
         self._facts = facts

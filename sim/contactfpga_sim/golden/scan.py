@@ -102,7 +102,7 @@ RASTER = Raster()
 
 
 def strobe(facts: Facts, slot: int) -> int:
-    """The cycle in which the sample of a row slot has come through shift registers and synchronisers."""
+    """The cycle in which the sample of a row slot has come through shift registers and synchronizers."""
     return sampled(facts, slot) + 2 + facts.column_shift
 
 

@@ -25,7 +25,7 @@ class Departures:
     row: np.ndarray
     """(n,) int64: the row that is worked while the zone leaves."""
     clock: np.ndarray
-    """(n,) int64: in which clock behind the one in which that row was handed over it leaves."""
+    """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
     moments: np.ndarray
     """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave."""
 
@@ -75,7 +75,7 @@ def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: Labeller
 def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
     """(N, R, C) int64: for a pressed cell the least index, over all frames, of its zone's cells, else -1.
 
-    The least label spreads to neighbours until nothing changes; after every round each cell also takes the
+    The least label spreads to neighbors until nothing changes; after every round each cell also takes the
     label of the cell its label names, which doubles the distance that labels travel.
     """
     count, rows, columns = frames.shape

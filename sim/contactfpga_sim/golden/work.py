@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclasses.dataclass(frozen=True)
 class Departure:
-    """A zone that leaves: so many clocks behind the one in which row ``row`` was handed over."""
+    """A zone that leaves: this many clocks after the one in which row ``row`` was handed over."""
 
     row: int
     clock: int

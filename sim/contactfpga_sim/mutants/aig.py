@@ -13,10 +13,10 @@ from pathlib import Path
 
 @dataclasses.dataclass(frozen=True)
 class Circuit:
-    """What a file holds. Nodes are numbered inputs first, then latches, then gates, each behind its operands."""
+    """What a file holds. Nodes are numbered inputs first, then latches, then gates, each after its operands."""
 
     inputs: Sequence[str]
-    """Their names, a bit as ``name[3]``."""
+    """Their names, bits as ``name[3]``."""
     latches: Sequence[tuple[str, ...]]
     """All names of each."""
     outputs: Sequence[str]
@@ -126,7 +126,7 @@ class Graph:
         return nexts, driven
 
     def cone(self, roots: Iterable[int]) -> list[int]:
-        """Numbers of the nodes that the roots depend on, each behind its operands."""
+        """Numbers of the nodes that the roots depend on, each after its operands."""
         seen, todo = {0}, [root >> 1 for root in roots]
         while todo:
             node = todo.pop()

@@ -25,7 +25,7 @@ BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
 
 CHECKED = 2
-"""So many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
+"""This many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,7 +98,7 @@ def share_killed(results: Iterable[Result]) -> float:
 
 
 def listed(results: Iterable[Result]) -> str:
-    """What is alive, a line each: stage, source place, change, Skin."""
+    """What is alive, one per line: stage, source place, change, Skin."""
     alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
     return "\n".join(f"{mutant}  ({skin})" for mutant, skin in alive)
 

@@ -124,7 +124,7 @@ class Stimulus(NamedTuple):
     timeline: Timeline
     cycles: int
     noise: Sequence[tuple[int, int]] = ()
-    """At which cycle the receive pin goes low, and for how many: too short for a start bit, or with no stop bit behind
+    """At which cycle the receive pin goes low, and for how many: too short for a start bit, or with no stop bit after
     it, so that no byte is received."""
 
 
@@ -149,7 +149,7 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
 
 
 def until_time_wraps(skin: Skin) -> Stimulus:
-    """Little happens, until the device time has begun anew: the only way to its upper bits."""
+    """Little happens, until the device time has begun again: the only way to its upper bits."""
     return _rare(skin, "until the time wraps", _TIME_WRAPS_US + 500_000)
 
 
@@ -187,7 +187,7 @@ def _noisy(skin: Skin, scans: int) -> Stimulus:
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
-    """Hellos one behind the other: more frames are overwritten than the counter of them can count."""
+    """Hellos one after the other: more frames are overwritten than the counter of them can count."""
     known = facts(skin)
     scan = known.scan_clocks
     asked = range(scan, (scans - 5) * scan, 130 * known.bit_clocks)
@@ -196,7 +196,7 @@ def _crowded(skin: Skin, scans: int) -> Stimulus:
 
 
 def _meeting(skin: Skin, chains: int) -> Stimulus:
-    """Chains of hellos behind which a frame waits. Their ends are spread over a hello's time around the next frame's
+    """Chains of hellos, then a frame that waits. Their ends are spread over a hello's time around the next frame's
     end mark, so that the wire comes free in any clock of it."""
     known = facts(skin)
     scan, byte = known.scan_clocks, 10 * known.bit_clocks

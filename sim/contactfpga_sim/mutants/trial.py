@@ -50,7 +50,7 @@ def expected(board: CompiledBoard, stimulus: Stimulus) -> Events:
 
 
 def killed_at(board: CompiledBoard, number: int, stimulus: Stimulus, events: Events) -> str | None:
-    """The first boundary at which mutant ``number`` does something else than ``events``; None where it never does."""
+    """The first boundary at which mutant ``number`` does something other than ``events``; None where it never does."""
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
         until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)

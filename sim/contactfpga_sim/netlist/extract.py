@@ -1,4 +1,4 @@
-"""The netlist of a built board: taken back out of an iCE40's bitstream, or as synthesised for an ECP5."""
+"""The netlist of a built board: taken back out of an iCE40's bitstream, or as synthesized for an ECP5."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def _without_pll(chip: str, board: BoardSpec, skin: Skin) -> str:
     return chip[: cell.start()] + stub + chip[cell.end() :]
 
 
-def synthesised(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
-    """Synthesise for an ECP5: the cells that place and route starts from, without their places."""
+def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
+    """Synthesize for an ECP5: the cells that place and route starts from, without their places."""
     _check(skin)
     build.plan_for(board, skin).extract(str(folder))
     native.yosys(f"read_rtlil {NAME}.il; {synthesis.script(board.fpga, NAME)}; write_verilog -noattr chip.v", folder)

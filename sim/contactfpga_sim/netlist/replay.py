@@ -1,6 +1,6 @@
 """What ``make bitstream-replay`` runs: frames through the netlist of a built board, compared with the golden model.
 
-The iCE40 boards' netlists are taken back out of the bitstream; the ULX3S's is the synthesised one. Compared are the
+The iCE40 boards' netlists are taken back out of the bitstream; the ULX3S's is the synthesized one. Compared are the
 transmit and the contact pin in every clock after the power-up reset, hence every byte.
 """
 
@@ -186,8 +186,8 @@ def _report(board: BoardSpec, skin: Skin, frames: np.ndarray) -> None:
         taken = extract.from_bitstream(board, skin, folder)
         print("bitstream    unpacked and packed again: the same bytes; the netlist is taken out of it")
     else:
-        taken = extract.synthesised(board, skin, folder)
-        print("netlist      synthesised; not placed, not taken out of a bitstream")
+        taken = extract.synthesized(board, skin, folder)
+        print("netlist      synthesized; not placed, not taken out of a bitstream")
     if skin.clock_hz != board.clock_hz:
         print("PLL          a stub drives its output net; it is always locked")
     model = model_of(skin, taken)

@@ -63,7 +63,7 @@ def set_table(found: Mapping[str, Result]) -> str:
 
 
 def failure_table() -> str:
-    """What comes of each of :data:`FAILURES`."""
+    """What happens in each of :data:`FAILURES`."""
     lines = [["", "way", "reacts, ms", "because of", "peak force, N", "indentation, mm", "reversals", "at rest, ms"]]
     for failure in FAILURES:
         found = run(Case.load("paper").but(**failure.changes), failure.way, faults=failure.faults).outcome

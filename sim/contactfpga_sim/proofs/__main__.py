@@ -66,7 +66,7 @@ def _report(case: Case, number: str) -> bool:
         _progress(f"{number}: {case.name}: {bug.name}")
         found += case.run_with(bug).outcome == "counterexample"
     _progress("")
-    holds = "for ever" if not case.bounded else f"{case.clocks} clock{'s' if case.clocks > 1 else ''}"
+    holds = "forever" if not case.bounded else f"{case.clocks} clock{'s' if case.clocks > 1 else ''}"
     bugs = f"{found} of {len(case.bugs)}" if case.bugs else ""
     _line(case.claim, case.size, holds, f"{verdict.seconds:.1f}", verdict.outcome, bugs)
     return verdict.outcome == "proved" and found == len(case.bugs)

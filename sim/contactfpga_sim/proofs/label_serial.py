@@ -167,7 +167,7 @@ _STALL_BUGS = (
 )  # fmt: skip
 _BUGS = (
     Bug("clusters end with the row before", SerialLabeller, "closes", _clusters_end_early),
-    Bug("a zone is expected to go on for ever", SerialLabeller, "write_later__en",
+    Bug("a zone is expected to go on forever", SerialLabeller, "write_later__en",
         lambda enable, inside: enable & inside["starts"]),
     Bug("the table is not read", SerialLabeller, "wanted",
         lambda wanted, inside: wanted & inside["earlier"]),

@@ -61,7 +61,7 @@ def _described_until_commit(proof: Proof, dut: Packer, plain: "_PlainBytes") -> 
 
 
 class _PlainBytes:
-    """The bytes of items and trailer in their order, one a clock, from the clock after the one they come in."""
+    """The bytes of items and trailer in their order, one per clock, from the clock after the one they come in."""
 
     def __init__(self, m: Module, dut: Packer):
         derived, items, send = dut.derived, dut.items, dut.frames.verdict.send

@@ -124,7 +124,7 @@ _BUGS = (
     Bug("the wrong half", Seek, "suspects", _wrong_half),
     Bug("known rows again", Seek, "known",
         lambda known, inside: Mux(inside.component.alone, known, known & inside["known"])),
-    Bug("alone for ever", Seek, "todo",
+    Bug("alone forever", Seek, "todo",
         lambda todo, inside: todo | Mux(_in_state(inside, WAIT) & inside.component.alone, inside["pattern"], 0)),
     Bug("the highest first", Seek, "pattern",
         lambda rows, inside: Mux(_in_state(inside, PICK) & (rows & (rows - 1) == 0), _highest(inside["todo"]), rows)),

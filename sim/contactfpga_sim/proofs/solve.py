@@ -1,4 +1,4 @@
-"""The solver inside Yosys: by induction, for ever, or by search through all inputs for some clocks from power-up."""
+"""The solver inside Yosys: by induction, forever, or by search through all inputs for some clocks from power-up."""
 
 import dataclasses
 import re
@@ -41,7 +41,7 @@ class Verdict:
 
 
 def prove(build: Callable[[Proof], None], clocks: int, limit_s: float = 600) -> Verdict:
-    """Whether claims and lemmas of ``build`` hold for ever, by induction over at most ``clocks`` clocks."""
+    """Whether claims and lemmas of ``build`` hold forever, by induction over at most ``clocks`` clocks."""
     return _solve(build, Proof(), f"-tempinduct -maxsteps {clocks}", limit_s)
 
 

@@ -67,7 +67,7 @@ def debounce(proof: Proof, method: DebounceName) -> None:
 
 
 def audit(proof: Proof, capacity: int = 2) -> None:
-    """Free: records at any time, and when items are taken. Assumed: no more zones a frame than there can be.
+    """Free: records at any time, and when items are taken. Assumed: no more zones per frame than there can be.
 
     Claimed: of each frame the first ``capacity`` zones and the end mark pass, each in the clock in which it is taken;
     the others are taken and go no further. The summary counts them all and says whether some are missing.

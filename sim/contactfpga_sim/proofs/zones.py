@@ -1,4 +1,4 @@
-"""What the labeller's records are held against: the zones of a frame, found a row at a time with all their cells.
+"""What the labeller's records are held against: the zones of a frame, found row by row with all their cells.
 
 No runs, clusters, brackets or places here: the cells of two adjacent rows are the nodes of a graph, and what belongs
 together is its closure. :func:`rows_find_the_zones` shows that these are the zones of a flood fill over the frame.
@@ -72,7 +72,7 @@ class RowStep(Elaboratable):
 
 
 def next_row(m: Module, *given) -> tuple[OpenRow, Signal]:
-    """What comes of a :class:`RowStep`."""
+    """The result of a :class:`RowStep`."""
     m.submodules += (step := RowStep(*given))
     return step.after, step.ended
 

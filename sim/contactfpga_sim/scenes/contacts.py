@@ -1,6 +1,6 @@
 """What touches a sheet, as physical things: shape, place, force and motion. Lengths in mm on the sheet laid flat.
 
-x runs along the columns, y along the rows, cell (row 0, column 0) lies at 0 mm; angles turn from x towards y.
+x runs along the columns, y along the rows, cell (row 0, column 0) lies at 0 mm; angles turn from x toward y.
 """
 
 from __future__ import annotations
@@ -104,13 +104,13 @@ def edge(length_mm: float, width_mm: float) -> Shape:
 
 
 def palm(scale: float = 1.0) -> Shape:
-    """A hand laid flat, 84 mm wide and 92 mm long, fingers towards -y: two balls, the pads below the fingers and the
+    """A hand laid flat, 84 mm wide and 92 mm long, fingers toward -y: two balls, the pads below the fingers and the
     heel, one contact around a hollow."""
     return _scaled(scale, (-24, 16, 18, 34), (26, 16, 16, 34), (0, -24, 42, 14), (0, 42, 30, 12))
 
 
 def sole(length_mm: float = 260.0) -> Shape:
-    """A bare right foot, toes towards -y: heel, outer edge and ball, which are one contact, and the big toe, 8 mm
+    """A bare right foot, toes toward -y: heel, outer edge and ball, which are one contact, and the big toe, 8 mm
     apart from it where the foot is 260 mm long."""
     scale = length_mm / 260
     outer = Rectangle(16 * M * scale, 50 * M * scale, 22 * M * scale, 25 * M * scale)

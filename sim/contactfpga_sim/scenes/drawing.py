@@ -33,7 +33,7 @@ class Drawn(Protocol):
 
 
 def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
-    """Two rows of cells a line of text, each zone in a colour of its own; in ASCII a row a line."""
+    """Two rows of cells per line of text, each zone in a color of its own; in ASCII one row per line."""
     return Columns([_sheet(out, unicode) for out in outcomes], padding=(0, 3))
 
 

@@ -29,7 +29,7 @@ class SceneFileError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Range:
-    """A number that is drawn anew for each contact; a fixed one where both ends are the same."""
+    """A number that is drawn for each contact; a fixed one where both ends are the same."""
 
     low: float
     high: float

@@ -13,10 +13,10 @@ from contactfpga_sim.scenes.file import Kind, Range, SceneFile, SceneFileError
 from contactfpga_sim.scenes.scene import Scene, sheet
 
 DIRECTIONS = 128
-"""In which the distance of two shapes is looked for; it is told short by 0.03 % of their size at most."""
+"""In which the distance of two shapes is looked for; it comes out short by at most 0.03 % of their size."""
 
 PLACES = 10
-"""Places that are tried for a contact beside others, before the scene is drawn anew."""
+"""Places that are tried for a contact beside others, before the scene is drawn again."""
 
 
 def scene_of(file: SceneFile, number: int, skin: Skin) -> tuple[Scene, float]:

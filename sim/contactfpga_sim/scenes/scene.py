@@ -42,7 +42,7 @@ class Scene:
         return [load for load in found if load is not None]
 
     def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
-        """Number of contacts, areas in mm2 and centroids in mm at that time, from the continuous shapes: parts that
+        """Number of contacts, areas in mm2 and barycenters in mm at that time, from the continuous shapes: parts that
         overlap or touch are one contact. With a Skin, of what lies on its sheet, which ends half a pitch beyond the
         outermost switches."""
         parts = [part for load in self.loads(seconds) for part in load.parts]

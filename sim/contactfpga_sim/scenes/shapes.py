@@ -63,7 +63,7 @@ def ladder(rows: int, columns: int) -> np.ndarray:
 
 
 def tree(rows: int, columns: int) -> np.ndarray:
-    """Single cells that merge in pairs, the pairs in pairs, and so on downwards."""
+    """Single cells that merge in pairs, the pairs in pairs, and so on downward."""
     cells = np.zeros((rows, columns), bool)
     stems = list(range(0, columns, 2))
     y = 0

@@ -35,9 +35,9 @@ class TrueContact(NamedTuple):
 
     area_mm2: float
     x_mm: float
-    """Centroid along the columns; column 0 lies at 0."""
+    """Barycenter along the columns; column 0 lies at 0."""
     y_mm: float
-    """Centroid along the rows; row 0 lies at 0."""
+    """Barycenter along the rows; row 0 lies at 0."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _gaps(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
 
 
 def _measured(parts: Sequence[Part], box: Box) -> tuple[float, float, float]:
-    """Area in m2 and centroid in m of the union of these parts within the box."""
+    """Area in m2 and barycenter in m of the union of these parts within the box."""
     if len(parts) == 1 and _holds(box, parts[0]):
         return parts[0].area_m2, parts[0].x_m, parts[0].y_m
     low = min(_heights(part, box)[0] for part in parts)

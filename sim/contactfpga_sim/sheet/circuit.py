@@ -64,7 +64,7 @@ class Circuit:
 class Line:
     """A column with its capacitance: a resistor pulls it to the released level, a pressed switch to the pressed one.
 
-    Both go exponentially: towards released with R C of the pull resistor, towards the voltage divider of the two
+    Both go exponentially: toward released with R C of the pull resistor, towards the voltage divider of the two
     resistances with that of both in parallel.
     """
 
@@ -78,17 +78,17 @@ class Line:
 
     @property
     def pulled(self) -> float:
-        """Share of the way at which a column comes to rest that is pulled for ever."""
+        """Share of the way at which a column comes to rest that is pulled forever."""
         return self.pull_ohm / (self.pull_ohm + self.path_ohm)
 
     @property
     def press_s(self) -> float:
-        """Time constant towards pressed."""
+        """Time constant toward pressed."""
         return self.farad * self.path_ohm * self.pulled
 
     @property
     def release_s(self) -> float:
-        """Time constant towards released."""
+        """Time constant toward released."""
         return self.farad * self.pull_ohm
 
     @staticmethod

@@ -24,7 +24,7 @@ LINE_S = 5.0
 
 @contextlib.contextmanager
 def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
-    """So many processes on this machine, one a core where None is said; or the cluster with this scheduler.
+    """This many processes on this machine, one per core for None; or the cluster with this scheduler.
 
     When the block ends by an error or by Ctrl-C, what is left to do is dropped, and no process stays.
     """

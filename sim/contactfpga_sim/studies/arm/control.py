@@ -22,7 +22,7 @@ class Sensed(NamedTuple):
 
 
 class Controller:
-    """Speed PI with one of two behaviours.
+    """Speed PI with one of two behaviors.
 
     ``reverse``, the paper's: a contact, or torque at the limit, makes the arm go back until the contact is resolved,
     then slow down to rest. ``comply``: the arm follows the torque on it like an inertia with a damper and a spring;

@@ -166,7 +166,7 @@ def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
 
 
 def write_csv(found: dict[Task, Point], path: Path) -> Path:
-    """All numbers, a line a run, in SI units."""
+    """All numbers, a line per run, in SI units."""
     names = [field.name for field in dataclasses.fields(Point)]
     with open(path, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)

@@ -78,7 +78,7 @@ class Motor(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class Control(_Checked):
-    """Speed controller, behaviour, and what it trusts."""
+    """Speed controller, behavior, and what it trusts."""
 
     period_s: float
     """Between two samples, in s."""
@@ -177,7 +177,7 @@ class Touch(_Checked):
     """Of what holds that mass."""
     damping_ns_m: float = 0.0
     push_m_s: float = 0.0
-    """Speed with which it comes towards the arm; 0: it stays where it is."""
+    """Speed with which it comes toward the arm; 0: it stays where it is."""
     push_m: float = 0.0
     """How far it comes."""
     hold_s: float = 0.0
@@ -185,7 +185,7 @@ class Touch(_Checked):
     _zero = ("x_mm", "y_mm", "gap_m", "mass_kg", "stiffness_n_m", "damping_ns_m", "push_m_s", "push_m", "hold_s")
 
     def pushed(self, seconds: float) -> tuple[float, float]:
-        """How far it has come towards the arm, and how fast it does."""
+        """How far it has come toward the arm, and how fast it does."""
         if seconds <= 0 or not self.push_m_s:
             return 0.0, 0.0
         takes = self.push_m / self.push_m_s
@@ -202,7 +202,7 @@ class Usb(_Checked):
     """How bytes come from the board's UART to the program: a USB serial chip, and the host."""
 
     packet_bytes: float = 510
-    """The chip sends when it holds so many, or when its timer ran out."""
+    """The chip sends when it holds this many, or when its timer ran out."""
     timer_s: float = 1e-3
     """Its latency timer: 1 ms is what the driver sets, 16 ms what a system has."""
     frame_s: float = 125e-6

@@ -1,4 +1,4 @@
-"""The chart's numbers: a line a point, written as CSV and read back."""
+"""The chart's numbers: a line per point, written as CSV and read back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contactfpga_sim.studies.chart.study import KINDS, Point, Task
 
 TIMES = tuple(field.name for field in dataclasses.fields(Speed))
 ENDS = ("", "_low", "_high", "_count")
-"""Behind a metric's name, the fields of its interval."""
+"""After a metric's name, the fields of its interval."""
 
 
 def command(point: Point) -> str:

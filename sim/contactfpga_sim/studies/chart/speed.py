@@ -18,7 +18,7 @@ from contactfpga_sim.golden import Timeline, Trace, predict
 from contactfpga_sim.studies.chart import steady
 
 STEADY = 12
-"""So many scenes are also looked at while they stay as they are."""
+"""This many scenes are also looked at while they stay as they are."""
 
 MOST_SCANS = 4000
 """That a touch may take until it is reported."""
@@ -81,7 +81,7 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """The touches that (R, C) bool frames show, each at another instant of the scan.
 
     The first ``checked`` of them go through the compiled gateware as well; raises
-    :class:`contactfpga_sim.cosim.compare.Mismatch` where it does anything else than the golden model.
+    :class:`contactfpga_sim.cosim.compare.Mismatch` where it does anything but what the golden model.
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6

@@ -44,7 +44,7 @@ class Task:
     timed: int = 48
     """Touches whose time is worked out."""
     checked: int = 2
-    """Of these so many go through the gateware, too."""
+    """This many of them go through the gateware, too."""
 
 
 KINDS = ("total", "labeller", "sensing")
@@ -52,7 +52,7 @@ KINDS = ("total", "labeller", "sensing")
 of these pieces against the contacts."""
 
 Found = dict[str, dict[str, list[float]]]
-"""By kind and metric, a value a scene."""
+"""By kind and metric, a value per scene."""
 
 Look = tuple[np.ndarray, list[errors.Blob]]
 """(R, C) bool, the pressed cells, and what there is to be found."""

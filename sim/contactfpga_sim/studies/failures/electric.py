@@ -147,7 +147,7 @@ def _frames(skin: Skin, cells: list[np.ndarray]) -> list[Zones]:
 
 
 def _scattered(count: float) -> Outcome:
-    """Zones are not what touches; it is told if all frames in which that is so are flagged."""
+    """Zones are not what touches; it is reported if all frames in which that is so are flagged."""
     placed = scattered(int(count))
     cells = [finger(BARE, *spots) for spots in placed]
     frames = _frames(BARE, cells)
@@ -164,7 +164,7 @@ def _scattered(count: float) -> Outcome:
 
 
 def _scattered_cells(count: float) -> Outcome:
-    """Cells that are read wrong; it is told if each of them is marked."""
+    """Cells that are read wrong; it is reported if each of them is marked."""
     cells = [finger(BARE, *spots) for spots in scattered(int(count))]
     frames = _frames(BARE_CELLS, cells)
     read, marked = (np.array([getattr(zones, name) for zones in frames]) for name in ("cells", "ghost_cells"))

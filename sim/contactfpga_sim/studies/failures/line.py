@@ -45,7 +45,7 @@ ASKED = 0x15_2A_D0
 
 
 def _send(rig: Rig, byte: int, bit: float) -> None:
-    """A byte whose bits last so many of the board's clocks, at its receive pin."""
+    """A byte whose bits last this many of the board's clocks, at its receive pin."""
     bits = [0, *(byte >> index & 1 for index in range(8)), 1]
     ends = [round(bit * (index + 1)) for index in range(10)]
     for start, end, level in zip([0, *ends], ends, bits):

@@ -14,7 +14,7 @@ from contactfpga.wire import protocol
 from contactfpga_sim.studies.failures.rig import Rig, hello_clocks
 
 OVERSAMPLING = 16
-"""Looks at the line a bit, as most UARTs take; the middle one of a bit counts."""
+"""Looks at the line per bit, as most UARTs take; the middle one of a bit counts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Line:
             return cls(skin, edges, float(rig.board.cycle), tuple(packets))
 
     def noisy(self, rate_hz: float, seed: int) -> Line:
-        """With so many pulses a second that turn the level around for half a bit to two bits."""
+        """With this many pulses per second that turn the level around for half a bit to two bits."""
         rng = np.random.default_rng([seed, round(rate_hz)])
         bit = Derived(self.skin).bit_clocks
         count = rng.poisson(rate_hz * self.end / self.skin.clock_hz)
@@ -58,8 +58,8 @@ class Line:
         return dataclasses.replace(self, edges=np.sort(np.concatenate([self.edges, starts, starts + lengths])))
 
     def read(self, bit_clocks: float) -> bytes:
-        """What a UART takes for bytes whose bits last so many of the board's clocks; bytes without a stop bit are left
-        out."""
+        """What a UART takes for bytes whose bits last this many of the board's clocks; without the bytes that have no
+        stop bit."""
         tick = bit_clocks / OVERSAMPLING
         data, now, last = bytearray(), 0.0, self.end + 12 * Derived(self.skin).bit_clocks
         offsets = tick * (OVERSAMPLING * np.arange(10) + OVERSAMPLING // 2)

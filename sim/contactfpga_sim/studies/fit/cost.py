@@ -29,7 +29,7 @@ def cheapest(
     their LUT4, the cheapest first.
 
     The same method is taken to need no fewer LUT4 on a sheet with more rows and columns: where a coarser sheet
-    is above the limit, no finer one is synthesised.
+    is above the limit, no finer one is synthesized.
     """
     found: list[Trial] = []
     left = list(trials)

@@ -42,7 +42,7 @@ class Goals:
                 raise ValueError(f"the limit of {field.name} is {value}; it must be above 0")
 
     def check_count(self, count: int) -> None:
-        """Raises ValueError where so many scenes without an error could not show that a share is below its limit."""
+        """Raises ValueError where this many scenes without an error could not show that a share is below its limit."""
         for name in ("miscounted", "missed"):
             limit = getattr(self, name)
             if limit is not None and Z95**2 / (count + Z95**2) > limit:

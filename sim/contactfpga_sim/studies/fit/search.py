@@ -16,7 +16,7 @@ from contactfpga_sim.studies.fit.measuring import errors_of, speed_of
 from contactfpga_sim.studies.fit.trial import Fit, SoFar, Step, Task, Trial, gathered
 
 CHECKED = 2
-"""Of the answer's reported touches, so many go through the compiled gateware as well."""
+"""Of the answer's reported touches, this many go through the compiled gateware as well."""
 
 ZONES_ON_HOST = "reports no zones: say with --host-us how long the host takes to find them"
 

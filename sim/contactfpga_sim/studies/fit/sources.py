@@ -1,4 +1,4 @@
-"""Where scenes come from: families, built-in scenes, scene files and recordings, one scene a number.
+"""Where scenes come from: families, built-in scenes, scene files and recordings, one scene per number.
 
 A source's scenes depend on what it says and on the number only, never on a name or an order. Numbers below a count
 serve to choose, those from it on to report.

@@ -38,7 +38,7 @@ class Task:
     host_us: float | None = None
     """How long the host takes to find zones in a bitmap; None: it does not."""
     quick: bool = False
-    """Only those that meet the goals are synthesised; which of the refused ones are cheaper is not said."""
+    """Only those that meet the goals are synthesized; which of the refused ones are cheaper is not said."""
     timed: int = TIMED
     cover: Cover | None = None
     """Through which contacts press; for the answer's file."""
