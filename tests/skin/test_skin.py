@@ -101,13 +101,13 @@ REFUSED = [
     ),
     (
         {"settle_us": 1.0, "labeller": "serial"},
-        "settle_us + release_us is 24 clocks; 16 columns and 64 zones per frame need 27 clocks (2.25 us) with labeller = "
-        "'serial'",
+        "settle_us + release_us is 24 clocks; 16 columns and 64 zones per frame need 27 clocks (2.25 us) with "
+        "labeller = 'serial'",
     ),
     (
         {"settle_us": 3.0, "labeller": "serial", "connectivity": 4, "columns": 24, "zone_capacity": 1},
-        "settle_us + release_us is 48 clocks; 24 columns and 1 zones per frame need 51 clocks (4.25 us) with labeller = "
-        "'serial'",
+        "settle_us + release_us is 48 clocks; 24 columns and 1 zones per frame need 51 clocks (4.25 us) with "
+        "labeller = 'serial'",
     ),
     (
         {"labeller": "fast"},

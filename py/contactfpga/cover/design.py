@@ -254,7 +254,7 @@ def _thin(task: Task, foam: Foam | None, t0: float) -> Thin:
 
 
 def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
-    """How far the foam is pressed in so long after the touch, at most delta_c."""
+    """How far the foam is pressed in this long after the touch, at most delta_c."""
     if seconds >= hit.time_s:
         return hit.compression_m
     course = motion.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)

@@ -33,7 +33,7 @@ class Requests:
 
     def __init__(self, rng: random.Random | None = None):
         self.retry_s = 0.5
-        """A request that is unanswered for so long is sent again, as long as someone waits for it."""
+        """A request that is unanswered for this long is sent again, as long as someone waits for it."""
         self.answered = 0
         """All tickets up to this one are answered."""
         self._rng = rng or random.SystemRandom()

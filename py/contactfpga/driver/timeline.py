@@ -19,9 +19,9 @@ MOST_US = _EPOCH_US
 MOST_S = 8.0
 """Half the time in which a frame's time wraps: after a longer pause nobody knows how often it did."""
 SETTLED_S = 1.0
-"""So long after a pause in which nobody read, all that waited meanwhile has been read."""
+"""This long after a pause in which nobody read, all that waited meanwhile has been read."""
 BEGUN_US = 1 << 21
-"""A board may have been restarted so long ago without a hello that arrived."""
+"""A board may have been restarted this long ago without a hello that arrived."""
 
 
 class Timeline:

@@ -95,7 +95,7 @@ class Skin:
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
     baud: int = 3_000_000
-    """Bits a second on the wire."""
+    """Bits per second on the wire."""
 
     def __post_init__(self) -> None:
         self._keep(**checks.check_types(self))

@@ -66,7 +66,7 @@ class LabelBench:
     def run(self, frames: np.ndarray, *, gap: int = 0, stall: int = 0, seed: int = 1) -> Labelled:
         """Feed (N, R, C) bool frames back to back and take all records.
 
-        gap: chance in per cent that no row is offered in a clock; stall: that the record port is not ready.
+        gap: chance in percent that no row is offered in a clock; stall: that the record port is not ready.
         Raises RuntimeError if the labeller stops for good.
         """
         count, rows, columns = frames.shape

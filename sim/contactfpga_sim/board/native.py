@@ -249,7 +249,7 @@ def _version(tool: str) -> str:
 
 @contextlib.contextmanager
 def _progress(what: str, note: str = "") -> Iterator[Callable[[str], None]]:
-    """One line on stderr: what is done, the step, the seconds; rewritten ten times per second on a terminal. The note is
+    """One line on stderr: what is done, the step, the seconds; rewritten ten times a second on a terminal. The note is
     left out where the line would be wrapped, as it could not be written over then."""
     started = time.monotonic()
     step = "start"

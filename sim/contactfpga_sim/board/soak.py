@@ -38,7 +38,7 @@ class Soak:
         self._port = port
 
     def run(self, seconds: float) -> None:
-        """Read for so long, then give the port back."""
+        """Read for this long, then give the port back."""
         self.opened += 1
         with contactfpga.open(self._port, timeout=10.0) as board:
             until = time.monotonic() + seconds

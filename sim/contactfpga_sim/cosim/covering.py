@@ -34,7 +34,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "capacity": ("default", "one", "half"),
     "surface": ("plane", "cylinder"),
     "link": ((12, 3_000_000), (12, 4_000_000), (1, 500_000), (50, 5_500_000)),
-    "row_chains": (0, 1, 3),  # of shift registers, 0 for none; the most that there may be
+    "row_chains": (0, 1, 3),  # of shift registers at most, 0 for none
     "column_chains": (0, 1, 3),
     "shift_hz": (8_000_000, 5_000_000),
     "row_time": ("tight", "uneven", "long"),

@@ -64,7 +64,7 @@ class Circuit:
 class Line:
     """A column with its capacitance: a resistor pulls it to the released level, a pressed switch to the pressed one.
 
-    Both go exponentially: toward released with R C of the pull resistor, towards the voltage divider of the two
+    Both go exponentially: toward released with R C of the pull resistor, toward the voltage divider of the two
     resistances with that of both in parallel.
     """
 

@@ -75,6 +75,6 @@ def fastest_m_s(case: Case, resolution: float = 0.005) -> float:
 
 
 def pushes(case: Case) -> tuple[float, list[Push]]:
-    """The fastest push in m/s that the arm yields to, and what happens for pushes up to it and of a faster one."""
+    """The fastest push in m/s that the arm yields to, and what happens for pushes up to it and for a faster one."""
     fastest = fastest_m_s(case)
     return fastest, [pushed(case, share * fastest)[0] for share in SHARES]

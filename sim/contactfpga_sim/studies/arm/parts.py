@@ -99,7 +99,7 @@ class Control(_Checked):
     retreat_m: float = 0.01
     """How far it goes back at most, and how far after the torque limit, which cannot tell when a contact ends."""
     watchdog_s: float = 20e-3
-    """The host may be silent for so long, in s; then the arm stops."""
+    """The host may be silent for this long, in s; then the arm stops."""
     delay_s: float = 0.0
     """Age of the measured speed and torque, in s, where the loop is closed over a link."""
     behaviour: str = "reverse"

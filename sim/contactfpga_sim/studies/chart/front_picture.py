@@ -35,7 +35,7 @@ TICKS_US = {
     20_000: "20 ms",
 }
 LINE = 10**0.13
-"""By so much a line of words is below the one above, on the axis of errors."""
+"""By this much a line of words is below the one above, on the axis of errors."""
 
 SMALL: dict[str, Any] = {"fontsize": style.SMALL}
 

@@ -81,7 +81,7 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """The touches that (R, C) bool frames show, each at another instant of the scan.
 
     The first ``checked`` of them go through the compiled gateware as well; raises
-    :class:`contactfpga_sim.cosim.compare.Mismatch` where it does anything but what the golden model.
+    :class:`contactfpga_sim.cosim.compare.Mismatch` where it differs from the golden model.
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6

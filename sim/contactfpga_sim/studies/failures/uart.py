@@ -14,7 +14,7 @@ from contactfpga.wire import protocol
 from contactfpga_sim.studies.failures.rig import Rig, hello_clocks
 
 OVERSAMPLING = 16
-"""Looks at the line per bit, as most UARTs take; the middle one of a bit counts."""
+"""Samples per bit, as most UARTs take; the middle one of a bit counts."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
