@@ -20,7 +20,7 @@ from contactfpga.skin import Skin
 _NEEDED = object()
 
 LENGTHS = ("radius_m", "effective_radius_m", "pitch_m", "pitch_min_m", "thickness_m")
-"""Of cover and link; an error reports a value that looks like mm."""
+"""Of cover and link; a value that looks like mm is refused."""
 
 _KEYS: dict[str, dict[str, Any]] = {
     "arm": {

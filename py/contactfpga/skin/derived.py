@@ -61,14 +61,14 @@ class Derived(Widths):
 
     @property
     def settle_clocks(self) -> int:
-        """A row is driven this long: as asked, and until the columns of the slot before and the next row are shifted."""
+        """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
         row = self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
     def release_clocks(self) -> int:
-        """No row is driven this long: as asked, and until the columns are shifted, the next row is latched, or chosen and
-        then shifted."""
+        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and then
+        shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         return max(self.clocks(self.skin.release_us), column, row)

@@ -74,7 +74,7 @@ class LabelBench:
             raise ValueError(f"frames of {rows}x{columns}; this bench takes {self.skin.rows}x{self.skin.columns}")
         for name, value in (("gap", gap), ("stall", stall)):
             if not 0 <= value < 100:
-                raise ValueError(f"{name} is {value}; it must lie between 0 and 99 per cent")
+                raise ValueError(f"{name} is {value}; it must lie between 0 and 99 percent")
         words = np.ascontiguousarray(to_words(frames))
         work = (rows * (2 * columns + 2) + 64) * max(count, 1)
         limit = 4 * work * 100 // (100 - max(gap, stall))
