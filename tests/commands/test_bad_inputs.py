@@ -314,10 +314,10 @@ def test_random_words_never_end_in_a_traceback(which, bad, more, run):
 BASES = {
     "skin": [["zones", "sim://", "--skin"], (ROOT / "examples/icebreaker-64x64.toml").read_text()],
     "cover": [
-        ["zones", "sim://", "--skin"],
+        ["board", "--skin"],
         "rows = 8\n[cover]\nmodel = 'bonded'\nthickness_m = 0.005\n[cover.switch]\n",
     ],
-    "patch": [["zones", "sim://", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
+    "patch": [["board", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
     "design": [["cover", "design"], (ROOT / "examples/paper-second-design.toml").read_text()],
     "scenes": [["fit"], (ROOT / "examples/scenes-hands.toml").read_text()],
     "case": [["arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/studies/arm/cases/paper.toml").read_text()],

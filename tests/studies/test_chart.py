@@ -7,7 +7,6 @@ import math
 import shlex
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -212,7 +211,7 @@ def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatc
     study.accuracy(task(), 0)
     study.accuracy(task(), 0)
     assert len(calls) == 20
-    monkeypatch.setattr(kept, "sources", lambda: "other code")
+    monkeypatch.setattr(kept, "sources", lambda skin: "other code")
     study.accuracy(task(), 0)
     assert len(calls) == 40
 
@@ -303,7 +302,7 @@ def test_no_point_lies_outside_its_panel():
 
 def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own():
     points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
-    toy = SimpleNamespace(report="moments", scan="raster", labeller="toy", pitch_x_mm=7.0)
+    toy = Skin(pitch_x_mm=7.0, labeller="toy_labeller:TOY")
     points.append(dataclasses.replace(points[0], task=dataclasses.replace(points[0].task, method="toy", skin=toy)))
     before, found = picture.colors(points[:24]), picture.colors(points)
     assert found == before | {"toy": found["toy"]}

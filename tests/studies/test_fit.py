@@ -485,7 +485,7 @@ def test_the_command_fails_where_other_scenes_break_a_limit(tmp_path, shortcuts,
         (["guess"], "scene 'guess' is not known; take a .toml, .npz or .npy file, or one of bumper, fingers"),
         (["none.toml"], "No such file"),
         (["bumper", "--placements", "50"], "the limit of miscounted is 5 %; take 73 scenes or more"),
-        (["bumper", "--labeller", "x"], "--labeller 'x' is not known; take one of: single; projection; serial; run"),
+        (["bumper", "--labeller", "x"], "labeller is 'x'; it must be one of 'run', 'serial', 'projection', 'single'"),
         (["bumper", "--scan", "x"], "--scan 'x' is not known; take one of: raster; adaptive"),
     ],
 )

@@ -42,9 +42,9 @@ def test_other_code_has_another_digest(monkeypatch, tmp_path):
     (package / "__init__.py").write_text("")
     stand_in = type("Package", (), {"__file__": str(package / "__init__.py")})
     monkeypatch.setattr(kept, "_PACKAGES", (stand_in,))
-    kept.sources.cache_clear()
+    kept._own.cache_clear()
     empty = kept.sources()
     (package / "new.py").write_text("x = 1")
-    kept.sources.cache_clear()
+    kept._own.cache_clear()
     assert len({before, empty, kept.sources()}) == 3
-    kept.sources.cache_clear()
+    kept._own.cache_clear()

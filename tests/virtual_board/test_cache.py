@@ -116,7 +116,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path):
 
 def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
     code = (
-        "import sys, time; from pathlib import Path; from contactfpga_sim import cache\n"
+        "import sys, time; from pathlib import Path; from contactfpga_sim.board import cache\n"
         "with cache.scratch(Path(sys.argv[1]), 'build') as work: print(work, flush=True); time.sleep(60)"
     )
     command = [sys.executable, "-c", code, str(tmp_path)]
