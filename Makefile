@@ -40,7 +40,7 @@ sim: $(VENV)/.stamp-sim | compiler ## run the gateware against the golden model 
 	$(PY) -m contactfpga_sim.demo $(ARGS)
 
 test: $(VENV)/.stamp-test | compiler ## run the tests
-	$(PY) -m pytest -n $(JOBS) --dist loadfile --junitxml build/tests.xml $(ARGS)
+	$(PY) -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --junitxml build/tests.xml $(ARGS)
 ifeq ($(strip $(ARGS)),)
 	$(PY) scripts/verification.py --check
 endif
