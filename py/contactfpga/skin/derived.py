@@ -67,8 +67,8 @@ class Derived(Widths):
 
     @property
     def release_clocks(self) -> int:
-        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and then
-        shifted."""
+        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and
+        then shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
         return max(self.clocks(self.skin.release_us), column, row)
