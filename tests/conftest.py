@@ -40,3 +40,21 @@ def _closed_ports():
     yield
     for port in list(driver._boards):
         driver._forget(port)
+
+
+LONGEST_FIRST = (
+    "test_mutants",
+    "test_failures",
+    "test_formal",
+    "test_adaptive",
+    "test_label_volume",
+    "test_cosim",
+    "test_chart",
+    "test_noise",
+)
+"""Files that take longest: begun first, so that at the end of a run no process works alone."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    ranks = {name: rank for rank, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))

@@ -228,7 +228,7 @@ _BUGS = (
 _HELLO = protocol.encode_hello(_SKIN)
 _SHORT = _HELLO[:1] + _HELLO[-CHECK_BYTES - 1 :]  # goes out first, and a search has to come to the frames after it
 CASES = (
-    Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3),
+    Case("packed frames are sent", "1x2, cells", partial(packed_frames_are_sent, hello=_HELLO), 3, campaign=True),
     Case("packed frames are sent", "1x2, cells, hello of 1 byte", partial(packed_frames_are_sent, hello=_SHORT), 3,
          _BUGS, bug_clocks=40),
 )  # fmt: skip
