@@ -13,6 +13,10 @@ from contactfpga.cover.switch import Switch
 from contactfpga.inputs import tomlfile
 
 
+MIN_LENGTH_M = 1e-6
+"""Nothing is thinner; integrals over a layer run out of numbers long after."""
+
+
 def load(path: str | Path) -> Cover | None:
     """The cover in a Skin's file; None where it has no table ``[cover]``. Raises CoverError."""
     values = tomlfile.load(path, CoverError)
@@ -30,11 +34,14 @@ def read(values: Any) -> Cover:
     if "switch" in given:
         given["switch"] = Switch(**_known("cover.switch", given["switch"], Switch))
     cover = Cover(**given)
-    if cover.thickness_m > MAX_LENGTH_M:
+    if not MIN_LENGTH_M <= cover.thickness_m <= MAX_LENGTH_M:
         raise CoverError(
             f"thickness_m in [cover] is {cover.thickness_m:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
-            "5 mm is 0.005"
+            f"5 mm is 0.005, and the least is {MIN_LENGTH_M:g}"
         )
+    for name, value, unit in (("force_n", cover.switch.force_n, "N"), ("area_m2", cover.switch.area_m2, "m2")):
+        if not 1e-9 <= value <= 1e6:
+            raise CoverError(f"{name} in [cover.switch] is {value:g}; it must lie between 1e-09 and 1e+06 {unit}")
     return cover
 
 
