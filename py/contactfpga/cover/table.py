@@ -12,7 +12,6 @@ from contactfpga.cover.press import Cover
 from contactfpga.cover.switch import Switch
 from contactfpga.inputs import tomlfile
 
-
 MIN_LENGTH_M = 1e-6
 """Nothing is thinner; integrals over a layer run out of numbers long after."""
 
