@@ -2,12 +2,11 @@
 
 import numpy as np
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import wiring
 
 from contactfpga.choices.labellers import Labeller
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.payloads import record_layout, row_layout
+from contactfpga_hdl.label.ports import labeller_ports
 from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
 
 TOY = Labeller(
@@ -27,12 +26,7 @@ class RowLabeller(wiring.Component):
 
     def __init__(self, skin):
         self.derived = Derived(skin)
-        super().__init__(
-            {
-                "rows": In(stream.Signature(row_layout(self.derived))),
-                "records": Out(stream.Signature(record_layout(self.derived))),
-            }
-        )
+        super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):
         m = Module()

@@ -7,12 +7,12 @@ split, and the moments of what is taken as a zone are exact.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
-from amaranth.lib import data, memory, stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
+from contactfpga_hdl.label.ports import labeller_ports
+from contactfpga_hdl.payloads import moments_layout
 
 
 def _step_layout() -> data.StructLayout:
@@ -33,12 +33,7 @@ class ProjectionLabeller(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.derived = Derived(skin)
-        super().__init__(
-            {
-                "rows": In(stream.Signature(row_layout(self.derived))),
-                "records": Out(stream.Signature(record_layout(self.derived))),
-            }
-        )
+        super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):
         m = Module()

@@ -12,15 +12,14 @@ cannot overflow and needs no allocation.
 """
 
 from amaranth.hdl import Module
-from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.join import Join
+from contactfpga_hdl.label.ports import labeller_ports
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk
-from contactfpga_hdl.payloads import record_layout, row_layout
 
 
 class RunLabeller(wiring.Component):
@@ -36,12 +35,7 @@ class RunLabeller(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.derived = Derived(skin)
-        super().__init__(
-            {
-                "rows": In(stream.Signature(row_layout(self.derived))),
-                "records": Out(stream.Signature(record_layout(self.derived))),
-            }
-        )
+        super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):
         m = Module()

@@ -1,12 +1,12 @@
 """All pressed cells are one zone: the smallest labeller, enough where there is never more than one contact."""
 
 from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.payloads import moments_layout, record_layout, row_layout
+from contactfpga_hdl.label.ports import labeller_ports
+from contactfpga_hdl.payloads import moments_layout
 
 
 class SingleLabeller(wiring.Component):
@@ -21,12 +21,7 @@ class SingleLabeller(wiring.Component):
 
     def __init__(self, skin: Skin):
         self.derived = Derived(skin)
-        super().__init__(
-            {
-                "rows": In(stream.Signature(row_layout(self.derived))),
-                "records": Out(stream.Signature(record_layout(self.derived))),
-            }
-        )
+        super().__init__(labeller_ports(self.derived))
 
     def elaborate(self, platform):
         m = Module()

@@ -1,13 +1,13 @@
 """Drives rows together where nothing is touched, one by one where something is."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
-from amaranth.lib import stream, wiring
+from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS, TIME_BITS, Derived
-from contactfpga_hdl.payloads import row_layout, tag_layout
-from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
+from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.scan.shift import RowChain
@@ -49,13 +49,7 @@ class AdaptiveScanner(wiring.Component):
         self.derived = Derived(skin)
         super().__init__(
             {
-                "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
-                "rows": Out(stream.Signature(row_layout(self.derived))),
-                "tag": Out(tag_layout(self.derived)),
-                "request": In(1),
-                "heard": In(HEARD_BITS),
-                "epoch": Out(1),
-                "contact": Out(1),
+                **scan_ports(self.derived),
                 "alone": Out(1),
                 "sampled": Out(self.derived.slot_bits),
                 "busy": In(skin.rows),

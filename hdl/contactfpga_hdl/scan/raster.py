@@ -1,13 +1,12 @@
 """Drives one row after the other and samples all columns of it at once."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
-from amaranth.lib import stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
-from contactfpga_hdl.payloads import row_layout, tag_layout
-from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, column_pins, connect_pins, row_pins
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
+from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
 
@@ -60,17 +59,7 @@ class Scanner(wiring.Component):
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
-        super().__init__(
-            {
-                "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
-                "rows": Out(stream.Signature(row_layout(self.derived))),
-                "tag": Out(tag_layout(self.derived)),
-                "request": In(1),
-                "heard": In(HEARD_BITS),
-                "epoch": Out(1),
-                "contact": Out(1),
-            }
-        )
+        super().__init__(scan_ports(self.derived))
 
     def elaborate(self, platform):
         m = Module()

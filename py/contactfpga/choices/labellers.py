@@ -19,8 +19,8 @@ Clocks = Callable[["Derived"], int]
 class Labeller(Choice):
     """Rows in, zone records out.
 
-    ``gateware`` is a component with a stream of rows in, ``rows``, and a stream of zone records out, ``records``
-    (``contactfpga_hdl.payloads``). ``golden`` is a :class:`contactfpga_sim.golden.work.LabellerRule`.
+    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.label.ports.labeller_ports`. ``golden`` is a
+    :class:`contactfpga_sim.golden.work.LabellerRule`.
     """
 
     exact: bool

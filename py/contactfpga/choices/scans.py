@@ -22,7 +22,8 @@ Count = Callable[["Derived"], int]
 class Scan(Choice):
     """Drives rows, samples columns.
 
-    ``gateware`` is a component with the ports of :class:`contactfpga_hdl.scan.raster.Scanner`. ``golden`` is a
+    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.scan.ports.scan_ports`, and one that is not
+    ``even`` also with those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden`` is a
     :class:`contactfpga_sim.golden.scan.ScanRule`.
     """
 

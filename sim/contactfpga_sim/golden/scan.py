@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import bisect
 import dataclasses
 from collections.abc import Iterable, Sequence
@@ -42,31 +43,31 @@ Scanned = tuple[list[Scan], Iterable[np.ndarray], list[tuple[int, int]]]
 """Frames, their cells as they count once debounced, and changes of the contact pin."""
 
 
-class ScanRule:
+class ScanRule(abc.ABC):
     """The golden rule of a scan."""
 
     even: bool
     """Every frame takes the same time, every row once."""
 
+    @abc.abstractmethod
     def choice(self, facts: Facts) -> int:
         """Clocks that the scan takes to choose its next rows."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def frame_slots(self, facts: Facts) -> int:
         """The most row times that a frame takes."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
         """The frames of cycles 0 to ``cycles`` - 1, or more, with the requests in the order of their coming."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
         """(cycle, rows) of every change of the rows that are driven, up to ``cycles`` and beyond; bit r is row r."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
         """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
-        raise NotImplementedError
 
 
 class Raster(ScanRule):
