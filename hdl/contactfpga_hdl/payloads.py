@@ -6,8 +6,14 @@ from contactfpga.skin.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
-    """A sampled row: one bit per column, and whether it is the frame's last."""
-    return data.StructLayout({"cells": derived.skin.columns, "last": 1})
+    """A sampled row: one bit per column, whether it is the frame's last, and its number where the scan skips rows."""
+    number = {"y": row_bits(derived)} if derived.skips else {}
+    return data.StructLayout({"cells": derived.skin.columns, "last": 1, **number})
+
+
+def row_bits(derived: Derived) -> int:
+    """Of a row's number."""
+    return max(1, (derived.skin.rows - 1).bit_length())
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:

@@ -90,6 +90,9 @@ class Top(wiring.Component):
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
         ]
+        if self.derived.scan.waits:
+            frames = packer.frames
+            m.d.comb += scan.packed.eq(frames.commit | frames.decide & ~frames.verdict.send)
         if self.probes:
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
@@ -108,12 +111,23 @@ class Top(wiring.Component):
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
         return debounce.rows
 
+    def _hand_over(self, m: Module, rows: stream.Interface, taken: stream.Interface, free: Value) -> None:
+        """Where the scan waits, a row waits until it can be counted, too; otherwise rows are never that close."""
+        if not self.derived.scan.waits:
+            wiring.connect(m, rows, taken)
+            return
+        m.d.comb += [
+            taken.payload.eq(rows.payload),
+            taken.valid.eq(rows.valid & free),
+            rows.ready.eq(taken.ready & free),
+        ]
+
     def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's zones, and its summary."""
         m.submodules.label = label = self.derived.labeller.load_gateware()(self.skin)
         m.submodules.audit = audit = Audit(self.skin)
         m.submodules.backlog = backlog = Backlog(self.skin)
-        wiring.connect(m, rows, label.rows)
+        self._hand_over(m, rows, label.rows, audit.free)
         wiring.connect(m, label.records, audit.records)
         wiring.connect(m, audit.items, backlog.passed)
         m.d.comb += [audit.taken.eq(rows.valid & rows.ready), audit.row.eq(rows.payload)]
@@ -135,7 +149,7 @@ class Top(wiring.Component):
         """Items of a frame's rows as they are, and its summary."""
         m.submodules.bitmap = bitmap = Bitmap(self.skin)
         m.submodules.backlog = backlog = Backlog(self.skin)
-        wiring.connect(m, rows, bitmap.rows)
+        self._hand_over(m, rows, bitmap.rows, bitmap.free)
         wiring.connect(m, bitmap.items, backlog.passed)
         if self.probes:
             item = bitmap.items.payload

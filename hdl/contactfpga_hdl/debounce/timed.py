@@ -17,7 +17,7 @@ class TimedDebounce(wiring.Component):
 
     raw (in): a frame's rows in ascending order.
     alone (in): the row on offer was driven alone.
-    now (in): the row time in which it was sampled; must hold for C + 4 clocks.
+    now (in): the row time in which it was sampled; must hold for C + 4 clocks, but where the scan waits.
     rows (out): the same rows without bounce.
     busy (out): a bit per row that was not quiet after its last sample, as soon as it is offered.
     """
@@ -42,19 +42,29 @@ class TimedDebounce(wiring.Component):
         raw, rows = self.raw, self.rows
         row = Signal(range(self.skin.rows))  # of which one at most is inside
         passes = raw.valid & ~self.alone & walk.raw.ready
+        enters = walk.raw.valid & walk.raw.ready
+        now = self.now
+        if self.derived.scan.waits:  # it goes on while a row is inside
+            now = Signal.like(self.now)
+            with m.If(enters):
+                m.d.sync += now.eq(self.now)
+        if self.derived.skips:
+            with m.If(enters):
+                m.d.sync += row.eq(raw.payload.y)
+        else:
+            with m.If(rows.valid & rows.ready):
+                m.d.sync += row.eq(Mux(rows.payload.last, 0, row + 1))
         m.d.comb += [
             walk.raw.valid.eq(raw.valid & self.alone),
             walk.raw.payload.eq(raw.payload),
             walk.row.eq(row),
-            walk.now.eq(self.now),
+            walk.now.eq(now),
             walk.rows.ready.eq(rows.ready),
             raw.ready.eq(walk.raw.ready & (self.alone | rows.ready)),
             rows.valid.eq(walk.rows.valid | passes),
             rows.payload.eq(Mux(passes, raw.payload.as_value(), walk.rows.payload.as_value())),
             self.busy.eq(walk.busy),
         ]
-        with m.If(rows.valid & rows.ready):
-            m.d.sync += row.eq(Mux(rows.payload.last, 0, row + 1))
         return m
 
 
@@ -104,6 +114,8 @@ class _Walk(wiring.Component):
             m.d.sync += kept.eq(kept | (switch.next_word != 0))
         with m.If(phase.finish):
             m.d.sync += [kept.eq(0), self.busy.bit_select(self.row, 1).eq(kept)]
+            if self.derived.skips:
+                m.d.sync += self.rows.payload.y.eq(self.row)
         return m
 
 

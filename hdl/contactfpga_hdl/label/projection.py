@@ -13,6 +13,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.ports import labeller_ports
 from contactfpga_hdl.payloads import moments_layout
+from contactfpga_hdl.util.row_number import row_number
 
 
 def _step_layout() -> data.StructLayout:
@@ -53,7 +54,6 @@ class ProjectionLabeller(wiring.Component):
         row = self.rows.payload
         cells, shadow = Signal(columns), Signal(columns)  # both move on by one column per clock
         walks, closes, last = Signal(), Signal(), Signal()
-        y_next = Signal.like(y)
         in_band = Signal()
         final = column == columns - 1
         m.d.comb += [
@@ -75,7 +75,9 @@ class ProjectionLabeller(wiring.Component):
             ]
         with m.Elif(enable):
             m.d.sync += last.eq(0)
-        with m.If(self.rows.valid & self.rows.ready):
+        taken = self.rows.valid & self.rows.ready
+        number = row_number(m, self.derived, row, taken)
+        with m.If(taken):
             pressed = row.cells.any()
             m.d.sync += [
                 cells.eq(row.cells),
@@ -84,8 +86,7 @@ class ProjectionLabeller(wiring.Component):
                 walks.eq(in_band | pressed),
                 in_band.eq(pressed & ~row.last),
                 column.eq(0),
-                y.eq(y_next),
-                y_next.eq(Mux(row.last, 0, y_next + 1)),
+                y.eq(number),
             ]
         return step, column, y
 

@@ -140,7 +140,8 @@ class SerialLabeller(wiring.Component):
                     walk.tail.eq(walk.active & ends),
                 ]
             with m.If(handed):
-                m.d.sync += [walk.last.eq(row.last), walk.y.eq(Mux(walk.last, 0, walk.y + 1))]
+                counted = Mux(walk.last, 0, walk.y + 1)
+                m.d.sync += [walk.last.eq(row.last), walk.y.eq(row.y if self.derived.skips else counted)]
 
     def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value) -> None:
         """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.

@@ -7,6 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.ports import labeller_ports
 from contactfpga_hdl.payloads import moments_layout
+from contactfpga_hdl.util.row_number import row_number
 
 
 class SingleLabeller(wiring.Component):
@@ -29,7 +30,7 @@ class SingleLabeller(wiring.Component):
         row = self.rows.payload
         enable = ~self.records.valid | self.records.ready
         cells, x = Signal(skin.columns), Signal(range(skin.columns + 1))
-        y, y_next = (Signal(range(max(2, skin.rows)), name=name) for name in ("y", "y_next"))
+        y = Signal(range(max(2, skin.rows)))
         zone = Signal(moments_layout(self.derived))
         walks, last, pressed = Signal(), Signal(), Signal()
         leaves, ends, end = Signal(), Signal(), Signal()
@@ -45,13 +46,14 @@ class SingleLabeller(wiring.Component):
                 m.d.sync += [zone.area.eq(zone.area + 1), zone.sum_x.eq(zone.sum_x + x), zone.sum_y.eq(zone.sum_y + y)]
         with m.Elif(enable):
             m.d.sync += last.eq(0)
-        with m.If(self.rows.valid & self.rows.ready):
+        taken = self.rows.valid & self.rows.ready
+        number = row_number(m, self.derived, row, taken)
+        with m.If(taken):
             any_pressed = pressed | row.cells.any()
             m.d.sync += [
                 cells.eq(row.cells),
                 x.eq(0),
-                y.eq(y_next),
-                y_next.eq(Mux(row.last, 0, y_next + 1)),
+                y.eq(number),
                 last.eq(row.last),
                 pressed.eq(any_pressed & ~row.last),
                 walks.eq(row.cells.any() | row.last & any_pressed),

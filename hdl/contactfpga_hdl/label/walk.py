@@ -7,6 +7,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import step_layout
 from contactfpga_hdl.payloads import row_layout
+from contactfpga_hdl.util.row_number import row_number
 
 
 def _split(m: Module, bits: Value) -> tuple[Value, Value]:
@@ -103,12 +104,13 @@ class Walk(wiring.Component):
     def _take_row(self, m: Module, left: _Left) -> None:
         row = self.rows.payload
         before = Signal.like(row.cells)  # the row last taken, empty before a frame
-        y_next = Signal.like(left.y)
         work = left.inside[0]
         with m.If(self.enable & ~work):
             m.d.sync += left.last.eq(0)  # its end mark is on its way
         m.d.comb += self.rows.ready.eq(self.enable & ~work)
-        with m.If(self.rows.valid & self.rows.ready):
+        taken = self.rows.valid & self.rows.ready
+        y = row_number(m, self.derived, row, taken)
+        with m.If(taken):
             right_row, right_before = row.cells >> 1, before >> 1
             if self.derived.skin.connectivity == 8:
                 joined = (row.cells | before) & (right_row | right_before)
@@ -119,9 +121,8 @@ class Walk(wiring.Component):
                 left.starts.eq(row.cells & ~(row.cells << 1)),
                 left.stops.eq(row.cells & ~right_row),
                 left.last.eq(row.last),
-                left.y.eq(y_next),
+                left.y.eq(y),
                 before.eq(Mux(row.last, 0, row.cells)),
-                y_next.eq(Mux(row.last, 0, y_next + 1)),
             ]
             row_ends = Signal(len(joined))
             m.d.comb += row_ends.eq((row.cells | before) & ~joined)

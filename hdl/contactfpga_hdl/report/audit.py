@@ -21,6 +21,7 @@ class Audit(wiring.Component):
     """Counts a frame before and after the labeller; lets as many zones through as the frame can carry.
 
     taken, row (in): a row, in the clock in which the labeller takes it.
+    free (out): that row can be counted.
     records (in): from the labeller.
     items (out): the same without delay, but no more than the frame can carry.
     summary (out): until the next frame's. ``zones``, ``overflow`` and ``changed`` are there one clock after the end
@@ -34,6 +35,7 @@ class Audit(wiring.Component):
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
+                "free": Out(1),
                 "records": In(stream.Signature(record_layout(self.derived))),
                 "items": Out(stream.Signature(passed_layout(self.derived))),
                 "summary": Out(summary_layout(self.derived)),
@@ -58,6 +60,7 @@ class Audit(wiring.Component):
             self.items.payload.end.eq(record.end),
             counts.taken.eq(self.taken),
             counts.row.eq(self.row),
+            self.free.eq(counts.free),
             counts.ends.eq(ends),
             counts.zone_valid.eq(zone),
             counts.zone.eq(record.zone),
@@ -83,6 +86,7 @@ class Bitmap(wiring.Component):
     """With ``report = "cells"`` in the place of labeller and audit: rows go into the frame as they are.
 
     rows (in): a frame's rows in ascending order.
+    free (out): the row on offer can be counted.
     items (out): the same without delay; the end mark follows the last one three clocks later, when that is counted.
     summary (out): as of :class:`Audit`, where it has no zones.
     """
@@ -93,6 +97,7 @@ class Bitmap(wiring.Component):
         super().__init__(
             {
                 "rows": In(stream.Signature(row_layout(self.derived))),
+                "free": Out(1),
                 "items": Out(stream.Signature(item_layout(self.derived))),
                 "summary": Out(summary_layout(self.derived)),
             }
@@ -116,6 +121,7 @@ class Bitmap(wiring.Component):
             self.items.payload.end.eq(ends),
             counts.taken.eq(taken),
             counts.row.eq(self.rows.payload),
+            self.free.eq(counts.free),
             counts.ends.eq(ends & self.items.ready),
             self.summary.cells.eq(counts.cells),
             self.summary.changed.eq(counts.changed),
@@ -126,7 +132,7 @@ class Bitmap(wiring.Component):
 class _Counts(wiring.Component):
     """What a frame's rows say of it, and whether its zones explain all of its cells.
 
-    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart. ``ends`` is the clock of the end mark.
+    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to. ``ends`` is the clock of the end mark.
     ``changed`` is captured in it, ``cells`` and ``mismatch`` as soon as the last row is counted as well; all hold until
     the next frame's.
     """
@@ -138,6 +144,7 @@ class _Counts(wiring.Component):
             {
                 "taken": In(1),
                 "row": In(row_layout(self.derived)),
+                "free": Out(1),
                 "ends": In(1),
                 "zone_valid": In(1),
                 "zone": In(moments_layout(self.derived)),
@@ -150,7 +157,11 @@ class _Counts(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.tally = tally = Tally(self.skin)
-        m.d.comb += [tally.taken.eq(self.taken), tally.row.eq(self.row)]
+        m.d.comb += [
+            tally.taken.eq(self.taken),
+            tally.row.eq(self.row),
+            self.free.eq(~tally.busy | ~self.row.cells.any()),
+        ]
         self._explain(m, tally)
         if self.skin.send == "on_change":
             self._watch_change(m)

@@ -2,7 +2,7 @@
 
 import math
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import memory, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -10,6 +10,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout, row_layout
 from contactfpga_hdl.util.popcount import popcount
+from contactfpga_hdl.util.row_number import row_number
 
 GROUPS = 4
 """The most groups of a row. Each of a row's steps may hold up the counting, and the next row comes six clocks later."""
@@ -48,16 +49,14 @@ class Tally(wiring.Component):
         cells = Signal(self._groups * self._columns)
         left = Signal(range(self._groups + 2))  # groups to come, and the one that is being added
         y = Signal(range(max(2, self.skin.rows)))
-        y_next = Signal.like(y)
         first = Signal(range(max(2, self._groups * self._columns)))  # column of the group
         group = cells[: self._columns]
         area = Signal(range(self._columns + 1))
         offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
         first_counted = Signal.like(first)
-        with m.If(self.taken):
-            m.d.sync += y_next.eq(Mux(self.row.last, 0, y_next + 1))
+        number = row_number(m, self.derived, self.row, self.taken)
         with m.If(self.taken & self.row.cells.any()):
-            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(y_next)]
+            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(number)]
         with m.Elif(self.busy & ~self.hold):
             m.d.sync += [
                 cells.eq(cells >> self._columns),
@@ -77,29 +76,46 @@ class Tally(wiring.Component):
 
 
 class Change(wiring.Component):
-    """Whether any row since ``clear`` differs from the same row a frame before; one clock after ``taken``."""
+    """Whether the rows since ``clear`` differ from those of a frame before; one clock after ``taken``.
+
+    Where the scan skips rows, rows without a pressed cell make no difference: the others are compared with their
+    numbers, and how many there were is compared with the last one.
+    """
 
     def __init__(self, skin: Skin):
         self.skin = skin
-        super().__init__({"taken": In(1), "row": In(row_layout(Derived(skin))), "clear": In(1), "changed": Out(1)})
+        self.derived = Derived(skin)
+        super().__init__({"taken": In(1), "row": In(row_layout(self.derived)), "clear": In(1), "changed": Out(1)})
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.before = before = memory.Memory(shape=self.skin.columns, depth=self.skin.rows, init=[])
+        skips = self.derived.skips
+        row = self.row
+        word = Cat(row.cells, row.y) if skips else row.cells
+        m.submodules.before = before = memory.Memory(shape=len(word), depth=self.skin.rows, init=[])
         read, write = before.read_port(), before.write_port()
-        y = Signal(range(self.skin.rows))
-        following = Mux(self.row.last, 0, y + 1)[: len(y)]
+        place = Signal(range(self.skin.rows))
+        counts = self.taken & row.cells.any() if skips else self.taken
+        following = Mux(row.last, 0, place + counts if skips else place + 1)[: len(place)]
         m.d.comb += [
-            read.addr.eq(Mux(self.taken, following, y)),  # rows may follow each other without a pause
-            write.addr.eq(y),
-            write.data.eq(self.row.cells),
-            write.en.eq(self.taken),
+            read.addr.eq(Mux(self.taken, following, place)),  # rows may follow each other without a pause
+            write.addr.eq(place),
+            write.data.eq(word),
+            write.en.eq(counts),
         ]
+        differs = counts & (read.data != word)
+        if skips:
+            number, number_before = Signal(range(self.skin.rows + 1)), Signal(range(self.skin.rows + 1))
+            with m.If(self.taken):
+                m.d.sync += number.eq(Mux(row.last, 0, number + counts))
+            with m.If(self.taken & row.last):
+                m.d.sync += number_before.eq(number + counts)
+            differs |= self.taken & row.last & (number + counts != number_before)
         with m.If(self.clear):
             m.d.sync += self.changed.eq(0)
         with m.If(self.taken):
-            m.d.sync += y.eq(following)
-            with m.If(read.data != self.row.cells):
+            m.d.sync += place.eq(following)
+            with m.If(differs):
                 m.d.sync += self.changed.eq(1)
         return m
 

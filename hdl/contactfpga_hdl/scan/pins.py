@@ -10,15 +10,26 @@ from contactfpga.skin import Skin
 
 
 def row_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that drive the rows: one per row, or those of the shift registers with one ``row_data`` per chain."""
+    """The pins that drive the rows: one per row, or those of the shift registers with one ``row_data`` per chain.
+
+    A scan that reads the rows drives ``rows`` while ``rows_drive``, both bit by bit, and reads ``rows_read``.
+    """
+    if skin.scan == "reversal":
+        return {"rows": Out(skin.rows), "rows_drive": Out(skin.rows), "rows_read": In(skin.rows)}
     if skin.row_drive == "direct":
         return {"rows": Out(skin.rows)}
     return {"row_data": Out(skin.row_chains), "row_clock": Out(1), "row_latch": Out(1), "row_enable_n": Out(1, init=1)}
 
 
 def column_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins that read the columns: one per column, or those of the shift registers with
-    one ``column_data`` per chain."""
+    """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
+    chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit."""
+    if skin.precharge_us:
+        return _read_pins(skin) | {"columns_drive": Out(skin.columns)}
+    return _read_pins(skin)
+
+
+def _read_pins(skin: Skin) -> dict[str, wiring.Member]:
     if skin.column_read == "direct":
         return {"columns": In(skin.columns)}
     return {"column_load_n": Out(1, init=1), "column_clock": Out(1), "column_data": In(skin.column_chains)}
@@ -64,7 +75,7 @@ def column_reader(skin: Skin) -> wiring.Signature:
     """
     return wiring.Signature(
         {
-            "pins": Out(wiring.Signature(column_pins(skin))),
+            "pins": Out(wiring.Signature(_read_pins(skin))),
             "begin": In(1),
             "levels": Out(skin.columns),
             "done": Out(1),

@@ -7,6 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
 from contactfpga_hdl.scan.ports import scan_ports
+from contactfpga_hdl.scan.precharge import RETRY_BITS, Precharge
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
 
@@ -75,7 +76,9 @@ class Scanner(wiring.Component):
         self._mask_row(m, reader.levels, sample)
         self._offer_row(m, sample)
         self._watch_contact(m, sample)
-        self._tag_frame(m, slots, sample)
+        time = self._tag_frame(m, slots, sample)
+        if skin.precharge_us:
+            self._precharge(m, slots, sample, time)
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
@@ -115,6 +118,19 @@ class Scanner(wiring.Component):
         with m.If(sample.of_row):
             m.d.sync += sample.row.eq(Mux(sample.is_last, 0, sample.row + 1))
 
+    def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
+        """While no row is driven, but for a clock after the last one and a clock before the next one."""
+        m.submodules.precharge = precharge = Precharge(self.skin)
+        m.d.comb += [
+            precharge.drive.eq(
+                (slots.clock >= self.derived.settle_clocks) & (slots.clock < self.derived.row_clocks - 2)
+            ),
+            precharge.columns.eq(sample.read),
+            precharge.stuck.eq(sample.of_released),
+            precharge.time.eq(time[RETRY_BITS]),
+            self.pins.columns_drive.eq(precharge.pins),
+        ]
+
     def _mask_row(self, m: Module, levels: Value, sample: _Sample) -> None:
         m.d.comb += [
             sample.read.eq(~levels if self.skin.selects_low else levels),
@@ -144,8 +160,9 @@ class Scanner(wiring.Component):
                 self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
             ]
 
-    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> None:
-        """Time and request at the first row's sample; the tag takes them over with the last row's strobe."""
+    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> Value:
+        """Time and request at the first row's sample; the tag takes them over with the last row's strobe. Returns the
+        clock in us."""
         per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
         # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of the
         # first row's sample: no register has to keep that.
@@ -172,6 +189,7 @@ class Scanner(wiring.Component):
             m.d.sync += waiting.eq(1)
         with m.If(sample.of_row & sample.is_last):
             m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked), self.tag.heard.eq(heard_now)]
+        return time
 
 
 def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:

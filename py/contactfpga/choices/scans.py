@@ -30,12 +30,17 @@ class Scan(Choice):
     even: bool
     """Every row is sampled once per frame and frames take the same time. Otherwise times are counted in row times, and
     each frame tells how many it took."""
+    waits: bool
+    """It waits until the stage after takes a row, and until a frame is packed before it begins another one, so that no
+    stage can be too slow for it. Where zones are found it hands on the rows that it drove, with their numbers."""
     check: Callable[[Skin], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
     choice_clocks: Count
     """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
     max_frame_slots: Count
-    """The most row times that a frame can take."""
+    """The most row times that a frame can take, or that lie between two frames."""
+    max_frame_clocks: Count
+    """The most clocks that a frame can take, from its first sample to its last."""
     min_row_clocks: Count
     """The least clocks of a row time in which the later stages keep up, end mark and all; the scanner's tag is kept
     until the frame before it is packed, and no longer."""
@@ -49,6 +54,33 @@ def _check_adaptive(skin: Skin) -> None:
             f"column_read is {skin.column_read!r}; scan = 'adaptive' needs column_read = 'direct', as it looks at "
             "the columns of an untouched sheet in each clock"
         )
+    if skin.precharge_us:
+        raise SkinError(
+            f"precharge_us is {skin.precharge_us}; scan = 'adaptive' keeps rows driven and cannot drive the columns, "
+            "scan = 'reversal' can"
+        )
+
+
+def _check_reversal(skin: Skin) -> None:
+    if skin.row_drive != "direct":
+        raise SkinError(
+            f"row_drive is {skin.row_drive!r}; scan = 'reversal' needs row_drive = 'direct', as it reads the rows"
+        )
+    if not skin.precharge_us:
+        raise SkinError("precharge_us is 0; scan = 'reversal' drives the columns, and needs a time for it")
+
+
+def _reversal_frame_clocks(derived: Derived) -> int:
+    """All rows are touched, and each waits for the one before it to be taken, debounced, labelled and counted."""
+    handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones + 8)
+    return derived.project_clocks + 8 + derived.skin.rows * (derived.row_clocks + handed)
+
+
+def _reversal_max_frame_slots(derived: Derived) -> int:
+    """A frame is packed before the next one begins; untouched, one begins after as many row times as there are rows."""
+    packed = derived.packed_clocks + derived.items_clocks(derived.max_items)
+    longest = derived.max_frame_clocks + packed + 2 * derived.project_clocks
+    return math.ceil(longest / derived.row_clocks) + derived.skin.rows + 2
 
 
 def _raster_min_row_clocks(derived: Derived) -> int:
@@ -78,7 +110,7 @@ def _adaptive_packing_clocks(derived: Derived, pressed: int) -> int:
     return math.ceil(clocks / min(pressed + 1, skin.rows))
 
 
-ScanName = Literal["raster", "adaptive"]
+ScanName = Literal["raster", "adaptive", "reversal"]
 
 SCANS: dict[str, Scan] = {
     scan.name: scan
@@ -89,9 +121,11 @@ SCANS: dict[str, Scan] = {
             gateware="contactfpga_hdl.scan.raster:Scanner",
             golden="contactfpga_sim.golden.scan:RASTER",
             even=True,
+            waits=False,
             check=lambda skin: None,
             choice_clocks=lambda derived: 0,
             max_frame_slots=lambda derived: derived.skin.rows,
+            max_frame_clocks=lambda derived: derived.frame_clocks,
             min_row_clocks=_raster_min_row_clocks,
         ),
         Scan(
@@ -100,10 +134,25 @@ SCANS: dict[str, Scan] = {
             gateware="contactfpga_hdl.scan.adaptive:AdaptiveScanner",
             golden="contactfpga_sim.golden.adaptive:ADAPTIVE",
             even=False,
+            waits=False,
             check=_check_adaptive,
             choice_clocks=lambda derived: max(derived.row_levels, 2) + 4,
             max_frame_slots=lambda derived: derived.skin.rows + 2 * derived.row_levels + 2,
+            max_frame_clocks=lambda derived: derived.max_frame_slots * derived.row_clocks,
             min_row_clocks=_adaptive_min_row_clocks,
+        ),
+        Scan(
+            name="reversal",
+            title="reversal",
+            gateware="contactfpga_hdl.scan.reversal:ReversalScanner",
+            golden="contactfpga_sim.golden.reversal:REVERSAL",
+            even=False,
+            waits=True,
+            check=_check_reversal,
+            choice_clocks=lambda derived: 0,
+            max_frame_slots=_reversal_max_frame_slots,
+            max_frame_clocks=_reversal_frame_clocks,
+            min_row_clocks=lambda derived: 1,
         ),
     )
 }

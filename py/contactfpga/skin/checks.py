@@ -98,6 +98,7 @@ def check_sheet(skin: Skin) -> Mask:
         _within(name, getattr(skin, name), limits.MIN_PITCH_MM, limits.MAX_PITCH_MM, "mm")
     mask = _check_mask(skin)
     _check_registers(skin)
+    _check_precharge(skin)
     scans.find(skin.scan).check(skin)
     _check_ghosts(skin, mask)
     _check_surface(skin)
@@ -160,6 +161,15 @@ def _check_registers(skin: Skin) -> None:
         )
 
 
+def _check_precharge(skin: Skin) -> None:
+    if skin.precharge_us and skin.column_read != "direct":
+        raise SkinError(f"column_read is {skin.column_read!r}; precharge_us drives the columns and needs 'direct'")
+    if skin.precharge_us and skin.ghosts:
+        raise SkinError("diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'")
+    if skin.scan != "reversal" and skin.project_us != limits.PROJECT_US:
+        raise SkinError(f"project_us is {skin.project_us}; leave it out, or set scan = 'reversal'")
+
+
 def _check_ghosts(skin: Skin, mask: Mask) -> None:
     """Without diodes only what can still be told apart from ghosts is taken."""
     if not skin.ghosts:
@@ -205,11 +215,11 @@ def check_timing(skin: Skin) -> None:
     """What follows a row is done before the next, with the zone capacity that the Skin has by now."""
     assert skin.zone_capacity is not None
     _within("zone_capacity", skin.zone_capacity, 1, skin.max_zones(), "for this sheet")
-    for name in ("settle_us", "release_us"):
-        _within(name, getattr(skin, name), 0.0, 10_000.0, "us")
+    for name in ("settle_us", "release_us", "precharge_us", "project_us"):
+        _within(name, getattr(skin, name), 0.0, limits.MAX_ROW_US, "us")
     derived = Derived(skin)
     megahertz = skin.clock_hz // 1_000_000
-    for name in ("settle_us", "release_us"):
+    for name in ("settle_us", "release_us", "project_us"):
         if derived.clocks(getattr(skin, name)) < 1:
             raise SkinError(f"{name} is {getattr(skin, name)}; it must be at least one clock, {1 / megahertz:g} us")
     if derived.row_clocks < derived.min_row_clocks:

@@ -71,7 +71,18 @@ class Derived(Widths):
         then shifted."""
         column = self.column_load_clocks + self.column_shift_clocks
         row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
-        return max(self.clocks(self.skin.release_us), column, row)
+        precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
+        return max(self.clocks(self.skin.release_us), column, row, precharge)
+
+    @property
+    def precharge_clocks(self) -> int:
+        """How long columns are driven at least before a row is; 0: they never are."""
+        return self.clocks(self.skin.precharge_us)
+
+    @property
+    def project_clocks(self) -> int:
+        """How long all columns are driven and rows let go before these are sampled."""
+        return self.clocks(self.skin.project_us)
 
     @property
     def row_clocks(self) -> int:
@@ -114,8 +125,18 @@ class Derived(Widths):
 
     @property
     def max_frame_slots(self) -> int:
-        """The most row times that a frame can take."""
+        """The most row times that a frame can take, or that lie between two frames."""
         return self.scan.max_frame_slots(self)
+
+    @property
+    def max_frame_clocks(self) -> int:
+        """The most clocks that a frame can take, from its first sample to its last."""
+        return self.scan.max_frame_clocks(self)
+
+    @property
+    def skips(self) -> bool:
+        """Rows that were not driven are not handed on, but for an empty one where zones have to end."""
+        return self.scan.waits and self.report.zones
 
     @property
     def frame_clocks(self) -> int:
@@ -245,8 +266,10 @@ class Derived(Widths):
         Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
         them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
         are packed before the next one comes. An adaptive scan omits empty rows, so that every row may close as many
-        zones, and bitmap rows of two frames may wait.
+        zones, and bitmap rows of two frames may wait. A scan that waits has one frame at most under way.
         """
+        if self.scan.waits:
+            return self.max_items + 2
         if not self.report.zones:
             return 4 if self.scan.even else 2 * self.skin.rows + 2
         busy = self.open_zones * self.item_clocks

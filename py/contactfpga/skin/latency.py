@@ -20,7 +20,7 @@ def latency_s(skin: Skin) -> float:
     items = 1 if derived.report.zones else derived.max_items
     plain = items * derived.item_bytes + derived.trailer_bytes
     packet = plain + -(-plain // 254) + CHECK_BYTES + 1
-    clocks = 2 * derived.max_frame_slots * derived.row_clocks + packet * 10 * derived.bit_clocks
+    clocks = 2 * derived.max_frame_clocks + packet * 10 * derived.bit_clocks
     if debounces.find(skin.debounce).delays_press:
         clocks += derived.press_scans * derived.frame_clocks
     if derived.label_empty_row_clocks > 1:

@@ -52,11 +52,17 @@ class Skin:
     as ``col2row``, but with no diodes rows float while they are not selected, and three pressed corners of a rectangle
     make the fourth read pressed: what that may have made is flagged ``ghost``."""
     scan: ScanName | Scan = "raster"
-    """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched."""
+    """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched;
+    ``reversal`` drives all columns and reads the rows, and then drives only the rows that are touched."""
     settle_us: float = 5.0
     """Time a row is driven before its columns are sampled, in us."""
     release_us: float = 1.0
-    """Time without a driven row before the next one, in us."""
+    """Time without a driven row before the next one, in us; with ``precharge_us`` at least that and two clocks."""
+    precharge_us: float = 0.0
+    """How long the board drives the columns to the released level before it drives a row, in us; 0: pulls alone bring
+    them there."""
+    project_us: float = limits.PROJECT_US
+    """``scan = "reversal"``: how long all columns are driven before the rows are read, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
     row_chains: int = 1
