@@ -88,7 +88,7 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
         disturb(cycle, sheet)
         columns = np.array([stuck(cycle) >> column & 1 for column in range(skin.columns)], bool)
         sheet.matrix.press(cells[min(cycle, len(cells) - 1)], columns)
-        level = sheet.step(pins)
+        (level,) = sheet.step(pins)
         driven.append([row for row in range(skin.rows) if (sheet.row_levels ^ idle) >> row & 1])
         return level
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -27,14 +28,14 @@ def run(skin: Skin, timeline: Timeline, cycles: int, limit_s: float = 60.0) -> T
     names = ports(PAYLOADS, skin)
     payloads = [getattr(top, name) for name in names]
     reads = {name: getattr(top, name) for name in stimulus.reads}
-    drives = Cat(*(getattr(top, name) for name in stimulus.drives))
-    above = len(getattr(top, stimulus.drives[0]))
+    drives = [getattr(top, name) for name in stimulus.drives]
+    places = list(itertools.accumulate((len(port) for port in drives), initial=0))
     deadline = time.monotonic() + limit_s
 
     async def bench(ctx: Any) -> None:
         for cycle in range(cycles):
-            sheet, rx = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
-            ctx.set(drives, sheet | rx << above)
+            pins = stimulus.pins(cycle, {name: ctx.get(port) for name, port in reads.items()})
+            ctx.set(Cat(*drives), sum(level << place for level, place in zip(pins, places, strict=False)))
             _, _, level, *values = await ctx.tick().sample(levels, *payloads)
             recorder.note(cycle, level, dict(zip(names, values, strict=True)).__getitem__)
             if cycle % 256 == 0 and time.monotonic() > deadline:

@@ -40,18 +40,18 @@ class Stimulus:
     def __init__(self, skin: Skin, timeline: Timeline):
         self._sheet = Sheet(skin)
         self.reads = self._sheet.reads
-        self.drives = (self._sheet.drives, "rx")
+        self.drives = (*self._sheet.drives, "rx")
         self._pieces = list(reversed(timeline.pieces))
         self._bit_clocks = facts(skin).bit_clocks
         self._received = list(reversed(timeline.received))
         self._start, self._data = 0, b""
 
-    def pins(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, int]:
+    def pins(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, ...]:
         """Levels of ``drives``, given those of ``reads``."""
         if self._pieces and self._pieces[-1][0] <= cycle:
             _, cells, stuck = self._pieces.pop()
             self._sheet.matrix.press(cells, stuck)
-        return self._sheet.step(pins), self._rx(cycle)
+        return (*self._sheet.step(pins), self._rx(cycle))
 
     def _rx(self, cycle: int) -> int:
         if self._received and self._received[-1][0] == cycle:

@@ -11,7 +11,7 @@ import numpy as np
 from contactfpga_sim.golden import debounce, seek
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.scan import Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.golden.scan import Play, Scan, Scanned, ScanRule, last_number
 from contactfpga_sim.golden.trace import Timeline
 
 
@@ -197,25 +197,12 @@ class Adaptive(ScanRule):
     def frame_slots(self, facts: Facts) -> int:
         return facts.rows + 2 * facts.halvings + 2
 
-    def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
-        scanner = Scanner(facts, timeline, requests)
-        frames = [scanner.frame()]
-        while scanner.slots[-1].end < cycles:
-            frames.append(scanner.frame())
-        return [one for one, _ in frames], [counted for _, counted in frames], scanner.contact
-
-    def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
-        scanner = Scanner(facts, timeline, [])
-        while not scanner.slots or scanner.slots[-1].end < cycles:
-            scanner.frame()
-        return driven(facts, scanner.slots)
-
-    def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
-        scanner, found = Scanner(facts, timeline, []), [facts.row_shift]
-        while found[-1] <= cycles:
-            scanner.frame()
-            found.append(scanner.slots[-1].end)
-        return found
+    def scan(self, play: Play) -> Scanned:
+        scanner, beginnings = Scanner(play.facts, play.timeline, play.requests), [play.facts.row_shift]
+        while beginnings[-1] <= play.cycles:
+            play.stages.frame(*scanner.frame())
+            beginnings.append(scanner.slots[-1].end)
+        return Scanned(scanner.contact, driven(play.facts, scanner.slots), beginnings)
 
 
 ADAPTIVE = Adaptive()

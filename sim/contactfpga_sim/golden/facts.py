@@ -114,7 +114,9 @@ class Facts:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
         chosen = self.choice + self.row_shift if self.choice else 0
-        return max(asked, self.load + self.column_shift, latch, chosen)
+        precharge = upwards(exact(self.skin.precharge_us) * self.clocks_per_us)
+        charged = 1 + precharge + 1 if precharge else 0
+        return max(asked, self.load + self.column_shift, latch, chosen, charged)
 
     @functools.cached_property
     def settle(self) -> int:
@@ -133,6 +135,17 @@ class Facts:
     @functools.cached_property
     def bit_clocks(self) -> int:
         return round(Fraction(self.skin.clock_hz, self.skin.baud))
+
+    @functools.cached_property
+    def project(self) -> int:
+        """Clocks for which all columns are driven before the rows are sampled."""
+        return upwards(exact(self.skin.project_us) * self.clocks_per_us)
+
+    @functools.cached_property
+    def column_groups(self) -> int:
+        """Groups of columns, at most four, in which a row is counted: of 4 columns, 8 or 16."""
+        group = next(width for width in (4, 8, 16) if 4 * width >= self.columns)
+        return -(-self.columns // group)
 
     @property
     def debounced(self) -> bool:

@@ -55,8 +55,8 @@ class Packer:
         self._before: np.ndarray | None = None
         self._overwritten = 0
 
-    def take(self, items: Items) -> None:
-        """Pack one frame."""
+    def take(self, items: Items) -> int:
+        """Pack one frame; returns the cycle from which the next one's items can be taken."""
         packet = Packet()
         for put, data in items.records[: self._facts.capacity]:
             offered, item = self._queue.offer(put, data)
@@ -78,6 +78,7 @@ class Packer:
         if self._since_hello >= self._facts.hello_slots:
             self._link.want_hello(taken + 1)
             self._since_hello = 0
+        return self._free
 
     def _is_sent(self, items: Items) -> bool:
         if self._facts.skin.send == "always" or self._before is None or items.scan.requested:

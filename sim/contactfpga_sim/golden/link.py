@@ -18,6 +18,8 @@ class Link:
         self._state = state
         self._byte_clocks = 10 * facts.bit_clocks
         self._hellos: list[int] = []
+        self._blank: list[tuple[int, int, int]] = []
+        """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, frames sent then."""
         self._frame: tuple[int, bytes] | None = None
         self._idle_from = 0
         self._uart_from = 0
@@ -56,12 +58,24 @@ class Link:
                 self.sent += 1
                 self._send(taken, packet)
 
+    def finish(self, cycle: int) -> None:
+        """Let the wire take what it takes up to ``cycle``, and fill in the state of the hellos, now that all is known
+        that came while they went out."""
+        self.advance(cycle)
+        for begin, taken, sent in self._blank:
+            self._fill_in(begin, taken, sent)
+
     def _send_hello(self, taken: int) -> None:
+        self._blank.append((len(self.bytes), taken, self.sent))
+        self._send(taken, hello(self._facts))
+
+    def _fill_in(self, begin: int, taken: int, sent: int) -> None:
         """Each digit is taken in the cycle after the transfer of the byte before it."""
-        first = max(taken + 2, self._uart_from)
-        before = (first + (place - 1) * self._byte_clocks for place in DIGITS)
-        digits = [self._state.digit(place, at + 1, self.sent, taken) for place, at in enumerate(before)]
-        self._send(taken, hello(self._facts, digits))
+        before = (self.bytes[begin + place - 1][0] for place in DIGITS)
+        digits = [self._state.digit(place, at + 1, sent, taken) for place, at in enumerate(before)]
+        packet = hello(self._facts, digits)
+        cycles = [cycle for cycle, _ in self.bytes[begin : begin + len(packet)]]
+        self.bytes[begin : begin + len(packet)] = list(zip(cycles, packet, strict=True))
 
     def _send(self, taken: int, packet: bytes) -> None:
         cycle = max(taken + 2, self._uart_from)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,70 +20,148 @@ if TYPE_CHECKING:
 
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
-    known = facts(skin)
-    heard = request.heard(timeline.received, known.bit_clocks)
-    scanned, counted, contact = known.scan.scanned(known, timeline, heard.requests, cycles)
-    trace = Trace(cycles)
-    link = Link(known, State(known, scanned, heard))
-    for cycle in (0, *(one.cycle + 1 for one in heard.requests if one.hello)):
-        link.want_hello(cycle)
-    packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
-    handed = Labeller(known, trace)
-    for one, cells in zip(scanned, counted, strict=True):
-        packer.take(handed.take(one, cells))
-    link.advance(cycles)
+    trace, link, scanned = _play(skin, timeline, cycles)
+    trace.contact = scanned.contact
     trace.bytes = link.bytes
-    trace.line = uart.line(link.bytes, known.bit_clocks)
-    trace.contact = contact
+    trace.line = uart.line(link.bytes, facts(skin).bit_clocks)
     return trace.until(cycles)
 
 
 def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
     """(cycle, rows) of every change of the rows that are driven in cycles 0 to ``cycles`` - 1; bit r is row r."""
-    known = facts(skin)
-    return [change for change in known.scan.driven(known, timeline, cycles) if change[0] < cycles]
+    return [change for change in _play(skin, timeline, cycles)[2].driven if change[0] < cycles]
 
 
 def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
-    """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
+    """Cycles in which a frame begins, up to ``cycles`` and one beyond."""
+    return _play(skin, timeline, cycles)[2].beginnings
+
+
+def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, scan.Scanned]:
     known = facts(skin)
-    return known.scan.beginnings(known, timeline, cycles)
+    heard = request.heard(timeline.received, known.bit_clocks)
+    trace = Trace(cycles)
+    frames: list[scan.Scan] = []
+    link = Link(known, State(known, frames, heard))
+    for cycle in (0, *(one.cycle + 1 for one in heard.requests if one.hello)):
+        link.want_hello(cycle)
+    packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
+    stages = Stages(known, trace, packer, frames)
+    scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
+    link.finish(cycles)
+    return trace, link, scanned
 
 
-class Labeller:
-    """Hands rows over and emits records, noting both in a trace."""
+class Stages:
+    """The stages after the scan: rows are handed over, records leave, frames are packed; all noted in a trace."""
 
-    def __init__(self, facts: Facts, trace: Trace):
+    def __init__(self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan]):
         self._facts = facts
         self._trace = trace
+        self._packer = packer
+        self._scanned = scanned
         self._free = 0
         self._handed = -1
+        self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
 
-    def take(self, one: scan.Scan, cells: np.ndarray) -> Items:
-        """Work one frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
-        facts = self._facts
-        late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
-        words = [int(np.sum(1 << np.nonzero(row)[0].astype(object))) for row in cells]
-        work = label.labelling(cells, facts.skin.connectivity, facts.skin.labeller)
+    def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
+        """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced. The scan waits for no row."""
+        work = label.labelling(cells, self._facts.skin.connectivity, self._facts.skin.labeller)
         handed = []
         for row, offered in enumerate(one.offered):
-            last = row == facts.rows - 1
-            cycle = max(max(offered, self._handed + 1) + late * (row in one.alone), self._free)
-            self._handed = cycle
-            handed.append(cycle)
-            self._trace.rows.append((cycle, words[row], last))
-            if facts.zones:
+            cycle = max(max(offered, self._handed + 1) + self._late * (row in one.alone), self._free)
+            handed.append(self._hand_over(cycle, cells[row], row == self._facts.rows - 1))
+            if self._facts.zones:
                 self._free = cycle + work.busy[row]
+        self._end(one, cells, cells, range(self._facts.rows), handed, work)
+
+    def rows(self) -> Rows:
+        """The rows of the next frame, for a scan that waits until a row is taken."""
+        return Rows(self._facts, self)
+
+    def _hand_over(self, cycle: int, cells: np.ndarray, last: bool) -> int:
+        self._handed = cycle
+        self._trace.rows.append((cycle, _word(cells), last))
+        return cycle
+
+    def _end(
+        self,
+        one: scan.Scan,
+        cells: np.ndarray,
+        taken: np.ndarray,
+        places: Sequence[int],
+        handed: list[int],
+        work: label.Labelling,
+    ) -> int:
+        """Records of the rows that were ``taken``, at these ``places`` of the sheet, and the frame packed."""
+        facts = self._facts
         if facts.zones:
-            records = [(handed[zone.row] + zone.clock, self._record(zone)) for zone in work.departures]
+            records = [
+                (handed[zone.row] + zone.clock, self._record(zone, places[zone.row] - zone.row))
+                for zone in work.departures
+            ]
             end = handed[-1] + work.end
         else:
-            records = list(zip(handed, words, strict=True))
+            records = [(cycle, _word(row)) for cycle, row in zip(handed, taken, strict=True)]
             end = handed[-1] + 3
         self._trace.records += [(cycle, data, False) for cycle, data in records] + [(end, 0, True)]
-        return Items(one, cells, records, end)
+        self._scanned.append(one)
+        return self._packer.take(Items(one, cells, records, end))
 
-    def _record(self, zone: label.Departure) -> int:
+    def _record(self, zone: label.Departure, below: int) -> int:
+        """The record of a zone whose rows lie this many rows further down than they were counted."""
         facts = self._facts
-        fields = (zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (zone.sum_y, facts.sum_y_bits)
-        return join(fields)[0]
+        sum_y = zone.sum_y + below * zone.area
+        return join(((zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)))[0]
+
+
+class Rows:
+    """A frame row by row: an empty one parts rows that are no neighbors, so a zone lies in rows without a gap."""
+
+    def __init__(self, facts: Facts, stages: Stages):
+        self._facts = facts
+        self._stages = stages
+        self._cells: list[np.ndarray] = []
+        self._places: list[int] = []
+        self._handed: list[int] = []
+
+    def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
+        """Hand over a row, its (C,) cells debounced; returns the cycle in which the scan's offer is taken."""
+        stages = self._stages
+        taken = max(offered, stages._handed + 1)
+        cycle = max(taken + stages._late * alone, stages._free, self._counted() if cells.any() else 0)
+        self._cells.append(cells)
+        self._places.append(place)
+        self._handed.append(stages._hand_over(cycle, cells, last))
+        if self._facts.zones:
+            stages._free = cycle + self._work([*self._cells, np.zeros_like(cells)]).busy[len(self._cells) - 1]
+        return taken if alone and stages._late else cycle
+
+    def end(self, one: scan.Scan, cells: np.ndarray) -> int:
+        """The frame is complete; returns the cycle from which the next one may begin."""
+        rows = self._cells
+        return self._stages._end(one, cells, np.array(rows), self._places, self._handed, self._work(rows))
+
+    def _work(self, rows: list[np.ndarray]) -> label.Labelling:
+        return label.labelling(np.array(rows), self._facts.skin.connectivity, self._facts.skin.labeller)
+
+    def _counted(self) -> int:
+        """The cycle from which a row with a pressed cell can be counted: the one before it is counted, a group of
+        columns per clock, in clocks in which no zone passes."""
+        pressed = [index for index, row in enumerate(self._cells) if row.any()]
+        if not pressed:
+            return 0
+        cycle = self._handed[pressed[-1]] + 1
+        passing: set[int] = set()
+        if self._facts.zones:
+            work = self._work([*self._cells, np.zeros_like(self._cells[0])])
+            passing = {self._handed[zone.row] + zone.clock for zone in work.departures if zone.row < len(self._handed)}
+        left = 1 + self._facts.column_groups
+        while left:
+            left -= cycle not in passing
+            cycle += 1
+        return cycle
+
+
+def _word(cells: np.ndarray) -> int:
+    return int(np.sum(1 << np.nonzero(cells)[0].astype(object)))

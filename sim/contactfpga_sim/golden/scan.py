@@ -6,6 +6,7 @@ import abc
 import bisect
 import dataclasses
 from collections.abc import Iterable, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -39,8 +40,53 @@ class Scan:
     """Rows that were driven alone."""
 
 
-Scanned = tuple[list[Scan], Iterable[np.ndarray], list[tuple[int, int]]]
-"""Frames, their cells as they count once debounced, and changes of the contact pin."""
+Changes = list[tuple[int, int]]
+"""(cycle, level) of every change."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scanned:
+    """What a scan does at the pins in the cycles it was asked for, and beyond."""
+
+    contact: Changes
+    """Of the contact pin."""
+    driven: Changes
+    """Of the rows that are driven; bit r is row r."""
+    beginnings: list[int]
+    """Cycles in which a frame begins, one of them beyond."""
+
+
+class Rows(Protocol):
+    """A frame's rows, for a scan that waits until each is taken."""
+
+    def take(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> int:
+        """A row of the sheet, its (C,) cells as they count, offered from a cycle on; ``alone``: it was driven. Returns
+        the cycle in which it is taken."""
+
+    def end(self, one: Scan, cells: np.ndarray) -> int:
+        """All rows were taken, (R, C) ``cells`` in all; returns the cycle from which the next frame may begin."""
+
+
+class Stages(Protocol):
+    """What comes after the scan."""
+
+    def frame(self, one: Scan, cells: np.ndarray) -> None:
+        """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
+
+    def rows(self) -> Rows:
+        """The next frame, row by row."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Play:
+    """What a scan goes through."""
+
+    facts: Facts
+    timeline: Timeline
+    requests: Sequence[Request]
+    """In the order of their coming."""
+    cycles: int
+    stages: Stages
 
 
 class ScanRule(abc.ABC):
@@ -58,16 +104,8 @@ class ScanRule(abc.ABC):
         """The most row times that a frame takes."""
 
     @abc.abstractmethod
-    def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
-        """The frames of cycles 0 to ``cycles`` - 1, or more, with the requests in the order of their coming."""
-
-    @abc.abstractmethod
-    def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
-        """(cycle, rows) of every change of the rows that are driven, up to ``cycles`` and beyond; bit r is row r."""
-
-    @abc.abstractmethod
-    def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
-        """Cycles in which the first row time of a frame begins, up to ``cycles`` and one beyond."""
+    def scan(self, play: Play) -> Scanned:
+        """The frames of all its cycles, or more; each is handed to its stages."""
 
 
 class Raster(ScanRule):
@@ -81,22 +119,20 @@ class Raster(ScanRule):
     def frame_slots(self, facts: Facts) -> int:
         return facts.rows
 
-    def scanned(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Scanned:
-        scanned = scans(facts, timeline, requests, cycles // facts.scan_clocks + 1)
+    def scan(self, play: Play) -> Scanned:
+        facts, frames = play.facts, play.cycles // play.facts.scan_clocks + 1
+        scanned = scans(facts, play.timeline, play.requests, frames)
         counted = debounced(
             np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
         )
-        return scanned, counted, contact(facts, scanned)
-
-    def driven(self, facts: Facts, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
-        changes = []
-        for slot in range(cycles // facts.row_clocks + 1):
+        for one, cells in zip(scanned, counted, strict=True):
+            play.stages.frame(one, cells)
+        driven = []
+        for slot in range(frames * facts.rows):
             start = facts.row_shift + slot * facts.row_clocks
-            changes += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
-        return changes
-
-    def beginnings(self, facts: Facts, timeline: Timeline, cycles: int) -> list[int]:
-        return [facts.row_shift + number * facts.scan_clocks for number in range(cycles // facts.scan_clocks + 2)]
+            driven += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
+        beginnings = [facts.row_shift + number * facts.scan_clocks for number in range(frames + 1)]
+        return Scanned(contact(facts, scanned), driven, beginnings)
 
 
 RASTER = Raster()

@@ -18,12 +18,18 @@ def words(cells: np.ndarray | None, rows: int) -> list[int]:
     return [int("".join("1" if cell else "0" for cell in row[::-1]), 2) for row in np.asarray(cells, bool)]
 
 
+class Contention(AssertionError):
+    """A driven column and a row that is driven to the selecting level meet in a pressed switch."""
+
+
 class Matrix:
-    """Column levels for pressed cells and driven rows.
+    """Levels of columns and rows for pressed cells and for what the board drives.
 
     A pressed switch passes its row's selecting level to its column and nothing else, as a diode in series
     makes it do. ``col2row``: a row selects by being low and a column that reads pressed is low, else pulled
     up; ``row2col``: both high, else pulled down. Masked cells may be pressed too: the board has to ignore them.
+    Likewise a driven column passes its level, the released one, to rows that are let go; else these are pulled to the
+    selecting level. A stuck column cannot be driven.
     """
 
     def __init__(self, skin: Skin):
@@ -43,11 +49,28 @@ class Matrix:
             self._pressed = list(cells)
         self._stuck = 0 if stuck is None else words(np.asarray(stuck)[None], 1)[0]
 
-    def levels(self, rows: int) -> int:
-        """Levels of the columns, bit c is column c, for the levels of the row pins, bit r is row r."""
-        selected = rows ^ self._all_rows if self._selects_low else rows
-        pressed = self._stuck
+    def levels(self, rows: int, rows_driven: int | None = None, columns_driven: int = 0) -> int:
+        """Levels of the columns, bit c is column c, for the levels of the row pins, bit r is row r.
+
+        ``rows_driven``: which rows are driven, by default all; ``columns_driven``: which columns are, to the released
+        level. Raises :class:`Contention`.
+        """
+        selected = (rows ^ self._all_rows if self._selects_low else rows) & self._driven(rows_driven)
+        pulled = 0
         for row, word in enumerate(self._pressed):
             if selected >> row & 1:
-                pressed |= word
+                pulled |= word
+        if fights := pulled & columns_driven:
+            raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
+        pressed = pulled | self._stuck
         return pressed ^ self._all_columns if self._selects_low else pressed
+
+    def row_levels(self, rows: int, rows_driven: int, columns_driven: int) -> int:
+        """Levels at the row pins: those of ``rows`` where they are driven, else what the columns make of them."""
+        feeding = columns_driven & ~self._stuck
+        touched = sum(1 << row for row, word in enumerate(self._pressed) if word & feeding)
+        let_go = touched if self._selects_low else touched ^ self._all_rows
+        return rows & rows_driven | let_go & ~rows_driven
+
+    def _driven(self, rows_driven: int | None) -> int:
+        return self._all_rows if rows_driven is None else rows_driven

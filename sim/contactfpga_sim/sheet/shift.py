@@ -72,14 +72,19 @@ class ColumnRegisters:
 class Sheet:
     """A :class:`Matrix` at the pins of the gateware's top, cycle by cycle.
 
-    ``reads`` names the top's outputs it looks at, ``drives`` the input it gives. ``column_delay``: see
+    ``reads`` names the top's outputs it looks at, ``drives`` the inputs it gives. ``column_delay``: see
     :class:`ColumnRegisters`; ``row_levels`` are those of the row wires.
     """
 
     def __init__(self, skin: Skin, power_up: int = 0, column_delay: int = 0):
         self.matrix = Matrix(skin)
         self.reads = ROW_PINS[skin.row_drive] + COLUMN_PINS[skin.column_read]
-        self.drives = COLUMN_DATA[skin.column_read]
+        self.drives: tuple[str, ...] = (COLUMN_DATA[skin.column_read],)
+        if skin.precharge_us:
+            self.reads += ("columns_drive",)
+        if skin.scan == "reversal":
+            self.reads += ("rows_drive",)
+            self.drives += ("rows_read",)
         self._released = (1 << skin.rows) - 1 if skin.selects_low else 0
         self.row_levels = self._released
         contents = random.Random(power_up)
@@ -90,14 +95,17 @@ class Sheet:
         if skin.column_read != "direct":
             self.column_registers = ColumnRegisters(skin.columns, skin.column_chains, contents, column_delay)
 
-    def step(self, pins: Mapping[str, int]) -> int:
-        """Level of ``drives`` in this cycle, for those of ``reads``."""
+    def step(self, pins: Mapping[str, int]) -> tuple[int, ...]:
+        """Levels of ``drives`` in this cycle, for those of ``reads``."""
         if self.row_registers is None:
             self.row_levels = pins["rows"]
         else:
             levels = self.row_registers.step(*(pins[name] for name in ROW_PINS["74hc595"]))
             self.row_levels = self._released if levels is None else levels & (1 << self.matrix.rows) - 1
-        columns = self.matrix.levels(self.row_levels)
+        rows_driven, columns_driven = pins.get("rows_drive"), pins.get("columns_drive", 0)
+        columns = self.matrix.levels(self.row_levels, rows_driven, columns_driven)
+        if rows_driven is not None:
+            return columns, self.matrix.row_levels(self.row_levels, rows_driven, columns_driven)
         if self.column_registers is None:
-            return columns
-        return self.column_registers.step(pins["column_load_n"], pins["column_clock"], columns)
+            return (columns,)
+        return (self.column_registers.step(pins["column_load_n"], pins["column_clock"], columns),)

@@ -1,0 +1,253 @@
+"""The scan by line reversal: when the board listens to the rows, which rows it drives then, and the contact pin."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from contactfpga_sim.golden import debounce
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.request import Request
+from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
+
+RETRY_US = 2**16
+"""A column that read stuck is driven again when the clock passes a multiple of this."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Slot:
+    """A row is driven from cycle ``begin`` on; its columns are sampled in the last cycle in which it is."""
+
+    row: int
+    begin: int
+    sample: int
+
+    @property
+    def strobe(self) -> int:
+        """When the sample has come through the synchronizer."""
+        return self.sample + 2
+
+
+class Scanner:
+    """Goes through a timeline frame by frame; the stages say when they take a row and a frame."""
+
+    def __init__(self, play: Play):
+        facts = play.facts
+        self.slots: list[Slot] = []
+        self.begun: list[int] = []
+        """For each frame the cycle in which the rows count, as the synchronizer shows them."""
+        self.contact: Changes = []
+        self._facts = facts
+        self._timeline = play.timeline
+        self._changes = [piece[0] for piece in play.timeline.pieces]
+        self._requests = play.requests
+        self._stages = play.stages
+        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
+        self._busy: frozenset[int] = frozenset()
+        self._listens = 1  # the first cycle in which all columns are driven and rows let go
+        self._packed = 0  # the cycle from which on a frame may begin
+        self._rests = False
+        self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
+
+    def frame(self) -> None:
+        """The next frame."""
+        begun = self._begin()
+        stuck = self._stuck(begun)
+        todo = sorted(self._touched(begun - 2) | self._busy)
+        scan = Scan(
+            cells=np.zeros((self._facts.rows, self._facts.columns), bool),
+            offered=[],
+            stuck=int(np.sum(stuck & ~self._facts.mask.all(axis=0))),
+            time_us=begun // self._facts.clocks_per_us,
+            requested=any(one.cycle < begun for one in self._waiting()),
+            heard=last_number(self._requests, begun) % 8,
+            told=begun + 3,
+            slots=self._ticks(begun),
+            alone=frozenset(todo),
+        )
+        self.begun.append(begun)
+        self._rests = not todo
+        rows = self._stages.rows()
+        counted = self._drive(begun, todo, rows, scan.cells)
+        if not scan.cells.any():
+            self._set_contact(self.slots[-1].strobe + 1 if todo else begun + 1, 0)
+        self._packed = rows.end(scan, counted)
+
+    # ---- when a frame begins
+
+    def _begin(self) -> int:
+        """Rows have been let go for long enough, and the frame before is packed; and on an untouched sheet something is
+        touched or a frame is wanted."""
+        project = self._facts.project
+        if not self._rests:
+            return max(self._listens + project + 1, self._packed)
+        wanted = max(self._wanted(), self._packed)
+        touched = self._first_touched(self.begun[-1] - 1, wanted - 2)
+        if touched is None:
+            return wanted
+        seen = touched + 2
+        if self._touched(touched) & self._clean_rows():
+            self._set_contact(seen + 1, 1)
+        return max(seen + project, self._packed)
+
+    def _wanted(self) -> int:
+        """The first cycle in which a frame is, though nothing is touched."""
+        before = self.begun[-1]
+        if self._facts.skin.send == "always":
+            return before + 1
+        row = self._facts.row_clocks
+        asked = [one.cycle + 1 for one in self._waiting()]
+        return min([*asked, (before // row + self._facts.rows) * row])
+
+    def _waiting(self) -> list[Request]:
+        """Requests that no frame has answered."""
+        before = self.begun[-1] if self.begun else 0
+        return [one for one in self._requests if one.cycle >= before]
+
+    def _ticks(self, begun: int) -> int:
+        """Row times since the frame before began; the first one has one more."""
+        row = self._facts.row_clocks
+        return begun // row - self.begun[-1] // row if self.begun else begun // row + 1
+
+    # ---- what the sheet shows while the board listens
+
+    def _touched(self, cycle: int) -> frozenset[int]:
+        """Rows that read touched at the pins and are not masked whole."""
+        cells, stuck = self._timeline.at(cycle)
+        if cells is None:
+            return frozenset()
+        driven = ~self._undriven(cycle) & ~self._facts.mask.all(axis=0)
+        if stuck is not None:
+            driven &= ~np.asarray(stuck, bool)
+        rows = (np.asarray(cells, bool) & driven).any(axis=1) & ~self._facts.mask.all(axis=1)
+        return frozenset(np.flatnonzero(rows).tolist())
+
+    def _clean_rows(self) -> set[int]:
+        return set(np.flatnonzero(~self._facts.mask.any(axis=1)).tolist())
+
+    def _first_touched(self, begin: int, end: int) -> int | None:
+        """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
+        retry = RETRY_US * self._facts.clocks_per_us
+        turns = {begin, *self._changes, self.begun[-1] + 2, *range(begin // retry * retry + 2, end + 1, retry)}
+        return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
+
+    def _undriven(self, cycle: int) -> np.ndarray:
+        """(C,) bool: columns that are not driven in this cycle, as they read stuck."""
+        retry = RETRY_US * self._facts.clocks_per_us
+        for begun, held in reversed(self._held):
+            if begun + 2 <= cycle:
+                return held if (cycle - 2) // retry == begun // retry else np.zeros_like(held)
+        return np.zeros(self._facts.columns, bool)
+
+    def _stuck(self, begun: int) -> np.ndarray:
+        """Columns that read pressed as a frame begins; from then on they are not driven."""
+        _, stuck = self._timeline.at(begun - 2)
+        now = np.zeros(self._facts.columns, bool) if stuck is None else np.asarray(stuck, bool)
+        retry = RETRY_US * self._facts.clocks_per_us
+        before = [held for cycle, held in self._held[-1:] if cycle // retry == begun // retry]
+        self._held.append((begun, np.logical_or.reduce([now, *before])))
+        return now
+
+    # ---- rows that are driven
+
+    def _drive(self, begun: int, todo: list[int], rows: Rows, cells: np.ndarray) -> np.ndarray:
+        """Drives the rows and fills in ``cells``; returns (R, C) bool: what counts, debounced."""
+        facts = self._facts
+        counted = np.zeros_like(cells)
+        handed = _Handed(facts, rows)
+        begin = begun + 4
+        for row in todo:
+            slot = Slot(row, begin, begin + facts.settle - 1)
+            self.slots.append(slot)
+            cells[row] = self._read(slot)
+            if cells[row].any():
+                self._set_contact(slot.strobe + 1, 1)
+            counts, busy = self._debounce.take(cells, {row: slot.strobe // facts.row_clocks})
+            self._busy = busy if facts.debounced else frozenset()
+            counted[row] = counts[row]
+            following = min((other for other in todo if other > row), default=None)
+            handed.driven(row, counted[row], slot.strobe + 1, following)
+            begin = max(slot.begin + facts.row_clocks, handed.taken + 4)
+        if not todo:
+            handed.nothing(begun + 1)
+        else:
+            self._listens = self.slots[-1].sample + 2
+        return counted
+
+    def _read(self, slot: Slot) -> np.ndarray:
+        pressed, stuck = self._timeline.at(slot.sample)
+        columns = np.zeros(self._facts.columns, bool)
+        if pressed is not None:
+            columns |= np.asarray(pressed[slot.row], bool)
+        if stuck is not None:
+            columns |= np.asarray(stuck, bool)
+        return columns & ~self._facts.mask[slot.row]
+
+    def _set_contact(self, cycle: int, level: int) -> None:
+        if level != (self.contact[-1][1] if self.contact else 0):
+            self.contact.append((cycle, level))
+
+
+class _Handed:
+    """Which rows of a frame are offered: where zones are found those that were driven, each with an empty one after it
+    whose neighbor is not; otherwise all."""
+
+    def __init__(self, facts: Facts, rows: Rows):
+        self.taken = 0
+        """The cycle in which the last one was taken."""
+        self._facts = facts
+        self._rows = rows
+        self._place = 0
+        self._nothing = np.zeros(facts.columns, bool)
+
+    def driven(self, row: int, cells: np.ndarray, offered: int, following: int | None) -> None:
+        if self._facts.zones:
+            self._offer(row, cells, offered, True, following is None)
+            if following is not None and following != row + 1:
+                self._offer(row + 1, self._nothing, self.taken + 1, False, False)
+            return
+        self._all_until(row, offered)
+        self._offer(row, cells, max(offered, self.taken + 1), True, row == self._facts.rows - 1)
+        if following is None:
+            self._all_until(self._facts.rows, offered)
+
+    def nothing(self, offered: int) -> None:
+        if self._facts.zones:
+            self._offer(0, self._nothing, offered, False, True)
+        else:
+            self._all_until(self._facts.rows, offered)
+
+    def _all_until(self, end: int, offered: int) -> None:
+        while self._place < end:
+            last = self._place == self._facts.rows - 1
+            self._offer(self._place, self._nothing, max(offered, self.taken + 1), False, last)
+
+    def _offer(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> None:
+        self.taken = self._rows.take(place, cells, offered, alone, last)
+        self._place = place + 1
+
+
+class Reversal(ScanRule):
+    """Line reversal: the rows that read touched, one by one."""
+
+    even = False
+
+    def choice(self, facts: Facts) -> int:
+        return 0
+
+    def frame_slots(self, facts: Facts) -> int:
+        row = facts.row_clocks + 7 * facts.columns + 23
+        packed = facts.capacity * (max(facts.item_bytes, facts.division + 1 if facts.divided else 0) + 1)
+        longest = facts.rows * row + 3 * facts.project + packed + 3 * facts.columns + 72
+        return facts.rows + 2 + -(-longest // facts.row_clocks)
+
+    def scan(self, play: Play) -> Scanned:
+        scanner = Scanner(play)
+        while not scanner.begun or scanner.begun[-1] <= play.cycles:
+            scanner.frame()
+        driven = [change for slot in scanner.slots for change in ((slot.begin, 1 << slot.row), (slot.sample + 1, 0))]
+        return Scanned(scanner.contact, driven, scanner.begun)
+
+
+REVERSAL = Reversal()
