@@ -15,6 +15,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.circuit import Line
+from contactfpga_sim.sheet.matrix import Contention
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
@@ -82,6 +83,7 @@ class CompiledBoard:
     def run(self, cycles: int) -> None:
         """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
         self._call("run", ctypes.c_uint64(cycles))
+        self._check_pins()
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
         """Press each of (n, rows, columns) bool frames for this many cycles, by default for one scan."""
@@ -94,6 +96,11 @@ class CompiledBoard:
             ctypes.c_size_t(len(words)),
             ctypes.c_uint64(Derived(self.skin).frame_clocks if cycles is None else cycles),
         )
+        self._check_pins()
+
+    def _check_pins(self) -> None:
+        if clocks := self._call("fights"):
+            raise Contention(f"in {clocks} clocks a column was driven against a row")
 
     def send(self, data: bytes) -> None:
         """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
@@ -152,6 +159,8 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
             "BIT_CLOCKS": Derived(skin).bit_clocks,
+            "PRECHARGE": int(skin.precharge_us > 0),
+            "REVERSAL": int(skin.scan == "reversal"),
             "PROBES": int(netlist is None),
             "DIVIDED": int(skin.report == "barycenter"),
         },
@@ -163,5 +172,6 @@ def _library(model: native.Model) -> ctypes.CDLL:
     library.board_new.restype = ctypes.c_void_p
     library.board_cycle.restype = ctypes.c_uint64
     library.board_broken.restype = ctypes.c_uint64
+    library.board_fights.restype = ctypes.c_uint64
     library.board_events.restype = ctypes.c_void_p
     return library

@@ -1,6 +1,7 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
 // Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
-// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records. With MUTANTS the gateware
+// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records; PRECHARGE is 1 where columns
+// can be driven, REVERSAL where rows can be let go and are read. With MUTANTS the gateware
 // has an input that picks a mutant.
 #include <deque>
 
@@ -25,14 +26,25 @@ public:
 
     static uint64_t driven(uint64_t row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROWS); }
 
-    // Once a clock.
-    uint64_t levels(uint64_t driven) {
-        uint64_t reads = stuck;
+    // Once a clock; `fights` counts the clocks in which a driven column meets a row that is driven to the other level.
+    uint64_t fights = 0;
+    uint64_t levels(uint64_t driven, uint64_t columns_driven) {
+        uint64_t reads = 0;
         for (; driven; driven &= driven - 1)
             reads |= pressed[__builtin_ctzll(driven)];
+        fights += (reads & columns_driven) != 0;
+        reads |= stuck;
         if (slow)
             reads = settled(reads);
         return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
+    }
+
+    // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
+    uint64_t row_levels(uint64_t levels, uint64_t rows_driven, uint64_t columns_driven) const {
+        uint64_t touched = 0;
+        for (unsigned row = 0; row < ROWS; row++)
+            touched |= static_cast<uint64_t>((pressed[row] & columns_driven & ~stuck) != 0) << row;
+        return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROWS));
     }
 
 private:
@@ -140,6 +152,26 @@ class Board {
     auto &columns() { return model_.top.p_columns; }
 #endif
 
+#if PRECHARGE
+    uint64_t columns_driven() { return static_cast<uint64_t>(get(model_.top.p_columns__drive)); }
+#else
+    uint64_t columns_driven() { return 0; }
+#endif
+
+#if REVERSAL
+    uint64_t rows_driven() { return static_cast<uint64_t>(get(model_.top.p_rows__drive)); }
+    bool put_rows() {
+        const uint64_t levels = matrix.row_levels(rows(), rows_driven(), columns_driven());
+        const bool changed = levels != row_levels_;
+        put(model_.top.p_rows__read, row_levels_ = levels);
+        return changed;
+    }
+    uint64_t row_levels_ = 0;
+#else
+    uint64_t rows_driven() { return mask(ROWS); }
+    bool put_rows() { return false; }
+#endif
+
 public:
     Matrix matrix;
     Sender sender;
@@ -156,10 +188,11 @@ public:
             put(model_.top.p_mutant, mutant);
 #endif
             model_.settle();
-            const uint64_t driven = Matrix::driven(rows());
-            const uint64_t levels = read(matrix.levels(driven));
-            if (levels != levels_) {
-                // Columns enter flip-flops only, so the second evaluation changes nothing but what those take.
+            const uint64_t driven = Matrix::driven(rows()) & rows_driven();
+            const uint64_t levels = read(matrix.levels(driven, columns_driven()));
+            const bool rows_change = put_rows();
+            if (levels != levels_ || rows_change) {
+                // Lines enter flip-flops only, so the second evaluation changes nothing but what those take.
                 put(columns(), levels_ = levels);
                 model_.settle();
             }
@@ -209,6 +242,7 @@ private:
 EXPORT Board *board_new() { return new Board; }
 EXPORT void board_free(Board *board) { delete board; }
 EXPORT uint64_t board_cycle(Board *board) { return board->cycle; }
+EXPORT uint64_t board_fights(Board *board) { return board->matrix.fights; }
 EXPORT uint64_t board_broken(Board *board) { return board->reader.broken; }
 EXPORT void board_capture(Board *board, unsigned boundaries) { board->captured = boundaries | 1u << RECEIVED; }
 EXPORT void board_restart(Board *board, unsigned mutant) {
