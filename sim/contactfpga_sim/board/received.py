@@ -24,13 +24,14 @@ class Received(NamedTuple):
 
 
 class Receiver:
-    """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are passed over."""
+    """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are counted."""
 
     def __init__(self, skin: Skin) -> None:
         self._prefix = protocol.check_prefix(skin)
         self._widths = Widths(skin.sheet)
         self._packet = bytearray()
         self._first = 0
+        self.hellos = 0
 
     def take(self, stream: Iterable[tuple[int, int]]) -> Iterator[Received]:
         """The frames that these (time, byte) pairs complete. Raises :class:`PacketError` for a damaged packet."""
@@ -42,7 +43,9 @@ class Receiver:
                 packet = bytes(self._packet)
                 self._packet.clear()
                 plain = framing.unseal(packet, self._prefix)
-                if framing.kind_of(plain) != framing.KIND_HELLO:
+                if framing.kind_of(plain) == framing.KIND_HELLO:
+                    self.hellos += 1
+                else:
                     frame = protocol.decode_frame(plain, self._widths)
                     yield Received(frame, self._first, time, len(packet) + 1)
 
