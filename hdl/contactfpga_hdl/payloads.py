@@ -43,12 +43,14 @@ def item_layout(derived: Derived) -> data.StructLayout:
 
 
 def tag_layout(derived: Derived) -> data.StructLayout:
-    """What the scanner knows of a frame besides its cells; ``slots``, where they differ, counts its row times.
+    """What the scanner knows of a frame besides its cells; ``slots``, where they differ and the link counts them, are
+    its row times.
 
     ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
     the frame before.
     """
-    slots = {} if derived.scan.even else {"slots": derived.max_frame_slots.bit_length()}
+    uneven = not derived.scan.even and not derived.scan.waits
+    slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
     return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
 
 

@@ -92,7 +92,11 @@ class Top(wiring.Component):
         ]
         if self.derived.scan.waits:
             frames = packer.frames
-            m.d.comb += scan.packed.eq(frames.commit | frames.decide & ~frames.verdict.send)
+            m.d.comb += [
+                scan.packed.eq(frames.commit | frames.decide & ~frames.verdict.send),
+                scan.due.eq(link.due),
+                link.time.eq(scan.time),
+            ]
         if self.probes:
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)

@@ -30,7 +30,7 @@ class TimedDebounce(wiring.Component):
             {
                 "raw": In(stream.Signature(row)),
                 "alone": In(1),
-                "now": In(self.derived.slot_bits),
+                "now": In(self.derived.tick_bits),
                 "rows": Out(stream.Signature(row)),
                 "busy": Out(skin.rows),
             }
@@ -96,7 +96,7 @@ class _Walk(wiring.Component):
                 "raw": In(stream.Signature(row)),
                 "rows": Out(stream.Signature(row)),
                 "row": In(range(skin.rows)),
-                "now": In(self.derived.slot_bits),
+                "now": In(self.derived.tick_bits),
                 "busy": Out(skin.rows),
             }
         )
@@ -105,9 +105,9 @@ class _Walk(wiring.Component):
         m = Module()
         switch, phase = _TimedSwitch(m, self.now), Phase()
         if self.skin.debounce == "sym_defer_pk":
-            _defer_both(m, switch, self.derived.press_slots, self.derived.release_slots)
+            _defer_both(m, switch, self.derived.press_ticks, self.derived.release_ticks)
         else:
-            _eager_press(m, switch, self.derived.press_slots, self.derived.release_slots)
+            _eager_press(m, switch, self.derived.press_ticks, self.derived.release_ticks)
         walk_columns(m, self.skin, self.raw, self.rows, self.row, switch, phase)
         kept = Signal()  # a switch so far was not quiet
         with m.If(phase.decide):

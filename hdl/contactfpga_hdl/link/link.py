@@ -5,7 +5,7 @@ from amaranth.lib import crc, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import CHECK_BYTES, Derived
+from contactfpga.skin.derived import CHECK_BYTES, HELLO_BIT, KEEP_ALIVE_BIT, TIME_BITS, Derived
 from contactfpga.wire import protocol
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
@@ -53,6 +53,8 @@ class Link(wiring.Component):
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
     asked (in): high for a clock when a hello is wanted.
     epoch (in): high for a clock when another 2^22 us are over.
+    time (in): of a scan that waits, its clock in us.
+    due (out): a frame is to be sent though nothing has changed.
     number (in): of the last request.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     """
@@ -67,6 +69,8 @@ class Link(wiring.Component):
                 "summary": In(summary_layout(self.derived)),
                 "asked": In(1),
                 "epoch": In(1),
+                "time": In(TIME_BITS),
+                "due": Out(1),
                 "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
                 "bytes": Out(stream.Signature(8)),
             }
@@ -114,26 +118,52 @@ class Link(wiring.Component):
         with m.If(decide & verdict.send):
             m.d.sync += overwritten.eq(overwritten + drops)
         if self.skin.send == "on_change":
-            keep_alive = self.derived.keep_alive_frames
-            idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
-            waited, due = self._wait(idle, keep_alive)
-            m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | due)
-            with m.If(decide):
-                m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
+            self._keep_alive(m)
+            m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | self.due)
         return frames_sent
 
+    def _keep_alive(self, m: Module) -> None:
+        verdict, decide = self.frames.verdict, self.frames.decide
+        if self.derived.scan.waits:
+            most = self.derived.keep_alive_turns
+            turns = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
+            m.d.comb += self.due.eq(turns == most)
+            with m.If(self._turns(m, KEEP_ALIVE_BIT) & ~self.due):
+                m.d.sync += turns.eq(turns + 1)
+            with m.If(decide & verdict.send):
+                m.d.sync += turns.eq(0)
+            return
+        keep_alive = self.derived.keep_alive_frames
+        idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
+        waited, due = self._wait(idle, keep_alive)
+        m.d.comb += self.due.eq(due)
+        with m.If(decide):
+            m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
+
     def _time_hello(self, m: Module, wire: _Wire, hello_due: Value) -> None:
+        with m.If(wire.take_hello):
+            m.d.sync += hello_due.eq(0)
+        with m.If(self._hello_period(m)):
+            m.d.sync += hello_due.eq(1)
+        with m.If(self.asked):
+            m.d.sync += hello_due.eq(1)
+
+    def _hello_period(self, m: Module) -> Value:
+        """High for a clock when another half second is over."""
+        if self.derived.scan.waits:
+            return self._turns(m, HELLO_BIT)
         period = self.derived.hello_frames
         since = Signal(range(max(2, period)))
         waited, due = self._wait(since, period)
-        with m.If(wire.take_hello):
-            m.d.sync += hello_due.eq(0)
         with m.If(self.frames.decide):
-            m.d.sync += since.eq(waited)
-            with m.If(due):
-                m.d.sync += [since.eq(0), hello_due.eq(1)]
-        with m.If(self.asked):
-            m.d.sync += hello_due.eq(1)
+            m.d.sync += since.eq(Mux(due, 0, waited))
+        return self.frames.decide & due
+
+    def _turns(self, m: Module, bit: int) -> Value:
+        """High for a clock when another 2^bit us are over."""
+        before = Signal(name=f"time_{bit}")
+        m.d.sync += before.eq(self.time[bit])
+        return self.time[bit] ^ before
 
     def _wait(self, waited: Value, limit: int) -> tuple[Value, Value]:
         """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""

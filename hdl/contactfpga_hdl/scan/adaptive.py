@@ -51,7 +51,7 @@ class AdaptiveScanner(wiring.Component):
             {
                 **scan_ports(self.derived),
                 "alone": Out(1),
-                "sampled": Out(self.derived.slot_bits),
+                "sampled": Out(self.derived.tick_bits),
                 "busy": In(skin.rows),
             }
         )

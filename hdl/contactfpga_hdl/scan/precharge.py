@@ -7,8 +7,8 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.stuck import anywhere
 
-RETRY_BITS = 16
-"""A column that read stuck is driven again after 2^16 us."""
+RETRY_BIT = 16
+"""Of the clock in us: a column that read stuck is driven again when this bit turns."""
 
 
 class Precharge(wiring.Component):
@@ -17,8 +17,9 @@ class Precharge(wiring.Component):
     drive (in): in the next clock the columns are driven.
     columns (in): those that read pressed.
     stuck (in): high for a clock in which these are stuck.
-    time (in): bit ``RETRY_BITS`` of a clock in us; all columns are retried when it changes.
-    pins (out): the columns that are driven, from registers.
+    turn (in): bit ``RETRY_BIT`` of a clock in us.
+    held (out): columns that are not driven as they read stuck, from the clock after ``stuck`` on.
+    pins (out): columns that are driven, from registers.
     """
 
     def __init__(self, skin: Skin):
@@ -28,18 +29,18 @@ class Precharge(wiring.Component):
                 "drive": In(1),
                 "columns": In(skin.columns),
                 "stuck": In(1),
-                "time": In(1),
+                "turn": In(1),
+                "held": Out(skin.columns),
                 "pins": Out(skin.columns),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        held = Signal(self.skin.columns)
+        free = Signal(self.skin.columns, init=anywhere(self.skin))
         before = Signal()
-        m.d.sync += [before.eq(self.time), self.pins.eq(Mux(self.drive, anywhere(self.skin) & ~held, 0))]
-        with m.If(self.stuck):
-            m.d.sync += held.eq(held | self.columns)
-        with m.Elif(self.time != before):
-            m.d.sync += held.eq(0)
+        m.d.comb += self.held.eq(~free & anywhere(self.skin))
+        m.d.sync += [before.eq(self.turn), self.pins.eq(Mux(self.drive, free, 0))]
+        retried = Mux(self.turn ^ before, anywhere(self.skin), free)
+        m.d.sync += free.eq(retried & ~Mux(self.stuck, self.columns, 0))
         return m

@@ -7,7 +7,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
 from contactfpga_hdl.scan.ports import scan_ports
-from contactfpga_hdl.scan.precharge import RETRY_BITS, Precharge
+from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
 
@@ -127,7 +127,7 @@ class Scanner(wiring.Component):
             ),
             precharge.columns.eq(sample.read),
             precharge.stuck.eq(sample.of_released),
-            precharge.time.eq(time[RETRY_BITS]),
+            precharge.turn.eq(time[RETRY_BIT]),
             self.pins.columns_drive.eq(precharge.pins),
         ]
 

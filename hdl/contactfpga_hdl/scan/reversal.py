@@ -10,9 +10,9 @@ from contactfpga.skin.derived import HEARD_BITS, TIME_BITS, Derived
 from contactfpga_hdl.payloads import row_bits
 from contactfpga_hdl.scan.pins import DirectColumns
 from contactfpga_hdl.scan.ports import scan_ports
-from contactfpga_hdl.scan.precharge import RETRY_BITS, Precharge
+from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import watch_epoch
-from contactfpga_hdl.scan.stuck import Stuck, present
+from contactfpga_hdl.scan.stuck import count_columns, present
 
 SYNCHRONIZED = 3
 """Clocks that a touch has been there when its row reads touched in a synchronizer's output, that clock included."""
@@ -41,11 +41,10 @@ class _Turn:
         self.wanted = Signal()  # a frame is, though nothing is touched
         self.underway = Signal()  # a frame has begun and is not packed
         self.todo = Signal(rows)  # rows still to be driven in this frame
-        self.y = Signal(row_bits(derived))  # of the row that was driven last
-        self.apart = Signal()  # and the next one to be driven is not its neighbor
+        self.y = Signal(row_bits(derived))  # of the row that is driven, or was last
+        self.following = Signal(row_bits(derived))  # of the next one
         self.strobe = Signal()  # high for a clock: the columns of that row are there
         self.waits = Signal()  # a row is on its way, or on offer
-        self.time = Signal(TIME_BITS)  # in us
 
 
 class ReversalScanner(wiring.Component):
@@ -59,9 +58,11 @@ class ReversalScanner(wiring.Component):
     untouched sheet has one empty row. With ``report = "cells"`` all rows.
     tag (out): of the frame that is under way.
     packed (in): high for a clock when it is packed.
+    time (out): in us.
+    due (in): a frame is wanted, though nothing is touched.
     contact (out): rises three clocks after a touch of an untouched sheet; falls with a frame without a pressed switch.
     alone (out): the row on offer was driven.
-    sampled (out): in which row time, counted from power-up on.
+    sampled (out): at which time.
     busy (in): with debounce, a bit per row; that row is driven in the next frame, touched or not.
     """
 
@@ -72,8 +73,10 @@ class ReversalScanner(wiring.Component):
             scan_ports(self.derived)
             | {
                 "packed": In(1),
+                "time": Out(TIME_BITS),
+                "due": In(1),
                 "alone": Out(1),
-                "sampled": Out(self.derived.slot_bits),
+                "sampled": Out(self.derived.tick_bits),
                 "busy": In(skin.rows),
             }
         )
@@ -111,9 +114,8 @@ class ReversalScanner(wiring.Component):
     def _drive_sheet(self, m: Module, sheet: _Sheet, turn: _Turn) -> None:
         """All pins come from registers; at power-up none is driven."""
         m.submodules.precharge = precharge = Precharge(self.skin)
-        m.submodules.stuck = stuck = Stuck(self.skin)
-        driven = Signal()
-        m.d.sync += [driven.eq(~sheet.listens), stuck.take.eq(turn.begins)]
+        driven, begun = Signal(), Signal()
+        m.d.sync += [driven.eq(~sheet.listens), begun.eq(turn.begins)]
         m.d.comb += [
             self.pins.rows.eq(~sheet.selected if self.skin.selects_low else sheet.selected),
             self.pins.rows_drive.eq(driven.replicate(self.skin.rows)),
@@ -121,32 +123,29 @@ class ReversalScanner(wiring.Component):
             precharge.drive.eq(sheet.charges),
             precharge.columns.eq(sheet.pressed),
             precharge.stuck.eq(turn.begins),
-            precharge.time.eq(turn.time[RETRY_BITS]),
-            stuck.columns.eq(sheet.pressed),
-            stuck.released.eq(turn.begins),
-            self.tag.stuck.eq(stuck.count),
+            precharge.turn.eq(self.time[RETRY_BIT]),
         ]
+        count_columns(m, precharge.held, begun, self.tag.stuck)
 
     def _take_turns(self, m: Module, sheet: _Sheet, turn: _Turn) -> None:
         """What a state does to the sheet is seen at the pins a clock later."""
-        project, settle, charge = (
-            self.derived.project_clocks,
-            self.derived.settle_clocks,
-            self.derived.release_clocks - 2,
-        )
+        derived = self.derived
+        project, settle, charge = derived.project_clocks, derived.settle_clocks, derived.release_clocks - 2
         clock = Signal(range(max(project + SYNCHRONIZED, settle + 1, charge)))
         due = Signal(2)  # a sample on its way through the synchronizer
-        lowest = Signal(self.skin.rows)
+        touched = sheet.touched.any()
         m.d.comb += [
-            lowest.eq(turn.todo & -turn.todo),
+            turn.following.eq(_lowest(turn.todo)[: len(turn.y)]),
             turn.strobe.eq(due[-1]),
             turn.waits.eq(due.any() | self.rows.valid),
         ]
-        m.d.sync += [clock.eq(clock + 1), due.eq(due << 1)]
-        with m.If(turn.begins):
-            m.d.sync += turn.underway.eq(1)
-        with m.Elif(self.packed):
-            m.d.sync += turn.underway.eq(0)
+        m.d.sync += [
+            clock.eq(clock + 1),
+            due.eq(due << 1),
+            turn.underway.eq((turn.underway | turn.begins) & ~self.packed),
+            turn.todo.eq(Mux(turn.begins, sheet.touched, turn.todo & ~sheet.selected)),
+            sheet.selected.eq(0),
+        ]
         with m.FSM(name="turn"):
             with m.State("LISTEN"):
                 m.d.comb += [
@@ -156,12 +155,12 @@ class ReversalScanner(wiring.Component):
                 ]
                 with m.If(turn.settled):
                     m.d.sync += clock.eq(clock)
-                    with m.If(turn.rests & sheet.touched.any()):  # others may be about to be
+                    with m.If(turn.rests & touched):  # others may be about to be
                         m.d.sync += [turn.rests.eq(0), clock.eq(SYNCHRONIZED)]
                     with m.Elif(~turn.underway & (~turn.rests | turn.wanted)):
                         m.d.comb += turn.begins.eq(1)
-                        m.d.sync += [turn.todo.eq(sheet.touched), turn.rests.eq(~sheet.touched.any())]
-                        with m.If(sheet.touched.any()):
+                        m.d.sync += turn.rests.eq(~touched)
+                        with m.If(touched):
                             m.d.sync += clock.eq(charge - 1)
                             m.next = "CHARGE"
             with m.State("CHARGE"):
@@ -171,19 +170,13 @@ class ReversalScanner(wiring.Component):
                     with m.If(~turn.waits):
                         m.next = "GAP"
             with m.State("GAP"):
-                m.d.sync += [clock.eq(0), turn.y.eq(_index(lowest, len(turn.y)))]
+                m.d.sync += [clock.eq(0), turn.y.eq(turn.following)]
                 m.next = "SELECT"
             with m.State("SELECT"):
-                m.d.sync += sheet.selected.eq(lowest)
+                m.d.sync += sheet.selected.eq(Const(1, self.skin.rows) << turn.y)
                 with m.If(clock == settle):
-                    m.d.sync += [
-                        sheet.selected.eq(0),
-                        due.eq(1),
-                        clock.eq(0),
-                        turn.todo.eq(turn.todo & ~lowest),
-                        turn.apart.eq(~(turn.todo & lowest << 1).any()),
-                    ]
-                    with m.If((turn.todo & ~lowest).any()):
+                    m.d.sync += [sheet.selected.eq(0), due.eq(1), clock.eq(0)]
+                    with m.If(turn.todo.any()):
                         m.next = "CHARGE"
                     with m.Else():
                         m.next = "LISTEN"
@@ -200,21 +193,16 @@ class ReversalScanner(wiring.Component):
 
     def _offer_driven_rows(self, m: Module, sheet: _Sheet, turn: _Turn, pressed: Value) -> None:
         rows, row = self.rows, self.rows.payload
-        ends_zones = Signal()  # an empty row comes next
+        below, follows = Signal(), Signal()  # an empty row is on offer, or comes next
+        m.d.comb += [row.y.eq(turn.y + below), self.alone.eq(~below)]
         with m.If(rows.valid & rows.ready):
-            m.d.sync += [rows.valid.eq(ends_zones), ends_zones.eq(0), row.cells.eq(0), row.y.eq(row.y + 1)]
-            m.d.sync += self.alone.eq(0)
+            m.d.sync += [rows.valid.eq(follows), below.eq(follows), follows.eq(0), row.cells.eq(0)]
         with m.If(turn.strobe):
-            m.d.sync += [
-                rows.valid.eq(1),
-                row.cells.eq(pressed),
-                row.y.eq(turn.y),
-                row.last.eq(~turn.todo.any()),
-                ends_zones.eq(turn.apart & turn.todo.any()),
-                self.alone.eq(1),
-            ]
+            apart = turn.following != turn.y + 1
+            m.d.sync += [rows.valid.eq(1), row.cells.eq(pressed), row.last.eq(~turn.todo.any())]
+            m.d.sync += follows.eq(apart & turn.todo.any())
         with m.If(turn.begins & ~sheet.touched.any()):
-            m.d.sync += [rows.valid.eq(1), row.cells.eq(0), row.y.eq(0), row.last.eq(1)]
+            m.d.sync += [rows.valid.eq(1), below.eq(1), row.last.eq(1)]
 
     def _offer_all_rows(self, m: Module, sheet: _Sheet, turn: _Turn, pressed: Value) -> None:
         rows, row = self.rows, self.rows.payload
@@ -254,39 +242,32 @@ class ReversalScanner(wiring.Component):
                 m.d.sync += self.contact.eq(0)
 
     def _tag_frame(self, m: Module, turn: _Turn) -> None:
-        """A frame's tag is what there is when it begins. Row times since the one before are counted by a clock of their
-        own, as a frame takes no whole number of them."""
-        per_us, rows = self.derived.clocks_per_us, self.skin.rows
-        prescaler, in_row = Signal(range(max(2, per_us))), Signal(range(self.derived.row_clocks))
-        waiting, ticks = Signal(), Signal()
-        slots = Signal(self.tag.slots.shape(), init=1)
-        m.d.comb += ticks.eq(in_row == self.derived.row_clocks - 1)
-        m.d.sync += [
-            prescaler.eq(prescaler + 1),
-            in_row.eq(Mux(ticks, 0, in_row + 1)),
-            slots.eq(Mux(turn.begins, 0, slots) + ticks),
-        ]
+        """A frame's tag is what there is when it begins."""
+        per_us = self.derived.clocks_per_us
+        prescaler, waiting = Signal(range(max(2, per_us))), Signal()
+        m.d.sync += prescaler.eq(prescaler + 1)
         with m.If(prescaler == per_us - 1):
-            m.d.sync += [prescaler.eq(0), turn.time.eq(turn.time + 1)]
-        watch_epoch(m, turn.time, self.epoch)
+            m.d.sync += [prescaler.eq(0), self.time.eq(self.time + 1)]
+        watch_epoch(m, self.time, self.epoch)
         with m.If(turn.begins):
             m.d.sync += [
-                self.tag.time.eq(turn.time),
-                self.tag.slots.eq(slots),
+                self.tag.time.eq(self.time),
                 self.tag.requested.eq(waiting),
                 self.tag.heard.eq(self.heard),
                 waiting.eq(self.request),
             ]
         with m.Elif(self.request):
             m.d.sync += waiting.eq(1)
-        m.d.comb += turn.wanted.eq(waiting | (slots >= rows) if self.skin.send == "on_change" else 1)
-        if self.derived.debounced:
-            slot = Signal(self.derived.slot_bits)
-            m.d.sync += slot.eq(slot + ticks)
-            with m.If(turn.strobe):
-                m.d.sync += self.sampled.eq(slot)
+        m.d.comb += turn.wanted.eq(waiting | self.due if self.skin.send == "on_change" else 1)
+        with m.If(turn.strobe):
+            m.d.sync += self.sampled.eq(self.time)
 
 
-def _index(one_hot: Value, width: int) -> Value:
-    """Number of the bit that is set."""
-    return Cat(Cat(Const(0, 1), *(bit for i, bit in enumerate(one_hot) if i >> place & 1)).any() for place in range(width))
+def _lowest(bits: Value) -> Value:
+    """Number of the lowest bit that is set; by halves."""
+    if len(bits) <= 2:
+        return ~bits[0]
+    half = 1 << (len(bits) - 1).bit_length() - 1
+    low, high = bits[:half], bits[half:]
+    any_low = low.any()
+    return Cat(Mux(any_low, _lowest(low), _lowest(high))[: (half - 1).bit_length()], ~any_low)

@@ -1,6 +1,6 @@
 """Columns that read pressed while no row is driven."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -39,11 +39,17 @@ class Stuck(wiring.Component):
         seen = Signal(self.skin.columns)
         with m.If(self.released):
             m.d.sync += seen.eq(seen | self.columns & anywhere(self.skin))
-        # Counted in two clocks, as 64 columns are too many for one.
-        groups = [seen[first : first + 8] for first in range(0, self.skin.columns, 8)]
-        counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
         with m.If(self.take):
-            m.d.sync += [seen.eq(0), *(count.eq(popcount(group)) for count, group in zip(counts, groups))]
-        total = popcount(counts)
-        m.d.sync += self.count.eq(Mux(total > STUCK_MAX, STUCK_MAX, total))
+            m.d.sync += seen.eq(0)
+        count_columns(m, seen, self.take, self.count)
         return m
+
+
+def count_columns(m: Module, columns: Value, take: Value, count: Signal) -> None:
+    """``count`` is how many columns there were at ``take``, two clocks after that, as 64 are too many for one clock."""
+    groups = [columns[first : first + 8] for first in range(0, len(columns), 8)]
+    counts = [Signal(range(len(group) + 1), name=f"stuck_{index}") for index, group in enumerate(groups)]
+    with m.If(take):
+        m.d.sync += [one.eq(popcount(group)) for one, group in zip(counts, groups)]
+    total = popcount(counts)
+    m.d.sync += count.eq(Mux(total > STUCK_MAX, STUCK_MAX, total))

@@ -38,7 +38,7 @@ class Scan(Choice):
     choice_clocks: Count
     """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
     max_frame_slots: Count
-    """The most row times that a frame can take, or that lie between two frames."""
+    """The most row times that a frame can take."""
     max_frame_clocks: Count
     """The most clocks that a frame can take, from its first sample to its last."""
     min_row_clocks: Count
@@ -71,17 +71,9 @@ def _check_reversal(skin: Skin) -> None:
 
 
 def _reversal_frame_clocks(derived: Derived) -> int:
-    """All rows are touched, and each waits until the one before it is debounced, labelled and counted: that takes less
-    than 7 C + 23 clocks with a labeller that takes at most 2 C + 2."""
-    rows, columns = derived.skin.rows, derived.skin.columns
-    return rows * (derived.row_clocks + 7 * columns + 23) + derived.project_clocks
-
-
-def _reversal_max_frame_slots(derived: Derived) -> int:
-    """A frame is packed before the next one begins; untouched, one begins after as many row times as there are rows."""
-    packed = derived.max_items * (derived.item_clocks + 1) + 3 * derived.skin.columns + 72
-    longest = derived.max_frame_clocks + 2 * derived.project_clocks + packed
-    return derived.skin.rows + 2 + math.ceil(longest / derived.row_clocks)
+    """All rows are touched, and each waits until the one before it is debounced, labelled and counted."""
+    handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
+    return derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed)
 
 
 def _raster_min_row_clocks(derived: Derived) -> int:
@@ -151,7 +143,7 @@ SCANS: dict[str, Scan] = {
             waits=True,
             check=_check_reversal,
             choice_clocks=lambda derived: 0,
-            max_frame_slots=_reversal_max_frame_slots,
+            max_frame_slots=lambda derived: math.ceil(derived.max_frame_clocks / derived.row_clocks),
             max_frame_clocks=_reversal_frame_clocks,
             min_row_clocks=lambda derived: 1,
         ),

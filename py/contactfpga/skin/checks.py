@@ -230,10 +230,10 @@ def check_timing(skin: Skin) -> None:
             f"{skin.zone_capacity} zones per frame need {derived.min_row_clocks} clocks "
             f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
         )
-    if skin.send == "on_change" and derived.keep_alive_frames < 1:
+    if skin.send == "on_change" and (derived.keep_alive_turns if derived.scan.waits else derived.keep_alive_frames) < 1:
         raise SkinError(
-            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes "
-            f"{derived.max_frame_slots * derived.row_clocks / skin.clock_hz * 1e3:g} ms"
+            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes {derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
+            + (", and at least 4 ms are needed" if derived.scan.waits else "")
         )
     if not derived.debounced:
         return

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can wait for a frame and still come every second."""
 
+HELLO_BIT = 19
+"""Of the clock in us: a scan that waits makes a hello due when it turns, every 0.52 s."""
+KEEP_ALIVE_BIT = 10
+"""Likewise: a keep-alive is counted in its turns, of 1.024 ms."""
+
 EPOCH_BITS = 22
 """The board counts whole times 2^22 us beside a frame's time, less than half of what that can tell."""
 STUCK_BITS = 3
@@ -62,7 +67,7 @@ class Derived(Widths):
     @property
     def settle_clocks(self) -> int:
         """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
-        row = self.row_shift_clocks - self.release_clocks
+        row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
 
     @property
@@ -125,7 +130,7 @@ class Derived(Widths):
 
     @property
     def max_frame_slots(self) -> int:
-        """The most row times that a frame can take, or that lie between two frames."""
+        """The most row times that a frame can take."""
         return self.scan.max_frame_slots(self)
 
     @property
@@ -181,6 +186,14 @@ class Derived(Widths):
         return math.floor(clocks / self.row_clocks + 1e-9) - self.max_frame_slots + 1
 
     @property
+    def keep_alive_turns(self) -> int:
+        """Turns of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the time
+        is for that frame."""
+        turn = 2**KEEP_ALIVE_BIT * self.clocks_per_us
+        frame = 1 + math.ceil(2 * self.frame_clocks / turn)
+        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / turn + 1e-9) - frame
+
+    @property
     def hello_frames(self) -> int:
         """A hello is due after this many scans; where frames differ in length, after this many row times."""
         periods = max(1, math.floor(HELLO_PERIOD_US * self.clocks_per_us / self.frame_clocks + 1e-9))
@@ -197,21 +210,30 @@ class Derived(Widths):
         return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
     @property
-    def press_slots(self) -> int:
-        """The least row times that are more than one scan period short of ``press_scans``; see docs/timing.md."""
-        return max(0, (self.press_scans - 1) * self.skin.rows + 1)
+    def press_ticks(self) -> int:
+        """A press has lasted when this many ticks are over: row times, or us of a scan that waits; docs/timing.md."""
+        return self._debounce_ticks(self.skin.debounce_press_us, self.press_scans)
 
     @property
-    def release_slots(self) -> int:
-        """The same of ``release_scans``."""
-        return max(0, (self.release_scans - 1) * self.skin.rows + 1)
+    def release_ticks(self) -> int:
+        """The same of a release."""
+        return self._debounce_ticks(self.skin.debounce_release_us, self.release_scans)
+
+    def _debounce_ticks(self, us: float, scans: int) -> int:
+        if self.scan.waits:
+            return _whole(us) + 1 if us else 0
+        return max(0, (scans - 1) * self.skin.rows + 1)
 
     # ---- widths in bits and sizes in bytes
 
     @functools.cached_property
-    def slot_bits(self) -> int:
-        """Of a count of row times in which a debounce time, and two frames more, can be counted."""
-        return (max(self.press_slots, self.release_slots) + 2 * self.max_frame_slots).bit_length()
+    def tick_bits(self) -> int:
+        """Of a count in which a debounce time, and two frames more, can be counted."""
+        longest = max(self.press_ticks, self.release_ticks)
+        if self.scan.waits:
+            frame = self.max_frame_clocks + self.packed_clocks + self.items_clocks(self.max_items)
+            return (longest + 2 * math.ceil(frame / self.clocks_per_us)).bit_length()
+        return (longest + 2 * self.max_frame_slots).bit_length()
 
     @property
     def cell_bits(self) -> int:
@@ -266,10 +288,11 @@ class Derived(Widths):
         Two rows close at most ``open_zones`` zones, so a burst of that many may come at once; where packing
         them takes longer than two rows the rest adds up, over at most the capacity of two frames. Bitmap rows
         are packed before the next one comes. An adaptive scan omits empty rows, so that every row may close as many
-        zones, and bitmap rows of two frames may wait. A scan that waits has one frame at most under way.
+        zones, and bitmap rows of two frames may wait. A scan that waits has one frame at most under
+        way, and its first item is taken before its end mark comes; a power of two takes less logic.
         """
         if self.scan.waits:
-            return self.max_items + 2
+            return max(8, 1 << (self.max_items - 1).bit_length())
         if not self.report.zones:
             return 4 if self.scan.even else 2 * self.skin.rows + 2
         busy = self.open_zones * self.item_clocks

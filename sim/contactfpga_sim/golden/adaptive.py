@@ -44,7 +44,7 @@ class Scanner:
         self._answered = 0
         self._listed: frozenset[int] = frozenset()
         self._busy: frozenset[int] = frozenset()
-        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
+        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
         self._present: np.ndarray = ~np.all(facts.mask, axis=0)
         self._clean: np.ndarray = ~np.any(facts.mask, axis=0)
 
@@ -190,6 +190,7 @@ class Adaptive(ScanRule):
     """Rows together where nothing is touched, one by one where something is."""
 
     even = False
+    waits = False
 
     def choice(self, facts: Facts) -> int:
         return 4 + max(2, facts.halvings)

@@ -17,7 +17,7 @@ class DebounceRule:
     even: Callable[[list[bool], int, int], list[bool]]
     """What the switch counts as, from what it reads, a sample per scan; press and release in scan periods."""
     timed: Callable[[Timed, Switch, bool, int], None]
-    """The same sample by sample: changes the switch's state by what it reads in a slot."""
+    """The same sample by sample: changes the switch's state by what it reads in a tick."""
 
 
 def _rule(method: object) -> DebounceRule:
@@ -71,66 +71,62 @@ def _asym_eager_defer(reads: list[bool], press: int, release: int) -> list[bool]
 
 
 class Timed:
-    """The same where samples are not a scan apart; times are counted in slots, one per row time.
+    """The same where samples are not a scan apart; times are counted in ticks, row times or us.
 
-    ``press`` and ``release`` in scan periods of ``rows`` slots. A time is over at the first sample that comes later
-    than one scan period less after its beginning: with samples a scan period apart, when it is over.
+    A time is over at the first sample that comes ``press`` or ``release`` ticks or more after its beginning.
     """
 
-    def __init__(self, method: object, press: int, release: int, rows: int):
+    def __init__(self, method: object, press: int, release: int):
         self._rule = _rule(method).timed
-        self._press, self._release, self._rows = press, release, rows
+        self._press, self._release = press, release
         self._switches: dict[tuple[int, int], Switch] = {}
 
-    def take(self, cells: np.ndarray, slots: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
-        """(R, C) bool samples of a frame; ``slots`` tells when, for the rows that were driven alone.
+    def take(self, cells: np.ndarray, ticks: dict[int, int]) -> tuple[np.ndarray, frozenset[int]]:
+        """(R, C) bool samples of a frame; ``ticks`` tells when, for the rows that were driven alone.
 
         Returns what each switch counts as, and the rows with one that counts as pressed or has a time running.
         """
         counts = np.zeros_like(cells)
-        for row, slot in slots.items():
+        for row, tick in ticks.items():
             for column in range(cells.shape[1]):
                 reads, place = bool(cells[row, column]), (row, column)
                 if reads or place in self._switches:
                     switch = self._switches.setdefault(place, Switch())
-                    self._rule(self, switch, reads, slot)
+                    self._rule(self, switch, reads, tick)
                     counts[place] = switch.pressed
                     if not switch.pressed and switch.since is None:
                         del self._switches[place]
         return counts, frozenset(row for row, _ in self._switches)
 
-    def _over(self, since: int, slot: int, scans: int) -> bool:
-        return slot - since > (scans - 1) * self._rows
-
-    def none(self, switch: Switch, reads: bool, slot: int) -> None:
+    def none(self, switch: Switch, reads: bool, tick: int) -> None:
         switch.pressed = reads
 
-    def sym(self, switch: Switch, reads: bool, slot: int) -> None:
+    def sym(self, switch: Switch, reads: bool, tick: int) -> None:
         if reads == switch.pressed:
             switch.since = None
             return
         if switch.since is None:
-            switch.since = slot
+            switch.since = tick
         time = self._release if switch.pressed else self._press
-        if self._over(switch.since, slot, time):
+        if tick - switch.since >= time:
             switch.pressed, switch.since = reads, None
 
-    def eager(self, switch: Switch, reads: bool, slot: int) -> None:
+    def eager(self, switch: Switch, reads: bool, tick: int) -> None:
         if not switch.pressed:
-            switch.pressed, switch.ignored_since = reads, slot
+            switch.pressed, switch.ignored_since = reads, tick
             return
         if switch.ignored_since is not None:
-            if not self._over(switch.ignored_since, slot, self._press):
+            if tick - switch.ignored_since < self._press:
                 return
             switch.ignored_since = None
         if reads:
             switch.since = None
             return
         if switch.since is None:
-            switch.since = slot
+            switch.since = tick
             if self._release:
                 return
-        if self._over(switch.since, slot, self._release):
+        if tick - switch.since >= self._release:
             switch.pressed, switch.since = False, None
 
 
@@ -140,9 +136,9 @@ class Switch:
 
     pressed: bool = False
     since: int | None = None
-    """The slot since when it reads otherwise."""
+    """The tick since when it reads otherwise."""
     ignored_since: int | None = None
-    """The slot of its press, while what it reads is ignored."""
+    """The tick of its press, while what it reads is ignored."""
 
 
 NONE = DebounceRule(lambda reads, press, release: reads, Timed.none)

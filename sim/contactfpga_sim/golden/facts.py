@@ -121,7 +121,8 @@ class Facts:
     @functools.cached_property
     def settle(self) -> int:
         asked = upwards(exact(self.skin.settle_us) * self.clocks_per_us)
-        return max(asked, self.load + self.column_shift, self.row_shift - self.release)
+        chosen = 2 if self.scan.waits else 0
+        return max(asked, self.load + self.column_shift, self.row_shift - self.release, chosen)
 
     @functools.cached_property
     def row_clocks(self) -> int:
@@ -166,6 +167,26 @@ class Facts:
             return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)
         return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
+
+    @property
+    def keep_alive_turns(self) -> int:
+        """The same for a scan that waits, in turns of 1024 us."""
+        turns = exact(self.skin.keep_alive_ms) * 1000 / 1024
+        return downwards(turns) - 1 - math.ceil(2 * self.scan_clocks / Fraction(1024 * self.clocks_per_us))
+
+    @functools.cached_property
+    def press_ticks(self) -> int:
+        """When a press has lasted where samples are not a scan apart: in row times, or us with a scan that waits."""
+        return self._ticks(exact(self.skin.debounce_press_us), self.press_scans)
+
+    @functools.cached_property
+    def release_ticks(self) -> int:
+        return self._ticks(exact(self.skin.debounce_release_us), self.release_scans)
+
+    def _ticks(self, us: Fraction, scans: int) -> int:
+        if self.scan.waits:
+            return upwards(us) + 1 if us else 0
+        return max(0, (scans - 1) * self.rows + 1)
 
     @functools.cached_property
     def hello_slots(self) -> int:

@@ -53,6 +53,8 @@ class Packer:
         self._since_sent = 0
         self._since_hello = 0
         self._before: np.ndarray | None = None
+        self.due = 0
+        """For a scan that waits: the cycle from which on a frame is sent though nothing has changed."""
         self._overwritten = 0
 
     def take(self, items: Items) -> int:
@@ -69,21 +71,25 @@ class Packer:
         self._link.advance(taken)
         self._since_sent += items.scan.slots
         self._since_hello += items.scan.slots
-        if self._is_sent(items):
+        if self._is_sent(items, taken):
             self._send(packet, items, taken)
             self._since_sent = 0
+            turn = 1024 * self._facts.clocks_per_us
+            self.due = (taken // turn + self._facts.keep_alive_turns) * turn + 1
         else:
             self._free = taken + 1
         self._before = items.cells
-        if self._since_hello >= self._facts.hello_slots:
+        if not self._facts.scan.waits and self._since_hello >= self._facts.hello_slots:
             self._link.want_hello(taken + 1)
             self._since_hello = 0
         return self._free
 
-    def _is_sent(self, items: Items) -> bool:
+    def _is_sent(self, items: Items, taken: int) -> bool:
         if self._facts.skin.send == "always" or self._before is None or items.scan.requested:
             return True
         changed = not np.array_equal(items.cells, self._before)
+        if self._facts.scan.waits:
+            return changed or taken >= self.due
         return changed or self._since_sent >= self._facts.keep_alive_slots
 
     def _send(self, packet: Packet, items: Items, taken: int) -> None:

@@ -43,7 +43,9 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
     link = Link(known, State(known, frames, heard))
-    for cycle in (0, *(one.cycle + 1 for one in heard.requests if one.hello)):
+    half_second = 2**19 * known.clocks_per_us
+    timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
+    for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
     packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
     stages = Stages(known, trace, packer, frames)
@@ -74,6 +76,11 @@ class Stages:
             if self._facts.zones:
                 self._free = cycle + work.busy[row]
         self._end(one, cells, cells, range(self._facts.rows), handed, work)
+
+    @property
+    def due(self) -> int:
+        """The cycle from which on a frame is due, for a scan that waits."""
+        return self._packer.due
 
     def rows(self) -> Rows:
         """The rows of the next frame, for a scan that waits until a row is taken."""

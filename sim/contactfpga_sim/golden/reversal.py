@@ -43,7 +43,7 @@ class Scanner:
         self._changes = [piece[0] for piece in play.timeline.pieces]
         self._requests = play.requests
         self._stages = play.stages
-        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_scans, facts.release_scans, facts.rows)
+        self._debounce = debounce.Timed(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
         self._busy: frozenset[int] = frozenset()
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin
@@ -53,17 +53,17 @@ class Scanner:
     def frame(self) -> None:
         """The next frame."""
         begun = self._begin()
-        stuck = self._stuck(begun)
+        held = self._hold(begun)
         todo = sorted(self._touched(begun - 2) | self._busy)
         scan = Scan(
             cells=np.zeros((self._facts.rows, self._facts.columns), bool),
             offered=[],
-            stuck=int(np.sum(stuck & ~self._facts.mask.all(axis=0))),
+            stuck=int(np.sum(held & ~self._facts.mask.all(axis=0))),
             time_us=begun // self._facts.clocks_per_us,
             requested=any(one.cycle < begun for one in self._waiting()),
             heard=last_number(self._requests, begun) % 8,
             told=begun + 3,
-            slots=self._ticks(begun),
+            slots=0,
             alone=frozenset(todo),
         )
         self.begun.append(begun)
@@ -96,19 +96,12 @@ class Scanner:
         before = self.begun[-1]
         if self._facts.skin.send == "always":
             return before + 1
-        row = self._facts.row_clocks
-        asked = [one.cycle + 1 for one in self._waiting()]
-        return min([*asked, (before // row + self._facts.rows) * row])
+        return max(before + 1, min([*(one.cycle + 1 for one in self._waiting()), self._stages.due]))
 
     def _waiting(self) -> list[Request]:
         """Requests that no frame has answered."""
         before = self.begun[-1] if self.begun else 0
         return [one for one in self._requests if one.cycle >= before]
-
-    def _ticks(self, begun: int) -> int:
-        """Row times since the frame before began; the first one has one more."""
-        row = self._facts.row_clocks
-        return begun // row - self.begun[-1] // row if self.begun else begun // row + 1
 
     # ---- what the sheet shows while the board listens
 
@@ -140,14 +133,14 @@ class Scanner:
                 return held if (cycle - 2) // retry == begun // retry else np.zeros_like(held)
         return np.zeros(self._facts.columns, bool)
 
-    def _stuck(self, begun: int) -> np.ndarray:
-        """Columns that read pressed as a frame begins; from then on they are not driven."""
+    def _hold(self, begun: int) -> np.ndarray:
+        """Columns that read pressed as a frame begins, or did since the last retry; from then on they are not driven."""
         _, stuck = self._timeline.at(begun - 2)
         now = np.zeros(self._facts.columns, bool) if stuck is None else np.asarray(stuck, bool)
         retry = RETRY_US * self._facts.clocks_per_us
         before = [held for cycle, held in self._held[-1:] if cycle // retry == begun // retry]
         self._held.append((begun, np.logical_or.reduce([now, *before])))
-        return now
+        return self._held[-1][1]
 
     # ---- rows that are driven
 
@@ -163,7 +156,7 @@ class Scanner:
             cells[row] = self._read(slot)
             if cells[row].any():
                 self._set_contact(slot.strobe + 1, 1)
-            counts, busy = self._debounce.take(cells, {row: slot.strobe // facts.row_clocks})
+            counts, busy = self._debounce.take(cells, {row: slot.strobe // facts.clocks_per_us})
             self._busy = busy if facts.debounced else frozenset()
             counted[row] = counts[row]
             following = min((other for other in todo if other > row), default=None)
@@ -232,15 +225,13 @@ class Reversal(ScanRule):
     """Line reversal: the rows that read touched, one by one."""
 
     even = False
+    waits = True
 
     def choice(self, facts: Facts) -> int:
         return 0
 
     def frame_slots(self, facts: Facts) -> int:
-        row = facts.row_clocks + 7 * facts.columns + 23
-        packed = facts.capacity * (max(facts.item_bytes, facts.division + 1 if facts.divided else 0) + 1)
-        longest = facts.rows * row + 3 * facts.project + packed + 3 * facts.columns + 72
-        return facts.rows + 2 + -(-longest // facts.row_clocks)
+        return facts.rows + -(-facts.project // facts.row_clocks)
 
     def scan(self, play: Play) -> Scanned:
         scanner = Scanner(play)

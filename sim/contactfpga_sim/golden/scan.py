@@ -70,6 +70,10 @@ class Rows(Protocol):
 class Stages(Protocol):
     """What comes after the scan."""
 
+    @property
+    def due(self) -> int:
+        """The cycle from which on a frame is due, for a scan that waits."""
+
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
 
@@ -94,6 +98,8 @@ class ScanRule(abc.ABC):
 
     even: bool
     """Every frame takes the same time, every row once."""
+    waits: bool
+    """It waits for the stages after it, and the link counts no frames but time."""
 
     @abc.abstractmethod
     def choice(self, facts: Facts) -> int:
@@ -112,6 +118,7 @@ class Raster(ScanRule):
     """Row after row, each for the same time."""
 
     even = True
+    waits = False
 
     def choice(self, facts: Facts) -> int:
         return 0
