@@ -94,9 +94,10 @@ class Change(wiring.Component):
         word = Cat(row.cells, row.y) if skips else row.cells
         m.submodules.before = before = memory.Memory(shape=len(word), depth=self.skin.rows, init=[])
         read, write = before.read_port(), before.write_port()
-        place = Signal(range(self.skin.rows))
+        place = Signal(range(self.skin.rows + skips))  # where the next row that counts belongs
         counts = self.taken & row.cells.any() if skips else self.taken
-        following = Mux(row.last, 0, place + counts if skips else place + 1)[: len(place)]
+        after = place + counts if skips else place + 1
+        following = Mux(row.last, 0, after)[: len(place)]
         m.d.comb += [
             read.addr.eq(Mux(self.taken, following, place)),  # rows may follow each other without a pause
             write.addr.eq(place),
@@ -105,12 +106,10 @@ class Change(wiring.Component):
         ]
         differs = counts & (read.data != word)
         if skips:
-            number, number_before = Signal(range(self.skin.rows + 1)), Signal(range(self.skin.rows + 1))
-            with m.If(self.taken):
-                m.d.sync += number.eq(Mux(row.last, 0, number + counts))
+            number_before = Signal.like(place)
             with m.If(self.taken & row.last):
-                m.d.sync += number_before.eq(number + counts)
-            differs |= self.taken & row.last & (number + counts != number_before)
+                m.d.sync += number_before.eq(after)
+            differs |= self.taken & row.last & (after != number_before)
         with m.If(self.clear):
             m.d.sync += self.changed.eq(0)
         with m.If(self.taken):
