@@ -48,10 +48,10 @@ def test_force_that_closes_a_switch(offset_mm, thickness_mm, newtons, digits):
 
 
 @pytest.mark.parametrize(
-    ("newtons", "millimetres"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783), (15.789, 4.2002)]
+    ("newtons", "millimeters"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783), (15.789, 4.2002)]
 )
-def test_reach_of_a_force(newtons, millimetres):
-    assert round(point.reach_m(SWITCH, newtons, 5e-3) * 1e3, 4) == millimetres
+def test_reach_of_a_force(newtons, millimeters):
+    assert round(point.reach_m(SWITCH, newtons, 5e-3) * 1e3, 4) == millimeters
 
 
 def test_best_thickness():

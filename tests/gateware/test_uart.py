@@ -124,13 +124,13 @@ def test_noise_does_not_hide_the_byte_behind_it(bench, bit_clocks):
 @pytest.mark.parametrize("bit_clocks", BIT_CLOCKS)
 def test_a_byte_with_a_low_stop_bit_is_no_byte(bench, bit_clocks):
     levels = line([0x33], bit_clocks)
-    centre = 9 * bit_clocks + bit_clocks // 2
+    center = 9 * bit_clocks + bit_clocks // 2
     assert received(bench, bit_clocks, levels[:-bit_clocks] + [0] * (bit_clocks // 2 + 1)) == []
     spike = list(levels)
-    spike[centre] = 0  # only the middle of the stop bit counts
+    spike[center] = 0  # only the middle of the stop bit counts
     assert received(bench, bit_clocks, spike) == []
     spike = list(levels)
-    spike[centre - 1] = 0
+    spike[center - 1] = 0
     assert received(bench, bit_clocks, spike) == [moment(bit_clocks, 3)]
 
 

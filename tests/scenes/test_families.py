@@ -60,9 +60,9 @@ def test_scenes_lie_on_the_sheet_and_have_the_contacts_their_family_says(family)
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_places_fill_the_sheet(family):
-    centres = np.array([scene.truth(0.0, FINE).contacts[0][1:] for scene in placements(family, 60, 2, FINE)])
+    centers = np.array([scene.truth(0.0, FINE).contacts[0][1:] for scene in placements(family, 60, 2, FINE)])
     for axis in (0, 1):
-        low, high = centres[:, axis].min(), centres[:, axis].max()
+        low, high = centers[:, axis].min(), centers[:, axis].max()
         assert high - low > (20 if family == "sole" else 100)
 
 

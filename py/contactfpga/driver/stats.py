@@ -25,7 +25,7 @@ class Stats:
     """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Widths.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
     """Packets refused, by reason: framing, crc, length, kind, content, noise."""
-    resynchronised: int = 0
+    resynchronized: int = 0
     """Valid packets that followed damaged ones."""
     hellos: int = 0
     """Hellos received."""

@@ -98,7 +98,7 @@ def _noise(rate_hz: float) -> Outcome:
 NOISE = Study(
     name="noise",
     title="Pulses on the line",
-    knob="pulses a second",
+    knob="pulses per second",
     amount="share of frames lost",
     values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": _noise},
