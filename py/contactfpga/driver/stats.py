@@ -43,3 +43,7 @@ class Stats:
     """How often the board was restarted, as its hellos tell."""
     bytes: int = 0
     """All bytes received."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        return {**vars(self), "damaged": dict(self.damaged)}

@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from contactfpga.commands import doctor
+from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
@@ -112,7 +112,7 @@ def _clock(per_cent: float) -> Outcome:
     found = heard(recorded(), recorded().read(Derived(SKIN).bit_clocks * faster))
     if found.arrived < found.sent or found.wrong:
         return _of_line(found)
-    told = ("doctor",) if [*doctor.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
+    told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
     return Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off", per_cent / 100)
 
 
