@@ -419,7 +419,8 @@ def test_a_wide_turn_is_noted():
     [
         (lambda: Arm(0.0, 0.2), "inertia_kgm2 is 0.0; it must be a finite number above 0 kg m2"),
         (lambda: Arm(0.1, -0.2), "lever_m is -0.2; it must be a finite number above 0 m"),
-        (lambda: Arm(0.1, 0.2, math.nan), "torque_nm is nan; it must be finite"),
+        (lambda: Arm(0.1, 0.2, math.nan), "torque_nm is nan; it must be a finite number"),
+        (lambda: Arm(0.1, 0.2, "2"), "torque_nm is '2'; it must be a finite number"),
         (lambda: Arm(0.1, 0.2, 0.0, -1.0), "weight_nm is -1.0; it must be a finite number, 0 Nm or above"),
         (lambda: Arm.link(0, 0.038, 0.15, 0.2), "mass_kg is 0; it must be a finite number above 0 kg"),
         (lambda: arm(length_m=math.inf), "length_m is inf; it must be a finite number above 0 m"),

@@ -91,12 +91,6 @@ def table(results: Sequence[Result]) -> str:
     return writer.table_of(rows)
 
 
-def share_killed(results: Iterable[Result]) -> float:
-    """Share of the killed among the mutants that are not proved equivalent."""
-    fates = [result.fate for result in results]
-    return fates.count("killed") / (fates.count("killed") + fates.count("alive"))
-
-
 def listed(results: Iterable[Result]) -> str:
     """What is alive, one per line: stage, source place, change, Skin."""
     alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
