@@ -396,7 +396,7 @@ def test_no_latency_timer_is_nothing_to_say(tmp_path):
 def test_udev_rule_covers_every_supported_board():
     rules = health.udev_rule().splitlines()
     assert len(rules) == len(ports.SUPPORTED)
-    for rule, usb in zip(rules, ports.SUPPORTED):
+    for rule, usb in zip(rules, ports.SUPPORTED, strict=True):
         assert f'ATTRS{{idVendor}}=="{usb.vid:04x}", ATTRS{{idProduct}}=="{usb.pid:04x}"' in rule
         assert 'ATTR{latency_timer}="1", ATTR{event_char}="256"' in rule  # 256: enabled, byte 0
 

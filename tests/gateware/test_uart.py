@@ -66,7 +66,7 @@ def test_a_byte_starts_one_clock_after_its_transfer_and_the_line_rests_high(benc
     pin = sim.watch(dut.pin)
     sim.run(2000 * bit_clocks, until=lambda: source.done)
     expected = [1] * len(pin.values)
-    for start, byte in zip(source.transfers, data):
+    for start, byte in zip(source.transfers, data, strict=True):
         expected[start + 1 : start + 1 + 10 * bit_clocks] = line([byte], bit_clocks)
     assert pin.values == expected[: len(pin.values)]
     assert any(b - a > 10 * bit_clocks for a, b in zip(source.transfers, source.transfers[1:]))
