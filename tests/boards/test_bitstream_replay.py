@@ -100,7 +100,7 @@ def test_without_icebox_the_board_is_left_out(monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [(["--skin", "x.toml"], "--skin needs the board"), (["--frames", "0"], "--frames is 0; it must be at least 1")],
+    [(["--skin", "x.toml"], "--skin needs the board"), (["--frames", "0"], "'0' is not a whole number from 1")],
 )
 def test_arguments_that_cannot_work_are_refused(arguments, message, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["bitstream_replay", *arguments])

@@ -1,6 +1,7 @@
 """The command line: what each command prints, how it fails, and how light it starts."""
 
 import argparse
+import dataclasses
 import json
 import os
 import re
@@ -16,8 +17,8 @@ from fake_board import FakeBoard, background, wait_until
 
 import contactfpga
 from contactfpga import cli, commands
-from contactfpga.commands import doctor
-from contactfpga.driver import ports
+from contactfpga.driver import health, ports
+from contactfpga.driver.stats import Stats
 
 SKIN = contactfpga.Skin()
 CELLS = contactfpga.Skin(rows=3, columns=6, report="cells", settle_us=20.0)
@@ -293,6 +294,31 @@ def test_doctor_counts_what_is_lost(board, run):
     assert "fault 7 lost, 0 damaged" in out
 
 
+def test_doctor_prints_one_json_object(board, run):
+    with stream_of_frames(board, skip=7):
+        status, out, errors = run("doctor", "--json", "--seconds", 0.015, "--timeout", 30, board.path)
+    found = json.loads(out)
+    assert (status, found["faults"], errors) == (1, 1, "")
+    assert {"verdict": "fault", "sentence": "7 lost, 0 damaged, 0 restarts of the board"} in found["findings"]
+    assert (found["stats"]["lost"], found["stats"]["damaged"]) == (7, {})
+    assert set(found["stats"]) == {field.name for field in dataclasses.fields(Stats)}
+
+
+def test_doctor_prints_json_of_a_port_that_is_not_there(run):
+    status, out, errors = run("doctor", "--json", "/dev/no_such_port")
+    found = json.loads(out)
+    assert (status, errors, found["stats"]) == (1, "", None)
+    assert found["faults"] == len(found["findings"]) == 2
+    assert found["findings"][0]["sentence"] == "/dev/no_such_port does not exist; is the board plugged in?"
+
+
+def test_doctor_takes_a_board_without_frames_for_a_fault(board, run):
+    status, out, errors = run("doctor", "--timeout", 0.3, board.path)
+    assert (status, errors) == (1, "")
+    assert f"ok    {board.path} says hello" in out
+    assert out.splitlines()[-1].startswith("fault ")
+
+
 @pytest.mark.parametrize(
     ("board_s", "host_s", "told"),
     [
@@ -306,7 +332,7 @@ def test_doctor_counts_what_is_lost(board, run):
     ],
 )
 def test_doctor_compares_clocks(board_s, host_s, told):
-    findings = list(doctor.clock(board_s, host_s))
+    findings = list(health.clock(board_s, host_s))
     assert [verdict for verdict, _ in findings] == ([] if told is None else ["note"])
     assert told is None or told in findings[0][1]
 
@@ -346,7 +372,7 @@ def test_doctor_names_the_group_of_a_port_without_rights(monkeypatch, tmp_path):
     port = tmp_path / "port"
     port.touch()
     monkeypatch.setattr(os, "access", lambda *_: False)
-    ((verdict, sentence),) = doctor.rights(str(port))
+    ((verdict, sentence),) = health.rights(str(port))
     assert verdict == "fault"
     assert "usermod -aG" in sentence
 
@@ -355,22 +381,22 @@ def test_doctor_names_the_group_of_a_port_without_rights(monkeypatch, tmp_path):
 def test_doctor_reads_the_latency_timer(tmp_path, latency_ms, verdict):
     (tmp_path / "ttyUSB3").mkdir()
     (tmp_path / "ttyUSB3" / "latency_timer").write_text(f"{latency_ms}\n")
-    findings = list(doctor.ftdi("/dev/ttyUSB3", tmp_path))
+    findings = list(health.ftdi("/dev/ttyUSB3", tmp_path))
     assert findings[0][0] == verdict
     assert f"latency timer is {latency_ms} ms" in findings[0][1]
     assert "event character" in findings[1][1]
     if verdict == "fault":
-        assert doctor.udev_rule() in findings[0][1]
+        assert health.udev_rule() in findings[0][1]
 
 
 def test_no_latency_timer_is_nothing_to_say(tmp_path):
-    assert list(doctor.ftdi("/dev/ttyACM0", tmp_path)) == []
+    assert list(health.ftdi("/dev/ttyACM0", tmp_path)) == []
 
 
 def test_udev_rule_covers_every_supported_board():
-    rules = doctor.udev_rule().splitlines()
+    rules = health.udev_rule().splitlines()
     assert len(rules) == len(ports.SUPPORTED)
-    for rule, usb in zip(rules, ports.SUPPORTED):
+    for rule, usb in zip(rules, ports.SUPPORTED, strict=True):
         assert f'ATTRS{{idVendor}}=="{usb.vid:04x}", ATTRS{{idProduct}}=="{usb.pid:04x}"' in rule
         assert 'ATTR{latency_timer}="1", ATTR{event_char}="256"' in rule  # 256: enabled, byte 0
 

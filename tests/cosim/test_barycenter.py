@@ -52,7 +52,7 @@ def assert_replayed(frames, bits, connectivity=8):
     most = replay.zones_bound(frames, connectivity)
     skin = replay.skin_for(*frames.shape[1:], connectivity, most, barycenter_bits=bits)
     count = 0
-    for cells, result in zip(frames, replay.replay(frames, skin)):
+    for cells, result in zip(frames, replay.replay(frames, skin), strict=True):
         assert sorted(map(tuple, result.frame.barycenters.tolist())) == rounded_zones(cells, bits, connectivity)
         assert result.frame.flags == frozenset()
         count += 1

@@ -11,7 +11,7 @@ import toy_labeller
 from toy_labeller import TOY
 
 import contactfpga
-from contactfpga import Skin, SkinError, cli
+from contactfpga import Skin, SkinError, boards, cli
 from contactfpga.choices.choice import own_files
 from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.cosim import bench_amaranth, bench_native
@@ -41,6 +41,7 @@ def test_a_skin_takes_the_object_or_its_name(tmp_path):
         ("toy_labeller:NONE", "labeller is 'toy_labeller:NONE', which cannot be loaded: module 'toy_labeller' has no"),
         ("toy_labeller:RULE", "labeller is 'toy_labeller:RULE', which is a LabellerRule; it must be a Labeller"),
         (":", "labeller is ':', which cannot be loaded"),
+        (".toy:TOY", "labeller is '.toy:TOY', which cannot be loaded: TypeError: the 'package' argument is required"),
         (TOY.__class__(**{**vars(TOY), "name": "run"}), "labeller is an object called 'run', but another object is"),
         (3, "labeller is 3; it must be one of"),
     ],
@@ -48,6 +49,23 @@ def test_a_skin_takes_the_object_or_its_name(tmp_path):
 def test_what_is_no_labeller_is_refused(labeller, message):
     with pytest.raises(SkinError, match=re.escape(message)):
         Skin(labeller=labeller)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("TOY = (", "SyntaxError: '(' was never closed"),
+        ("TOY = 1 / 0", "ZeroDivisionError: division by zero"),
+        ("raise SystemExit('bye')", "SystemExit: bye"),
+    ],
+)
+def test_a_module_that_fails_is_refused_in_one_sentence(tmp_path, monkeypatch, text, reason):
+    (tmp_path / "failing.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SkinError, match=re.escape(f"labeller is 'failing:TOY', which cannot be loaded: {reason}")):
+        Skin(labeller="failing:TOY")
+    with pytest.raises(SkinError, match=re.escape(f"the board 'failing:TOY' cannot be loaded: {reason}")):
+        boards.find("failing:TOY")
 
 
 @pytest.mark.parametrize("run", [bench_amaranth.run, bench_native.run])

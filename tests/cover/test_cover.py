@@ -48,10 +48,10 @@ def test_force_that_closes_a_switch(offset_mm, thickness_mm, newtons, digits):
 
 
 @pytest.mark.parametrize(
-    ("newtons", "millimetres"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783), (15.789, 4.2002)]
+    ("newtons", "millimeters"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783), (15.789, 4.2002)]
 )
-def test_reach_of_a_force(newtons, millimetres):
-    assert round(point.reach_m(SWITCH, newtons, 5e-3) * 1e3, 4) == millimetres
+def test_reach_of_a_force(newtons, millimeters):
+    assert round(point.reach_m(SWITCH, newtons, 5e-3) * 1e3, 4) == millimeters
 
 
 def test_best_thickness():
@@ -331,7 +331,8 @@ def test_no_contact_closes_nothing():
         (lambda: Cover().stress_pa([], np.zeros(1), np.zeros(1)), r"'patch' knows no stress; take one of point, hertz"),
         (lambda: Load((Ellipse(1, 1),), -2.0), r"force_n is -2.0; it must be a finite number, 0 N or above"),
         (lambda: Ellipse(0.01, 0.0), r"half_y_m is 0.0; it must be a finite number above 0 m"),
-        (lambda: Rectangle(0.01, 0.01, x_m=math.inf), r"x_m is inf; it must be finite"),
+        (lambda: Rectangle(0.01, 0.01, x_m=math.inf), r"x_m is inf; it must be a finite number"),
+        (lambda: Rectangle(0.01, 0.01, x_m="3"), r"x_m is '3'; it must be a finite number"),
         (lambda: medium.spread("sand", 1.0), r"medium is 'sand'; it must be one of halfspace, bonded, frictionless"),
         (lambda: point.force_n(SWITCH, -0.1, 5e-3), r"offset_m is -0.1; it must be a finite number, 0 m or above"),
         (lambda: point.reach_m(SWITCH, math.inf, 5e-3), r"force is inf; it must be a finite number above 0 N"),

@@ -56,9 +56,9 @@ def test_inertia_and_stiffness():
 @pytest.mark.parametrize("row", ROWS)
 @pytest.mark.parametrize("method", ["auto", "quadrature", "ode"])
 def test_compression_time_and_force(row, method):
-    moved, stiffness, millimetres, mm_digits, milliseconds, ms_digits, newtons, n_digits = row
+    moved, stiffness, millimeters, mm_digits, milliseconds, ms_digits, newtons, n_digits = row
     found = impact.strike(moved, SPEED, stiffness, method=method)
-    assert abs(1e3 * found.compression_m - millimetres) <= 0.51 * 10**-mm_digits
+    assert abs(1e3 * found.compression_m - millimeters) <= 0.51 * 10**-mm_digits
     assert abs(1e3 * found.time_s - milliseconds) <= 0.51 * 10**-ms_digits
     if newtons:
         assert abs(found.force_n - newtons) <= 0.51 * 10**-n_digits
@@ -67,10 +67,10 @@ def test_compression_time_and_force(row, method):
     )
 
 
-@pytest.mark.parametrize(("seconds", "millimetres", "stiffness"), [(0.006, 1.63084, 731649), (0.008, 2.17445, 356415)])
-def test_stiffness_for_a_time(seconds, millimetres, stiffness):
+@pytest.mark.parametrize(("seconds", "millimeters", "stiffness"), [(0.006, 1.63084, 731649), (0.008, 2.17445, 356415)])
+def test_stiffness_for_a_time(seconds, millimeters, stiffness):
     found = impact.stiffness_for(arm(), SPEED, seconds)
-    assert (round(1e3 * found.compression_m, 5), round(found.stiffness)) == (millimetres, stiffness)
+    assert (round(1e3 * found.compression_m, 5), round(found.stiffness)) == (millimeters, stiffness)
     # with a torque that is next to none the search has to find the same
     searched = impact.stiffness_for(arm(torque_nm=1e-13), SPEED, seconds)
     assert searched.method == "quadrature"
@@ -82,10 +82,10 @@ def test_constant_of_the_closed_form():
     assert float(mpmath.mpf(2) / 5 * mpmath.beta(0.4, 0.5)) == pytest.approx(impact.COMPRESSION_TIME, rel=1e-15)
 
 
-@pytest.mark.parametrize(("radius", "millimetres"), [(0.019, 26.873381), (0.038, 15.434704)])
-def test_thickness_as_printed(radius, millimetres):
+@pytest.mark.parametrize(("radius", "millimeters"), [(0.019, 26.873381), (0.038, 15.434704)])
+def test_thickness_as_printed(radius, millimeters):
     found = elastic.thickness_m(Ball(radius, 4.6e5), 2.0, 1.5, 4791.0)
-    assert round(1e3 * found, 6) == millimetres
+    assert round(1e3 * found, 6) == millimeters
 
 
 def test_constants_of_the_thickness():
@@ -419,7 +419,8 @@ def test_a_wide_turn_is_noted():
     [
         (lambda: Arm(0.0, 0.2), "inertia_kgm2 is 0.0; it must be a finite number above 0 kg m2"),
         (lambda: Arm(0.1, -0.2), "lever_m is -0.2; it must be a finite number above 0 m"),
-        (lambda: Arm(0.1, 0.2, math.nan), "torque_nm is nan; it must be finite"),
+        (lambda: Arm(0.1, 0.2, math.nan), "torque_nm is nan; it must be a finite number"),
+        (lambda: Arm(0.1, 0.2, "2"), "torque_nm is '2'; it must be a finite number"),
         (lambda: Arm(0.1, 0.2, 0.0, -1.0), "weight_nm is -1.0; it must be a finite number, 0 Nm or above"),
         (lambda: Arm.link(0, 0.038, 0.15, 0.2), "mass_kg is 0; it must be a finite number above 0 kg"),
         (lambda: arm(length_m=math.inf), "length_m is inf; it must be a finite number above 0 m"),

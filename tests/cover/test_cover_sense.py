@@ -33,10 +33,10 @@ def test_half_space_by_name(offset_mm, thickness_mm, newtons, digits):
 
 
 @pytest.mark.parametrize(
-    ("newtons", "millimetres"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783)]
+    ("newtons", "millimeters"), [(5, 1.3857), (12, 3.6344), (15, 4.0958), (30, 5.4885), (65, 7.0783)]
 )
-def test_reach_by_name(newtons, millimetres):
-    assert round(1e3 * Sheet(SWITCH, 5e-3).reaches(newtons, HALFSPACE).value, 4) == millimetres
+def test_reach_by_name(newtons, millimeters):
+    assert round(1e3 * Sheet(SWITCH, 5e-3).reaches(newtons, HALFSPACE).value, 4) == millimeters
 
 
 def test_the_papers_definition():

@@ -1,5 +1,6 @@
 """The page on the cover: its tables are those that the code gives, and the rules that fail do."""
 
+import itertools
 import math
 import re
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga.cover import Ball, formula_study, paper
+from contactfpga.cover import Ball, formula_study, paper, study_drawing
 from contactfpga.cover.foams import FOAMS
 from contactfpga.cover.sense import LADDER
 from contactfpga_sim.pages import cover_page
@@ -113,3 +114,24 @@ def test_study_as_a_command(tmp_path, monkeypatch, capsys):
     drawn = sorted(file.name for file in tmp_path.glob("*.svg"))
     assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]
     assert capsys.readouterr().out.count("drew ") == 4
+
+
+def cross(one, other):
+    def side(line, point):
+        (ax, ay), (bx, by), (x, y) = *line, point
+        return np.sign((bx - ax) * (y - ay) - (by - ay) * (x - ax))
+
+    return all(side(line, rest[0]) * side(line, rest[1]) < 0 for line, rest in ((one, other), (other, one)))
+
+
+def test_lines_to_the_names_do_not_cross():
+    random = np.random.default_rng(5)
+    crossed = 0
+    for _ in range(30):
+        starts = [tuple(place) for place in random.random((17, 2))]
+        names = [(1.03, y) for y in np.linspace(0.99, 0.05, 17)]
+        ends = study_drawing.uncrossed(starts, names)
+        assert sorted(ends) == sorted(names)
+        crossed += any(cross(*pair) for pair in itertools.combinations(zip(starts, names), 2))
+        assert not any(cross(*pair) for pair in itertools.combinations(zip(starts, ends), 2))
+    assert crossed, "or there was nothing to sort"

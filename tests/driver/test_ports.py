@@ -1,11 +1,13 @@
 """The board is found among the ports by its USB ids and its hello."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import pytest
 from fake_board import FakeBoard
 
 import contactfpga
+from contactfpga.boards import BOARDS
 from contactfpga.driver import driver, ports
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
@@ -28,6 +30,13 @@ def test_only_serial_interfaces_of_supported_boards_are_candidates():
         SimpleNamespace(device="/dev/ttyS0"),
     ]
     assert [candidate.device for candidate in ports.choose(listed)] == ["/dev/ttyUSB1", "/dev/ttyUSB3", "COM7"]
+
+
+def test_boards_of_one_chip_are_one_candidate_wherever_they_stand_in_the_table():
+    mine = dataclasses.replace(BOARDS["icebreaker"], name="mine", title="Mine")
+    supported = ports.supported([*BOARDS.values(), mine])
+    assert [usb.boards for usb in supported] == ["iCEBreaker, iCEStick, Mine", "ULX3S 12F, ULX3S 85F"]
+    assert ports.supported(BOARDS.values()) == ports.SUPPORTED
 
 
 def plug_in(monkeypatch, *devices):

@@ -54,7 +54,7 @@ def schedule(rng, frames, records, sheet):
     """Rows as close as the shortest row time has them; after each at most as many records as it has columns."""
     plan, cycle = Schedule({}, []), 1
     row_clocks = max(10, sheet[1] + 6)
-    for frame, zones in zip(frames, records):
+    for frame, zones in zip(frames, records, strict=True):
         after = []
         for y, word in enumerate(frame):
             plan.rows[cycle] = word, y == len(frame) - 1
@@ -120,7 +120,7 @@ def test_records_pass_without_delay_and_add_up_with_the_cells(bench, rng, sheet)
     assert [cycle for cycle, _ in items.transfers] == source.transfers
     wanted = [1 << end if zone is None else record_word(zone, *sheet) for _, zone in plan.records]
     assert [item if item >> end == 0 else 1 << end for _, item in items.transfers] == wanted
-    for frame, group, summary in zip(frames, zones, summaries):
+    for frame, group, summary in zip(frames, zones, summaries, strict=True):
         cells = sum(word.bit_count() for word in frame)
         wanted = {"cells": cells, "zones": len(group), "overflow": 0, "mismatch": 0, "changed": 1}
         assert summary == wanted
@@ -151,7 +151,7 @@ def test_one_wrong_record_is_flagged_in_its_frame_and_in_no_other(bench, rng):
     records = [group for _, wrong in faults for group in (wrong, right)]
     _, _, summaries = run(bench, dut, schedule(rng, [frame] * len(records), records, sheet), sheet, rng)
     flags = [summary["mismatch"] for summary in summaries]
-    for (name, _), flagged in zip(faults, flags[::2]):
+    for (name, _), flagged in zip(faults, flags[::2], strict=True):
         assert flagged, name
     assert not any(flags[1::2])
 
@@ -181,7 +181,7 @@ def test_zones_beyond_the_capacity_are_counted_and_flagged_but_not_carried(bench
             frame += 1
         else:
             carried[frame].append(item)
-    for group, summary, got in zip(zones, summaries, carried):
+    for group, summary, got in zip(zones, summaries, carried, strict=True):
         assert got == [record_word(zone, *sheet) for zone in group[:capacity]]
         count, over = len(group), int(len(group) > capacity)
         assert (summary["zones"], summary["overflow"], summary["mismatch"]) == (count, over, 0)

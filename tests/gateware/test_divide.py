@@ -162,7 +162,7 @@ def test_nothing_is_lost_or_changed_by_gaps_and_stalls(bench, rng, stage, gap, s
 def cycles_by_the_rule(oracle, words, put, size):
     """When items are taken by a packer that takes ``size`` clocks for each, and from when on each was offered."""
     taken, offered, free, gone, packer = [], [], 0, 0, 0
-    for word, at in zip(words, put):
+    for word, at in zip(words, put, strict=True):
         if word == oracle.end:
             cycle = max(at + 2, free, packer)
             offered.append(max(at + 2, free, gone + 1))

@@ -120,7 +120,7 @@ def frame_rule(cells, columns, connectivity, labeller, start):
         clusters = sorted(pieces(pair, connectivity), key=lambda piece: min(x for _, x in piece))
         done, busy, end = RULES[labeller](clusters, columns, connectivity)
         last_clock = {}  # of the rightmost cluster that holds a cell of the zone
-        for cluster, clock in zip(clusters, done):
+        for cluster, clock in zip(clusters, done, strict=True):
             for index, zone in enumerate(zones):
                 if any((y - 1 + below, x) in zone for below, x in cluster):
                     last_clock[index] = clock

@@ -264,6 +264,7 @@ def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(be
     packets, ends = packets_of(sink)
     wanted, overwritten = replay(skin, frames, ends, cycles, asked, KEEP_ALIVE.get(name))
     sent = 0
+    assert 0 <= len(wanted) - len(packets) <= 1  # the last one may still be on its way
     for (begun, packet), (taken, expected) in zip(packets, wanted):
         assert begun - 2 == taken
         assert packet == (expected or hello_sent(skin, sink, begun, sent, number, stuck.__getitem__))

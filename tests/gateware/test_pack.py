@@ -212,7 +212,7 @@ def assert_clocks(skin, frames, verdicts, got, source):
     """
     size = sizes(skin)[0]
     taken, waits, ready = [], [], 0
-    for frame, verdict in zip(frames, verdicts):
+    for frame, verdict in zip(frames, verdicts, strict=True):
         plain = frame.plain(skin, verdict)
         extra = stuffed(plain)[1]
         for index in range(len(frame.items)):

@@ -66,7 +66,7 @@ def test_a_byte_starts_one_clock_after_its_transfer_and_the_line_rests_high(benc
     pin = sim.watch(dut.pin)
     sim.run(2000 * bit_clocks, until=lambda: source.done)
     expected = [1] * len(pin.values)
-    for start, byte in zip(source.transfers, data):
+    for start, byte in zip(source.transfers, data, strict=True):
         expected[start + 1 : start + 1 + 10 * bit_clocks] = line([byte], bit_clocks)
     assert pin.values == expected[: len(pin.values)]
     assert any(b - a > 10 * bit_clocks for a, b in zip(source.transfers, source.transfers[1:]))
@@ -124,13 +124,13 @@ def test_noise_does_not_hide_the_byte_behind_it(bench, bit_clocks):
 @pytest.mark.parametrize("bit_clocks", BIT_CLOCKS)
 def test_a_byte_with_a_low_stop_bit_is_no_byte(bench, bit_clocks):
     levels = line([0x33], bit_clocks)
-    centre = 9 * bit_clocks + bit_clocks // 2
+    center = 9 * bit_clocks + bit_clocks // 2
     assert received(bench, bit_clocks, levels[:-bit_clocks] + [0] * (bit_clocks // 2 + 1)) == []
     spike = list(levels)
-    spike[centre] = 0  # only the middle of the stop bit counts
+    spike[center] = 0  # only the middle of the stop bit counts
     assert received(bench, bit_clocks, spike) == []
     spike = list(levels)
-    spike[centre - 1] = 0
+    spike[center - 1] = 0
     assert received(bench, bit_clocks, spike) == [moment(bit_clocks, 3)]
 
 

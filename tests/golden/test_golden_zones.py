@@ -81,10 +81,10 @@ def scipy_zones(frames: np.ndarray, connectivity: int) -> list[tuple[int, int, i
 
 
 def cv2_zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
-    _, _, stats, centres = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=connectivity)
+    _, _, stats, centers = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=connectivity)
     found = [
-        (int(area), *np.rint(centre * area).astype(int).tolist())
-        for area, centre in zip(stats[1:, cv2.CC_STAT_AREA], centres[1:], strict=True)
+        (int(area), *np.rint(center * area).astype(int).tolist())
+        for area, center in zip(stats[1:, cv2.CC_STAT_AREA], centers[1:], strict=True)
     ]
     return sorted(found)
 

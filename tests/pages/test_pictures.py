@@ -20,6 +20,7 @@ every_picture = pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.
 def test_words_are_large_enough(path):
     picture = svg_texts.read(path)
     page = picture_style.WIDTH_PX / picture.width
+    assert picture.words
     assert not {one.text: one.pixels * page for one in picture.words if one.pixels * page < LEAST_PX - 0.01}
 
 

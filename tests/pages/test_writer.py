@@ -1,5 +1,11 @@
 """Tables in pages: only what is between their markers is written."""
 
+import subprocess
+import sys
+
+import pytest
+
+from contactfpga.console.outputs import OutputError
 from contactfpga_sim.pages import writer
 
 PAGE = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
@@ -26,3 +32,31 @@ def test_a_table_is_there_as_soon_as_it_is_measured(tmp_path):
 
 def test_a_table_from_cells():
     assert writer.table_of([("a", "b"), ("1", ""), ("2", "x y")]) == "| a | b |\n|---|---|\n| 1 |  |\n| 2 | x y |"
+
+
+def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
+    with pytest.raises(OutputError, match=r"^--page is '.*none.md'; there is no such page$"):
+        writer.page(tmp_path / "none.md", "--page")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "page.md").write_text(PAGE)
+    assert writer.page(tmp_path / "page.md").read_text() == PAGE
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "message"),
+    [
+        ("pages.figures", ["none.md"], "contactfpga: page is 'none.md'; there is no such page"),
+        ("pages.cover_page", ["none.md", "."], "contactfpga: page is 'none.md'; there is no such page"),
+        ("netlist.replay", ["icebreaker", "--skin", "none.toml"], "contactfpga: none.toml: No such file or directory"),
+        ("netlist.replay", ["icebreaker", "--skin", "bad.toml"], "contactfpga: rows is 0; it must lie between 1"),
+        ("mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
+        ("board.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
+    ],
+)
+def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):
+    (tmp_path / "bad.toml").write_text("rows = 0")
+    command = [sys.executable, "-m", f"contactfpga_sim.{module}", *arguments]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.returncode in (1, 2)

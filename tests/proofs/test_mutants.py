@@ -118,5 +118,4 @@ def test_a_table_counts_the_fates_by_stage():
     assert "| scan | 2 | 1 | 1 | 0 | 100.0 % |" in lines
     assert "| link | 2 | 1 | 0 | 1 | 50.0 % |" in lines
     assert lines[-1] == "| all | 4 | 2 | 1 | 1 | 66.7 % |"
-    assert campaign.share_killed(results) == pytest.approx(2 / 3)
     assert campaign.listed(results) == "link x.py:1: -mode inv 3  (8x8)"

@@ -60,9 +60,9 @@ def test_scenes_lie_on_the_sheet_and_have_the_contacts_their_family_says(family)
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_places_fill_the_sheet(family):
-    centres = np.array([scene.truth(0.0, FINE).contacts[0][1:] for scene in placements(family, 60, 2, FINE)])
+    centers = np.array([scene.truth(0.0, FINE).contacts[0][1:] for scene in placements(family, 60, 2, FINE)])
     for axis in (0, 1):
-        low, high = centres[:, axis].min(), centres[:, axis].max()
+        low, high = centers[:, axis].min(), centers[:, axis].max()
         assert high - low > (20 if family == "sole" else 100)
 
 
@@ -77,8 +77,8 @@ def test_a_sheet_that_is_too_small_gets_what_fits(family):
 def test_another_pitch_over_the_same_extents_gets_the_same_scenes():
     coarse = Skin(rows=16, columns=16, pitch_x_mm=20.0, pitch_y_mm=20.0, settle_us=20.0)
     for family in FAMILIES:
-        for here, there in zip(placements(family, 5, 4, FINE), placements(family, 5, 4, coarse)):
-            for one, other in zip(here.truth(0.2).contacts, there.truth(0.2).contacts):
+        for here, there in zip(placements(family, 5, 4, FINE), placements(family, 5, 4, coarse), strict=True):
+            for one, other in zip(here.truth(0.2).contacts, there.truth(0.2).contacts, strict=True):
                 assert other.area_mm2 == pytest.approx(one.area_mm2)
                 # Cell (0, 0) lies at 0 mm, half a pitch from the corner.
                 assert (other.x_mm + 10, other.y_mm + 10) == pytest.approx((one.x_mm + 2.5, one.y_mm + 2.5))

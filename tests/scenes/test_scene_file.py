@@ -173,7 +173,7 @@ def test_what_a_file_says_is_what_is_read(load):
         ("contact = 3", "contact is 3; a scene file has one part"),
         ("contact = [3]", "contact 1 is 3; it must be a part, [[contact]]"),
         ("x = = 1", "not a TOML file"),
-        ("colour = 1\n" + DISC, "a scene file has the key 'colour'; known are contact, width_mm"),
+        ("color = 1\n" + DISC, "a scene file has the key 'color'; known are contact, width_mm"),
         ("width_mm = 0\n" + DISC, "width_mm is 0; it must lie between 0.1 and 100000"),
         ("gap_mm = -1\n" + DISC, "gap_mm is -1; it must lie between 0 and 100000"),
         ("seconds = nan\n" + DISC, "seconds is nan; it must be a finite number"),

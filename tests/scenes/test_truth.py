@@ -16,7 +16,7 @@ CM = 0.01
 def assert_contacts(truth, *expected):
     """Contacts as (area in mm2, x and y in mm), in their order, to 1e-7 of the area and of 1 mm."""
     assert truth.count == len(expected)
-    for contact, (area, x, y) in zip(truth.contacts, expected):
+    for contact, (area, x, y) in zip(truth.contacts, expected, strict=True):
         assert contact.area_mm2 == pytest.approx(area, rel=1e-7)
         assert (contact.x_mm, contact.y_mm) == pytest.approx((x, y), abs=1e-7)
 
@@ -137,7 +137,7 @@ def test_random_scenes_against_a_raster(record_property):
             for row, column in (np.nonzero(labels == label) for label in range(1, count + 1))
         )
         expected = sorted((one.x_mm, one.y_mm, one.area_mm2) for one in truth.contacts)
-        for got, want in zip(found, expected):
+        for got, want in zip(found, expected, strict=True):
             assert got[:2] == pytest.approx(want[:2], abs=0.05)
             assert got[2] == pytest.approx(want[2], rel=5e-3, abs=0.05)
     assert compared > 45

@@ -56,6 +56,11 @@ REFUSED = [
         "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet, which is not "
         "supported; use at most 15 columns",
     ),
+    (
+        {"surface": "cylinder", "radius_mm": 1.0, "columns": 1},
+        "1 columns of 10.0 mm take 10 mm of a circumference of 6.28319 mm: the sheet's ends meet, which is not "
+        "supported; use a larger radius_mm or a smaller pitch_x_mm",
+    ),
     # its mask
     ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
     ({"mask": "ab"}, "mask is 'ab'; it must be a list of [row, column]"),

@@ -107,7 +107,7 @@ def test_the_consistent_set_is_reproduced(ours, oracle, name, stated, tolerance)
     integration takes the same ones: with them it agrees far closer."""
     found = getattr(ours.outcome, name)
     assert found == pytest.approx(stated, rel=tolerance)
-    step = PAPER.run.step_s if name.endswith("_s") else 0.0  # switches are looked at once a step
+    step = PAPER.run.step_s if name.endswith("_s") else 0.0  # switches are looked at once per step
     assert found == pytest.approx(getattr(oracle, name), rel=1e-3, abs=step)
 
 

@@ -76,7 +76,7 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
 
 def test_charts_of_an_arm_at_rest_are_refused(capsys):
     assert cli.main(["arm", "--case", "push", "--charts"]) == 1
-    assert "behaviour is 'comply' at 0 m/s" in capsys.readouterr().err
+    assert "behavior is 'comply' at 0 m/s" in capsys.readouterr().err
 
 
 def test_the_arm_needs_no_more_than_the_simulation():

@@ -104,7 +104,7 @@ def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsy
         ('like = "paper"\n[foam]\nthick = 1\n', "unknown key 'thick' in [foam]"),
         ('like = "paper"\n[foam]\nthickness_m = -1.0\n', "thickness_m is -1.0"),
         ('like = "paper"\n[foam]\npoisson = 0.7\n', "poisson is 0.7"),
-        ('like = "paper"\n[control]\nbehaviour = "flee"\n', "behaviour is 'flee'; it must be one of reverse, comply"),
+        ('like = "paper"\n[control]\nbehavior = "flee"\n', "behavior is 'flee'; it must be one of reverse, comply"),
         (
             'like = "paper"\n[control]\nperiod_s = 0.255e-3\n',
             "period_s is 0.000255; it must be a whole number of times",
@@ -156,7 +156,7 @@ def test_a_slow_push_is_held_by_the_virtual_spring_alone():
 
 
 def test_a_push_of_an_arm_that_does_not_comply_is_refused():
-    with pytest.raises(CaseError, match="behaviour is 'reverse'"):
+    with pytest.raises(CaseError, match="behavior is 'reverse'"):
         comply.pushed(PAPER, 0.1)
 
 

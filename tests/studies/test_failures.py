@@ -155,7 +155,7 @@ def test_fingers_that_close_in_are_counted_as_image_tools_do(turned, connectivit
     structure = np.ones((3, 3)) if connectivity == 8 else None
     found = turned["closing"][f"{connectivity}-connectivity, {pitch} mm"]
     x = y = np.arange(16) * float(pitch)
-    for gap, outcome in zip(found.values, found.outcomes):
+    for gap, outcome in zip(found.values, found.outcomes, strict=True):
         right = 0
         for scene in touch._pairs(gap, float(pitch)):
             middles = [(contact.x_mm, contact.y_mm) for contact in scene.contacts]
@@ -230,7 +230,7 @@ def test_zones_of_a_sheet_without_diodes_pass_unflagged_as_rarely_as_the_page_sa
 def test_moving_fingers_are_off_by_what_they_move_until_their_row_is_read(turned):
     """A zone is off by at most one scan's motion and what a disc of this size is off at rest."""
     for values in turned["moving"].values():
-        for speed, outcome in zip(values.values, values.outcomes):
+        for speed, outcome in zip(values.values, values.outcomes, strict=True):
             assert outcome.amount <= speed + 0.4 or outcome.amount == 5.0
 
 

@@ -159,11 +159,11 @@ def test_the_answer_is_the_cheapest_of_all_that_pass(file, shortcuts):
         wrong, apart = [], []
         for cells, there in given.looks(skin, Skin(), range(100), 100):
             picture = cells.astype(np.uint8)
-            count, _, _, centres = cv2.connectedComponentsWithStats(picture, connectivity=skin.connectivity)
+            count, _, _, centers = cv2.connectedComponentsWithStats(picture, connectivity=skin.connectivity)
             wrong.append(count - 1 != len(there))
             pairs = []
             for order in itertools.permutations(range(1, count), min(count - 1, len(there))):
-                found_mm = centres[list(order)] * (skin.pitch_x_mm, skin.pitch_y_mm)
+                found_mm = centers[list(order)] * (skin.pitch_x_mm, skin.pitch_y_mm)
                 for chosen_there in itertools.combinations(there, len(order)):
                     there_mm = np.array([(blob.x_mm, blob.y_mm) for blob in chosen_there])
                     pairs.append(np.hypot(*(found_mm - there_mm).T).mean())
@@ -330,7 +330,7 @@ def test_no_more_is_synthesized_than_the_order_of_the_cheapest_needs(file, short
     assert sorted(rest)[:1] == [found.answer.luts]
 
 
-def test_quick_synthesises_no_refused_ones(file, shortcuts):
+def test_quick_synthesizes_no_refused_ones(file, shortcuts):
     path = file(HANDS)
     slow = chosen(path)
     every = len(shortcuts.sized)

@@ -46,7 +46,9 @@ class Total(wiring.Component):
         else:
             m.d.comb += [parity[bit].eq(self.number[: bit + 1].xor()) for bit in range(8)]
         m.d.comb += self.now.eq(parity[7])
-        m.d.sync += self.total.eq(self.total + self.number + Cat(self.now))
+        top = Signal(16)  # called as the design itself is; counts down, so that it is no other name of the output
+        m.d.sync += top.eq(top - self.number - Cat(self.now))
+        m.d.comb += self.total.eq(-top)
         return m
 
 

@@ -28,7 +28,7 @@ def scipy_zones(cells, connectivity):
 def assert_zones_are_scipys(frames, connectivity):
     skin = replay.skin_for(*frames.shape[1:], connectivity, replay.zones_bound(frames, connectivity))
     count = 0
-    for cells, result in zip(frames, replay.replay(frames, skin)):
+    for cells, result in zip(frames, replay.replay(frames, skin), strict=True):
         assert sorted(map(tuple, result.frame.moments.tolist())) == scipy_zones(cells, connectivity)
         assert result.frame.flags == frozenset()
         count += 1

@@ -52,7 +52,7 @@ class Line:
         assert numbers == sorted(set(numbers))
         lost = sorted(set(range(len(self.sent))) - set(numbers))
         assert stats.lost == len(lost)
-        assert stats.resynchronised == bool(stats.damaged)
+        assert stats.resynchronized == bool(stats.damaged)
         return lost
 
 

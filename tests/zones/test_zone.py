@@ -91,7 +91,7 @@ def test_the_array_holds_the_zones_and_cannot_be_changed():
     array = zones.array
     assert array.dtype == DTYPE
     assert len(array) == len(zones) == 3
-    for row, zone in zip(array, zones):
+    for row, zone in zip(array, zones, strict=True):
         for name in DTYPE.names:
             assert np.array_equal(row[name], getattr(zone, name)), name
     with pytest.raises(ValueError, match="read-only"):

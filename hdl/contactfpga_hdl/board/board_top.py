@@ -1,9 +1,10 @@
 """A Skin's gateware on the pins of a board."""
 
 import importlib
+from collections.abc import Mapping
 
 from amaranth.build import Attrs, Pins, Platform, Resource
-from amaranth.hdl import ClockDomain, Elaboratable, Module, Value
+from amaranth.hdl import ClockDomain, Const, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
 
@@ -24,7 +25,8 @@ class BoardTop(Elaboratable):
     """Requests the pins and wires the Skin's :class:`Top` to them.
 
     The sheet must have passed :meth:`BoardSpec.check`. Rows are plain outputs: the diode at each switch keeps two of
-    them apart. Without diodes a row is low or floats, since two of them may meet.
+    them apart. Without diodes a row is low or floats, since two of them may meet. Lines that the Skin drives and reads
+    have a buffer of their own each.
     """
 
     def __init__(self, board: BoardSpec, skin: Skin):
@@ -56,28 +58,50 @@ class BoardTop(Elaboratable):
         return m
 
     def _connect_sheet(self, m: Module, platform: Platform, core: Top) -> None:
-        for name, member in self._sheet.items():
+        for name in self.board.pins(self.skin):
+            port, direction = platform.request(name, 0, dir="-"), self._direction(name)
             if name == "rows" and self.skin.ghosts:
-                self._connect_floating(m, platform.request(name, 0, dir="-"), core.rows)
-                continue
-            direction = "o" if member.flow == Out else "i"
-            m.submodules[name] = buffer = io.Buffer(direction, platform.request(name, 0, dir="-"))
-            m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
+                self._connect_floating(m, port, core.rows)
+            elif direction == "io":
+                self._connect_both_ways(m, name, port, core)
+            else:
+                m.submodules[name] = buffer = io.Buffer(direction, port)
+                m.d.comb += buffer.o.eq(getattr(core, name)) if direction == "o" else getattr(core, name).eq(buffer.i)
+
+    def _direction(self, name: str) -> str:
+        if f"{name}_drive" in self._sheet:
+            return "io"
+        return "o" if self._sheet[name].flow == Out else "i"
+
+    def _connect_both_ways(self, m: Module, name: str, port: io.SingleEndedPort, core: Top) -> None:
+        """A buffer per line, each with its own output enable. Columns are driven to the released level only."""
+        released = Const(-int(self.skin.selects_low), len(port))
+        levels, read = (core.rows, core.rows_read) if name == "rows" else (released, core.columns)
+        for line, (level, drive) in enumerate(zip(levels, getattr(core, f"{name}_drive"), strict=True)):
+            m.submodules[f"{name}_{line}"] = buffer = io.Buffer("io", port[line])
+            m.d.comb += [buffer.o.eq(level), buffer.oe.eq(drive), read[line].eq(buffer.i)]
 
     def _connect_floating(self, m: Module, port: io.SingleEndedPort, rows: Value) -> None:
         for row in range(self.skin.rows):
             m.submodules[f"row_{row}"] = buffer = io.Buffer("o", port[row])
             m.d.comb += [buffer.o.eq(0), buffer.oe.eq(~rows[row])]
 
+    def _pulls(self, name: str) -> Mapping[str, object]:
+        """Only what hangs on switches needs a level of its own: columns that of released, rows that are read the other
+        one. A shift register drives its data pin."""
+        up = self.skin.selects_low == (name == "columns")
+        needs = name == "columns" or f"{name}_read" in self._sheet
+        return self.board.pulls["col2row" if up else "row2col"] if needs else {}
+
     def _resources(self) -> list[Resource]:
         board, skin = self.board, self.skin
         attrs = Attrs(**board.standard)
         resources = [Resource("contact", 0, Pins(board.contact, dir="o"), attrs)]
         for name, pins in board.pins(skin).items():
-            direction = "o" if self._sheet[name].flow == Out else "i"
-            # Only what hangs on switches needs a level of its own; a shift register drives its data pin.
-            pulls = board.pulls["col2row" if skin.selects_low else "row2col"] if name == "columns" else {}
-            resources.append(Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **pulls)))
+            direction = self._direction(name)
+            resources.append(
+                Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **self._pulls(name)))
+            )
         if board.held_high:
             resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))
         return resources

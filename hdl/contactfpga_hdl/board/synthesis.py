@@ -6,7 +6,7 @@ NO_COLLISIONS = "setparam -set COLLISION_X_MASK 1'1 t:$memrd_v2"
 """No word is read in the clock in which it is written, or it is not used: what such a read gives may be anything.
 
 Amaranth promises the word before the write, and an FPGA's memory does not: keeping that promise costs a comparison
-of the addresses and two registers a bit.
+of the addresses and two registers per bit.
 """
 
 _BLOCK_RAMS = 'setattr -set ram_style "block" m:*'

@@ -3,7 +3,7 @@
 from contactfpga.boards.ice40 import ICEBREAKER, ICESTICK
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.boards.ulx3s import ULX3S_12F, ULX3S_85F
-from contactfpga.choices.choice import load
+from contactfpga.choices.choice import load_own
 from contactfpga.skin import SkinError
 
 __all__ = ["BOARDS", "find"]
@@ -19,10 +19,7 @@ def find(name: str) -> BoardSpec:
     if ":" not in name:
         known = ", ".join(BOARDS)
         raise SkinError(f"no board is called {name!r}; known are {known}, and 'module:attribute' of your own")
-    try:
-        board = load(name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise SkinError(f"the board {name!r} cannot be loaded: {error}") from error
+    board = load_own(name, f"the board {name!r}")
     if not isinstance(board, BoardSpec):
         raise SkinError(f"{name!r} is a {type(board).__name__}; it must be a BoardSpec")
     return board

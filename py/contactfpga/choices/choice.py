@@ -55,10 +55,7 @@ def find(kind: type[AnyChoice], built_in: Mapping[str, AnyChoice], value: object
             f"{field} is {shown(value)}; it must be one of {', '.join(map(repr, built_in))}, "
             "or 'module:attribute' of your own"
         )
-    try:
-        found = load(value)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise SkinError(f"{field} is {shown(value)}, which cannot be loaded: {error}") from error
+    found = load_own(value, f"{field} is {shown(value)}, which")
     if not isinstance(found, kind):
         raise SkinError(f"{field} is {shown(value)}, which is a {type(found).__name__}; it must be a {kind.__name__}")
     if found.name != value:
@@ -70,6 +67,16 @@ def load(place: str) -> Any:
     """What is at ``module:attribute``."""
     module, _, attribute = place.partition(":")
     return getattr(importlib.import_module(module), attribute)
+
+
+def load_own(place: str, what: str) -> Any:
+    """What is at a place that a user names. Raises SkinError, which begins with ``what``, however the module fails."""
+    try:
+        return load(place)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SkinError(f"{what} cannot be loaded: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise SkinError(f"{what} cannot be loaded: {type(error).__name__}: {error}") from error
 
 
 def own_files(skin: Skin) -> set[Path]:

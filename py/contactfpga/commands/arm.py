@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     case = Case.load(args.case)
     if args.charts:
         return _charts(args, case)
-    return _pushes(args, case) if case.control.behaviour == "comply" else _contact(args, case)
+    return _pushes(args, case) if case.control.behavior == "comply" else _contact(args, case)
 
 
 def _contact(args: argparse.Namespace, case: Case) -> int:

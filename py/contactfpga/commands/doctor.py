@@ -3,33 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import os
-import sys
-from collections.abc import Iterator
-from pathlib import Path
+import json
+from collections.abc import Iterable
 
 from contactfpga.console import flags, numbers, terminal
-from contactfpga.driver import driver, ports
-from contactfpga.driver.driver import Board
-from contactfpga.errors import ContactFPGAError, ReplayEnded
-from contactfpga.wire.mismatch import report_of
+from contactfpga.driver import driver, health, ports
+from contactfpga.driver.health import Finding
+from contactfpga.driver.stats import Stats
+from contactfpga.errors import ContactFPGAError
 
 HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None
-
-USB_SERIAL = Path("/sys/bus/usb-serial/devices")
-RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
-
-LATENCY_MS = 1
-EVENT_CHAR = 0x100
-"""Byte 0, the delimiter, and bit 8, which enables it: the chip hands over what it has when that byte comes."""
-
-CLOCK_ERROR = 0.01
-JITTER_S = 0.03
-"""By how much the time of a frame's arrival may vary, with an FTDI chip's default latency."""
-
-Finding = tuple[str, str]
-"""("ok", "note" or "fault", sentence)."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -37,143 +21,58 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.connection(parser)
     long = "Seconds of device time over which frames are counted (default: 1)."
     parser.add_argument("--seconds", type=numbers.SECONDS, default=1.0, help=long)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
-    faults = 0
-    for verdict, sentence in _findings(args):
-        terminal.say(f"{verdict:5} {sentence}", hang=6)
-        faults += verdict == "fault"
-    return min(faults, 1)
+    report = _Report(silent=args.json)
+    _look(args, report)
+    if args.json:
+        print(json.dumps(report.to_dict()), flush=True)
+    return min(report.faults, 1)
 
 
-def _findings(args: argparse.Namespace) -> Iterator[Finding]:
+class _Report:
+    """What was found so far, printed as it comes unless ``silent``."""
+
+    def __init__(self, silent: bool):
+        self.stats: Stats | None = None
+        self._silent = silent
+        self._findings: list[Finding] = []
+
+    @property
+    def faults(self) -> int:
+        return sum(finding.verdict == "fault" for finding in self._findings)
+
+    def add(self, findings: Iterable[Finding]) -> None:
+        for finding in findings:
+            self._findings.append(finding)
+            if not self._silent:
+                terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
+
+    def to_dict(self) -> dict[str, object]:
+        return {
+            "faults": self.faults,
+            "findings": [finding._asdict() for finding in self._findings],
+            "stats": self.stats and self.stats.to_dict(),
+        }
+
+
+def _look(args: argparse.Namespace, report: _Report) -> None:
     port = args.port
     if port is None:
         found = ports.candidates()
-        for candidate in found:
-            yield "note", f"{candidate} may be a board"
+        report.add(Finding("note", f"{candidate} may be a board") for candidate in found)
         if len(found) == 1:
             port = found[0].device
     if port is not None and "://" not in port:
-        yield from rights(port)
-        yield from ftdi(port)
+        report.add(health.rights(port))
+        report.add(health.ftdi(port))
     try:
-        board = driver.open(port, args.skin, baud=args.baud, timeout=args.timeout)
+        with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
+            report.stats = board.stats
+            report.add(health.hello(board))
+            report.add(health.count(board, args.seconds, args.timeout))
     except (ContactFPGAError, ValueError) as error:
-        yield "fault", str(error)
-        return
-    with board:
-        yield from hello(board)
-        yield from count(board, args.seconds, args.timeout)
-
-
-def rights(port: str) -> Iterator[Finding]:
-    """Whether this user may read and write the port."""
-    if sys.platform == "win32":
-        return
-    if not os.path.exists(port):
-        yield "fault", f"{port} does not exist; is the board plugged in?"
-    elif os.access(port, os.R_OK | os.W_OK):
-        yield "ok", f"{port} may be read and written"
-    else:
-        yield "fault", f"{port} may not be read and written; add yourself to its group: {_group_command(port)}"
-
-
-def _group_command(port: str) -> str:
-    import grp
-
-    group = os.stat(port).st_gid
-    return f"sudo usermod -aG {grp.getgrgid(group).gr_name} $USER, then log in again"
-
-
-def ftdi(port: str, folder: Path = USB_SERIAL) -> Iterator[Finding]:
-    """The FTDI chip's latency timer, and the udev rule that sets it and the event character."""
-    device = folder / Path(port).resolve().name
-    timer = device / "latency_timer"
-    if not timer.exists():
-        return
-    latency_ms = int(timer.read_text())
-    if latency_ms > LATENCY_MS:
-        yield "fault", f"{port}: FTDI latency timer is {latency_ms} ms, it should be {LATENCY_MS} ms; {_advice()}"
-    else:
-        yield "ok", f"{port}: FTDI latency timer is {latency_ms} ms"
-    yield (
-        "note",
-        f"{port}: the event character, which sends each frame on at its last byte, cannot be read back; {_advice()}",
-    )
-
-
-def udev_rule() -> str:
-    """The rule that sets latency timer and event character of all supported boards."""
-    return "\n".join(
-        f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTRS{{idVendor}}=="{usb.vid:04x}", '
-        f'ATTRS{{idProduct}}=="{usb.pid:04x}", ATTR{{latency_timer}}="{LATENCY_MS}", '
-        f'ATTR{{event_char}}="{EVENT_CHAR}"'
-        for usb in ports.SUPPORTED
-    )
-
-
-def _advice() -> str:
-    return f"put this into {RULE_FILE} and plug the board in again:\n{udev_rule()}"
-
-
-def hello(board: Board) -> Iterator[Finding]:
-    """What the board says of itself."""
-    sheet = board.sheet
-    surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
-    name = f"{board.name!r}, " if board.name else ""
-    facts = (
-        f"{name}{sheet.rows}x{sheet.columns}, pitch {sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm, {surface}, "
-        f"connectivity {sheet.connectivity}, {report_of(sheet)}, {board.clock_hz / 1e6:g} MHz, {board.baud} baud, "
-        f"fingerprint {board.fingerprint.hex()}"
-    )
-    yield "ok", f"{board.port} says hello: {facts}"
-
-
-def clock(board_s: float, host_s: float) -> Iterator[Finding]:
-    """Whether the board's clock agrees with this computer's, as far as this much time can show."""
-    if host_s > 0 and abs(off := board_s / host_s - 1) > CLOCK_ERROR + JITTER_S / host_s:
-        yield (
-            "note",
-            f"the board's clock is {100 * abs(off):.1f} % {'fast' if off > 0 else 'slow'}, and so are all times; is "
-            "its crystal the Skin's clock_hz? (A virtual board may just not keep up.)",
-        )
-
-
-def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
-    """Frames and losses over some seconds of device time."""
-    try:
-        first = zones = board.next(timeout)
-    except ReplayEnded:
-        yield "fault", f"{board.port} holds no frame"
-        return
-    begun = board.clock()
-    while zones.time_us - first.time_us < seconds * 1e6 and zones.time_us >= first.time_us:
-        try:
-            zones = board.next(timeout)
-        except ReplayEnded:
-            yield "note", "the recording ends here"
-            break
-    yield from clock((zones.time_us - first.time_us) / 1e6, board.clock() - begun)
-    stats = board.stats
-    yield "ok", f"{stats.frames} frames, {stats.hellos} hellos in {(zones.time_us - first.time_us) / 1e6:.2f} s"
-    if stats.overwritten:
-        yield (
-            "note",
-            f"{stats.overwritten} frames overwritten on the board: the line is slower than the scan, a hello too",
-        )
-    if stats.unexplained:
-        yield "note", f"{stats.unexplained} frames left out, as their times were not known before the next hello"
-    faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
-    told = ", ".join(f"{number} {name}" for name, number in faults.items())
-    yield ("fault" if any(faults.values()) else "ok", told)
-    if "stuck" in zones.faults:
-        count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"
-        yield "fault", f"{count} read pressed while no row is driven; look for a short circuit there"
-    for flag in sorted(zones.flags - {"fault"}):
-        if flag == "ghost":
-            yield "note", "the last frame has zones that may be ghosts: the sheet has no diodes"
-        else:
-            yield "fault", f"the last frame is flagged {flag!r}"
+        report.add([Finding("fault", str(error))])

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     if args.page and args.study:
         raise ValueError("--page takes all studies; leave --study out")
     folder = outputs.folder(args.output)
-    path = outputs.file(args.page, "--page") if args.page else None
+    path = writer.page(args.page, "--page") if args.page else None
     pictures = outputs.folder(path.parent / "images" / "failures", "--page") if path else folder
     turned: dict[str, dict[str, Turned]] = {}
     try:

@@ -1,4 +1,4 @@
-"""How a command ends that somebody interrupts: at once, with its status, and without a word that is no use."""
+"""How a command ends that fails or is interrupted: at once, with its status, and without a word that is no use."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import warnings
 from collections.abc import Callable, Iterator
 
 from contactfpga.console import terminal
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.files import told
+from contactfpga.inputs.values import visible_lines
 
 STATUS = 130
 """Of a command that Ctrl-C ended: 128 and the number of the signal."""
@@ -20,7 +23,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def guarded(body: Callable[[], int | None]) -> int:
-    """The status of ``body``; Ctrl-C ends it without a traceback.
+    """The status of ``body``; neither Ctrl-C nor what a user can mend ends it with a traceback.
 
     A shell starts what runs in its background with Ctrl-C ignored, and so does everything below it. A command is
     ended by the same signal, so it listens all the same.
@@ -33,6 +36,18 @@ def guarded(body: Callable[[], int | None]) -> int:
             if str(interrupt):
                 terminal.say(f"contactfpga: {interrupt}", sys.stderr, hang=2)
             return STATUS
+        except ContactFPGAError as error:
+            return failed(error)
+        except OSError as error:
+            return failed(told(error))
+
+
+def failed(reason: object) -> int:
+    """Say why a command failed; its status."""
+    silence_amaranth()
+    # Names from files and devices are part of it.
+    terminal.say(f"contactfpga: {visible_lines(str(reason))}", sys.stderr, hang=2)
+    return 1
 
 
 @contextlib.contextmanager

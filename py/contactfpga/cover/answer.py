@@ -41,3 +41,10 @@ def not_negative(name: str, value: float, unit: str) -> float:
     if not is_finite(value) or value < 0:
         raise CoverError(f"{name} is {shown(value)}; it must be a finite number, 0 {unit} or above".replace("  ", " "))
     return float(value)
+
+
+def finite(name: str, value: float) -> float:
+    """``value`` if it is a finite number; raises :class:`CoverError` otherwise."""
+    if not is_finite(value):
+        raise CoverError(f"{name} is {shown(value)}; it must be a finite number")
+    return float(value)

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError, not_negative, positive
+from contactfpga.cover.answer import finite, not_negative, positive
 from contactfpga.cover.solve import Floats
 
 GRAVITY = 9.81
@@ -42,8 +42,7 @@ class Arm:
         positive("lever_m", self.lever_m, "m")
         not_negative("weight_nm", self.weight_nm, "Nm")
         for name in ("torque_nm", "angle_rad"):
-            if not math.isfinite(getattr(self, name)):
-                raise CoverError(f"{name} is {getattr(self, name)!r}; it must be finite")
+            finite(name, getattr(self, name))
 
     @classmethod
     def link(

@@ -12,7 +12,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError, positive
+from contactfpga.cover.answer import finite, positive
 
 Floats = np.ndarray
 
@@ -95,8 +95,7 @@ class _Placed:
         for name in ("half_x_m", "half_y_m"):
             positive(name, getattr(self, name), "m")
         for name in ("x_m", "y_m", "angle_rad"):
-            if not math.isfinite(getattr(self, name)):
-                raise CoverError(f"{name} is {getattr(self, name)}; it must be finite")
+            finite(name, getattr(self, name))
 
     def placed(self, x_m: float, y_m: float, angle_rad: float) -> Self:
         cosine, sine = math.cos(angle_rad), math.sin(angle_rad)

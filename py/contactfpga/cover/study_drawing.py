@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,11 @@ from contactfpga.cover import formula_study as measured
 LEAST_SHARE = 1e-3
 """Errors below are drawn on a linear scale, so that 0 has its place."""
 
+SHORTER = 1e-9
+"""What counts as a shorter line, of the axes' length; rounding does not."""
+
+Point = tuple[float, float]
+
 
 def study(path: Path) -> Path:
     """Error over time of the rules for the compression time, and of the models of sensitivity."""
@@ -28,7 +35,7 @@ def study(path: Path) -> Path:
 
 
 def _rules(place: Any) -> None:
-    """Each rule by name in a column on the right, the one with the largest error on top."""
+    """Each rule by name in a column on the right, joined by lines that do not cross."""
     found = []
     for rules, color in ((measured.RULES, style.BLUE), (measured.FAILING, style.VERMILLION)):
         for name, rule in rules.items():
@@ -40,12 +47,15 @@ def _rules(place: Any) -> None:
     place.set(
         xscale="log", yscale="log", xlim=(0.3, 2 * max(takes for _, takes, _, _ in found)), ylim=(measured.FLOOR / 3, 1)
     )
-    for number, (error, takes, name, color) in enumerate(found):
+    to_axes = place.transData + place.transAxes.inverted()
+    names = [(1.03, 0.99 - 0.94 * number / (len(found) - 1)) for number in range(len(found))]
+    ends = uncrossed([tuple(to_axes.transform((takes, error))) for error, takes, _, _ in found], names)
+    for (error, takes, name, color), end in zip(found, ends, strict=True):
         place.plot(takes, error, "o", ms=6, color=color, zorder=3)
         place.annotate(
             name,
             (takes, error),
-            xytext=(1.03, 0.99 - 0.94 * number / (len(found) - 1)),
+            xytext=end,
             textcoords="axes fraction",
             va="center",
             fontsize=style.SMALL,
@@ -56,6 +66,23 @@ def _rules(place: Any) -> None:
     _times(place)
     place.set_ylabel("error of the compression time")
     place.set_title("Rules: chosen from (blue), failing (red)", loc="left")
+
+
+def uncrossed(starts: Sequence[Point], ends: Sequence[Point]) -> list[Point]:
+    """The ends in such an order that no two lines, each from a start to its end, cross.
+
+    Two ends are swapped where that makes the lines shorter, as it does where they cross; so there is an end to it.
+    """
+    found = list(ends)
+    while longer := [
+        (a, b)
+        for a, b in itertools.combinations(range(len(starts)), 2)
+        if math.dist(starts[a], found[b]) + math.dist(starts[b], found[a]) + SHORTER
+        < math.dist(starts[a], found[a]) + math.dist(starts[b], found[b])
+    ]:
+        a, b = longer[0]
+        found[a], found[b] = found[b], found[a]
+    return found
 
 
 def _models(place: Any) -> None:

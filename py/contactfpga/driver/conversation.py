@@ -111,7 +111,7 @@ class Conversation:
         self._begun = True
         if self._damage:
             self._damage = False
-            self.stats.resynchronised += 1
+            self.stats.resynchronized += 1
         return event
 
     def _refuse(self, reason: str) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import BoardSpec
 from contactfpga.inputs.values import visible
 
 
@@ -21,14 +22,15 @@ class Usb:
     boards: str
 
 
-def _supported() -> Iterator[Usb]:
-    """The boards by the chip that carries their UART."""
-    for bridge, boards in itertools.groupby(BOARDS.values(), lambda board: board.bridge):
-        vid, pid = bridge.usb
-        yield Usb(vid, pid, bridge.interface, ", ".join(board.title for board in boards))
+def supported(boards: Iterable[BoardSpec]) -> tuple[Usb, ...]:
+    """The boards by the chip that carries their UART, each chip once."""
+    titles: dict[tuple[int, int, int | None], list[str]] = {}
+    for board in boards:
+        titles.setdefault((*board.bridge.usb, board.bridge.interface), []).append(board.title)
+    return tuple(Usb(*chip, ", ".join(names)) for chip, names in titles.items())
 
 
-SUPPORTED = tuple(_supported())
+SUPPORTED = supported(BOARDS.values())
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Stats:
     """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Widths.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
     """Packets refused, by reason: framing, crc, length, kind, content, noise."""
-    resynchronised: int = 0
+    resynchronized: int = 0
     """Valid packets that followed damaged ones."""
     hellos: int = 0
     """Hellos received."""
@@ -43,3 +43,7 @@ class Stats:
     """How often the board was restarted, as its hellos tell."""
     bytes: int = 0
     """All bytes received."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        return {**vars(self), "damaged": dict(self.damaged)}

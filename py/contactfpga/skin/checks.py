@@ -115,10 +115,11 @@ def _check_surface(skin: Skin) -> None:
     _within("radius_mm", skin.radius_mm, 0.1, 100_000.0, "mm")
     around = 2 * math.pi * skin.radius_mm
     if skin.columns * skin.pitch_x_mm >= around:
+        most = math.ceil(around / skin.pitch_x_mm) - 1
+        advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"
         raise SkinError(
             f"{skin.columns} columns of {skin.pitch_x_mm} mm take {skin.columns * skin.pitch_x_mm:g} mm of a "
-            f"circumference of {around:g} mm: the sheet's ends meet, which is not supported; "
-            f"use at most {math.ceil(around / skin.pitch_x_mm) - 1} columns"
+            f"circumference of {around:g} mm: the sheet's ends meet, which is not supported; {advice}"
         )
 
 

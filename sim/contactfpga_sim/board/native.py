@@ -54,7 +54,8 @@ HOST_SOURCES = (
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
 # evaluation a clock is enough.
 FLATTEN = "delete w:$verilog_initial_trigger; proc; flatten; opt_expr; opt_merge; opt_clean"
-_TO_CPP = "splitnets -driver; opt_clean; write_cxxrtl -g0 model.cpp"
+# A class may have no member of its own name, and no signal is called $design.
+_TO_CPP = "splitnets -driver; opt_clean; rename top $design; write_cxxrtl -g0 model.cpp"
 
 
 class CompileFailed(ContactFPGAError):

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import contactfpga
-from contactfpga.console import interrupt
+from contactfpga.console import interrupt, numbers
 from contactfpga.driver.driver import Board
 from contactfpga_sim.board.pty_board import PtyBoard
 
@@ -92,7 +92,7 @@ class Soak:
 def main(arguments: list[str] | None = None) -> int:
     """Run it; returns 1 if something was wrong."""
     parser = argparse.ArgumentParser(prog="make soak", description=__doc__)
-    parser.add_argument("--seconds", type=float, default=3600.0, help="how long (default: an hour)")
+    parser.add_argument("--seconds", type=numbers.SECONDS, default=3600.0, help="how long (default: an hour)")
     seconds = parser.parse_args(arguments).seconds
     early: tuple[float, int] | None = None
     with PtyBoard(SKIN, "moving") as board:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from contactfpga.console import interrupt
+from contactfpga.console import interrupt, numbers
 from contactfpga.skin import Skin
 from contactfpga_sim.mutants import netlist, proof, trial
 from contactfpga_sim.mutants.netlist import STAGES, Mutant
@@ -26,6 +26,9 @@ BATCH = 500
 
 CHECKED = 2
 """This many of the killed mutants of each Skin are given to the prover too, which must not prove them."""
+
+
+EACH = numbers.whole(1, 1_000_000, "mutants")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,12 +94,6 @@ def table(results: Sequence[Result]) -> str:
     return writer.table_of(rows)
 
 
-def share_killed(results: Iterable[Result]) -> float:
-    """Share of the killed among the mutants that are not proved equivalent."""
-    fates = [result.fate for result in results]
-    return fates.count("killed") / (fates.count("killed") + fates.count("alive"))
-
-
 def listed(results: Iterable[Result]) -> str:
     """What is alive, one per line: stage, source place, change, Skin."""
     alive = sorted((str(result.mutant), result.skin) for result in results if result.fate == "alive")
@@ -106,17 +103,18 @@ def listed(results: Iterable[Result]) -> str:
 def main() -> int:
     """Run the campaign; with a page named, write the table into it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--each", type=int, default=40, help="mutants of each Skin (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="for the choice of mutants (default %(default)s)")
+    parser.add_argument("--each", type=EACH, default=40, help="mutants of each Skin (default %(default)s)")
+    parser.add_argument("--seed", type=numbers.SEED, default=0, help="for the choice of mutants (default %(default)s)")
     parser.add_argument("--skin", action="append", choices=SKINS, help="only this Skin; can be repeated")
-    parser.add_argument("--jobs", type=int, default=2, help="Skins at once (default %(default)s)")
+    parser.add_argument("--jobs", type=numbers.JOBS, default=2, help="Skins at once (default %(default)s)")
     parser.add_argument("--page", type=Path, help="write the table into this page")
     args = parser.parse_args()
+    page = writer.page(args.page, "--page") if args.page else None
     results = _run(args.skin or list(SKINS), args.each, args.seed, args.jobs)
     print(f"{listed(results)}\n\n{table(results)}")
-    if args.page:
-        writer.write(args.page, {"mutants": lambda: table(results)})
-        print(f"wrote {args.page}")
+    if page:
+        writer.write(page, {"mutants": lambda: table(results)})
+        print(f"wrote {page}")
     return 0
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.console import interrupt
+from contactfpga.console import interrupt, numbers
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
@@ -145,16 +145,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make bitstream-replay", description=__doc__)
     parser.add_argument("board", nargs="?", choices=list(BOARDS), help="default: 8x8 on one of each FPGA")
     parser.add_argument("--skin", type=Path, help="the board's sheet; default: the one it is built with")
-    parser.add_argument("--frames", type=int, default=500, help="for each board (default: %(default)s)")
+    parser.add_argument(
+        "--frames", type=numbers.whole(1, 10**9), default=500, help="for each board (default: %(default)s)"
+    )
     told = "a .npz file with frames named `pressed`, or a folder of such files"
     parser.add_argument("--recordings", type=Path, metavar="PATH", help=told)
     args = parser.parse_args()
     if args.skin and not args.board:
         parser.error("--skin needs the board that it is for")
-    if args.frames < 1:
-        parser.error(f"--frames is {args.frames}; it must be at least 1")
     recordings = [Recording.load(path).pressed for path in recordings_in(args.recordings)]
-    print(f"frames       {args.frames} a board: shapes, random ones and {len(recordings)} recordings")
+    print(f"frames       {args.frames} per board: shapes, random ones and {len(recordings)} recordings")
     runs = RUNS
     if args.board:
         runs = ((args.board, Skin.load(args.skin) if args.skin else find(args.board).skin),)

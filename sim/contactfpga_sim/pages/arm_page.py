@@ -131,7 +131,7 @@ def main() -> int:
     parser.add_argument("page", type=Path)
     parser.add_argument("folder", type=Path)
     args = parser.parse_args()
-    outputs.file(args.page, "page")
+    writer.page(args.page)
     outputs.folder(args.folder, "folder")
     case = Case.load("paper")
     tasks = latency_charts.plan(case)

@@ -110,7 +110,7 @@ def main() -> int:
     parser.add_argument("page", type=Path)
     parser.add_argument("folder", type=Path)
     args = parser.parse_args()
-    outputs.file(args.page, "page")
+    writer.page(args.page)
     outputs.folder(args.folder, "folder")
     writer.write(args.page, TABLES)
     print(f"wrote {args.page}")

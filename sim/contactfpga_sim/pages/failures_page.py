@@ -30,7 +30,7 @@ def _cells(study: Study, turned: Turned) -> list[str]:
     holds = "" if turned.holds_until is None else study.format.format(turned.holds_until)
     if turned.broken is None:
         return [f"{holds}, all there are", "", "nothing", ""]
-    at = study.format.format(turned.values[turned.broken])
+    at = study.format.format(turned.breaks_at)
     return [holds or "nowhere", f"**{at}**", turned.outcomes[turned.broken].what, says(study, turned)]
 
 

@@ -129,7 +129,7 @@ def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
 
 def reference_table() -> str:
     """Latency, rate and size on the wire over some settings."""
-    head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames a second", "bytes, one zone")
+    head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames per second", "bytes, one zone")
     return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
 
 
@@ -144,7 +144,7 @@ def reference_row(name: str, skin: Skin) -> str:
 
 def report_table() -> str:
     """What dividing on the board saves on the wire, and what it costs, over some sheets."""
-    head = ("sheet", "report", "bytes a zone", "first row", "last row", "every other switch of the last row")
+    head = ("sheet", "report", "bytes per zone", "first row", "last row", "every other switch of the last row")
     names = ("reference", "32x32", "64x64")
     return writer.table(
         head, [report_row(name, SETTINGS[name].replace(report=report)) for name in names for report in REPORTS]

@@ -24,15 +24,13 @@ EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 
 def gateware_table() -> str:
     """The whole design and the labeller alone, by sheet and device."""
-    lines = [
-        "| design | device | " + " | ".join(f"{lines}x{lines}" for lines in sizes.SIZES) + " |",
-        "|---" * (2 + len(sizes.SIZES)) + "|",
-    ]
-    for name in sizes.DESIGNS:
-        for device in sizes.DEVICES:
-            cells = " | ".join(gateware_cell(name, device, lines) for lines in sizes.SIZES)
-            lines.append(f"| {name} | {device.title} | {cells} |")
-    return "\n".join(lines)
+    head = ("design", "device", *(f"{lines}x{lines}" for lines in sizes.SIZES))
+    rows = (
+        (name, device.title, *(gateware_cell(name, device, lines) for lines in sizes.SIZES))
+        for name in sizes.DESIGNS
+        for device in sizes.DEVICES
+    )
+    return writer.table(head, map(writer.line, rows))
 
 
 def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
@@ -44,15 +42,13 @@ def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
 
 def boards_table() -> str:
     """The sheets that the boards page names, each built for its board."""
-    lines = [
-        "| board | FPGA | clock | sheet | LUT4 | flip-flops | block RAMs | logic cells | Fmax |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
+    head = ("board", "FPGA", "clock", "sheet", "LUT4", "flip-flops", "block RAMs", "logic cells", "Fmax")
+    lines = []
     for board in BOARDS.values():
         lines.append(board_row(board, board.skin))
         if board.name in EXAMPLES:
             lines.append(board_row(board, Skin.load(EXAMPLES[board.name])))
-    return "\n".join(lines)
+    return writer.table(head, lines)
 
 
 def board_row(board: BoardSpec, skin: Skin) -> str:
@@ -72,7 +68,7 @@ def board_row(board: BoardSpec, skin: Skin) -> str:
         "{:,} of {:,}".format(*found.logic_cells) if found.logic_cells else "",
         f"{found.fmax_mhz:.1f} MHz",
     )
-    return f"| {' | '.join(fields)} |"
+    return writer.line(fields)
 
 
 TABLES: dict[str, Callable[[], str]] = {

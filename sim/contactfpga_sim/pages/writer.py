@@ -39,20 +39,27 @@ def update(text: str, tables: Tables) -> str:
     return _SECTION.sub(measured, text)
 
 
-def write(page: Path, tables: Tables) -> None:
+def write(path: Path, tables: Tables) -> None:
     """Write the tables into a page; each is there as soon as it is measured."""
     for name, measure in tables.items():
-        before = page.read_text(encoding="utf-8")
+        before = path.read_text(encoding="utf-8")
         if f"<!-- figures: {name} -->" in before:
-            page.write_text(update(before, {name: measure}), encoding="utf-8")
+            path.write_text(update(before, {name: measure}), encoding="utf-8")
+
+
+def page(path: str | Path, option: str = "page") -> Path:
+    """The page, which is there and can be written; looked at before anything is measured for it. Raises
+    :class:`~contactfpga.console.outputs.OutputError`."""
+    if not Path(path).is_file():
+        raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")
+    return outputs.file(path, option)
 
 
 def main(tables: Tables) -> int:
     """Update the pages named on the command line."""
     parser = argparse.ArgumentParser(description="Measure the tables in these pages and write them there.")
     parser.add_argument("pages", type=Path, nargs="+")
-    pages = [outputs.file(page, "page") for page in parser.parse_args().pages]
-    for page in pages:
-        write(page, tables)
-        print(f"measured {page}")
+    for path in list(map(page, parser.parse_args().pages)):
+        write(path, tables)
+        print(f"measured {path}")
     return 0

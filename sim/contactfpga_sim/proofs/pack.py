@@ -18,7 +18,7 @@ _STATES = ("ITEMS", "TRAILER", "CLOSE")
 
 def frames_are_packed(proof: Proof, skin: Skin) -> None:
     """Free: items at any time, what tag, summary and verdict say, and one place of the frame that is followed.
-    Assumed: no more items a frame than it can carry, as the audit sees to; from the clock of ``decide`` to that of
+    Assumed: no more items per frame than it can carry, as the audit sees to; from the clock of ``decide`` to that of
     ``commit`` the tag stays as it is, and from the clock after ``decide`` on the summary and the verdict's numbers.
 
     Claimed: when a frame closes, that place was written and holds what COBS puts there for the bytes of all items,

@@ -56,7 +56,7 @@ _BUGS = (
         lambda ready, inside: ready | (inside["bits_left"] == 2) & (inside["clock"] == 0)),
 )  # fmt: skip
 CASES = (
-    Case("UART framing", "4 clocks a bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
-    Case("UART framing", "5 clocks a bit", partial(framing, bit_clocks=5), 2),
-    Case("UART framing", "104 clocks a bit", partial(framing, bit_clocks=104), 2),
+    Case("UART framing", "4 clocks per bit", partial(framing, bit_clocks=4), 2, _BUGS, bug_clocks=44),
+    Case("UART framing", "5 clocks per bit", partial(framing, bit_clocks=5), 2),
+    Case("UART framing", "104 clocks per bit", partial(framing, bit_clocks=104), 2),
 )

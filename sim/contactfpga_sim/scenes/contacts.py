@@ -20,7 +20,7 @@ Shape = tuple[Part, ...]
 """Convex parts around the origin, as the cover takes them: in m. Parts may overlap or lie apart."""
 
 M = 1e-3
-"""Metres in a mm: a Skin counts in mm, the cover's physics in m."""
+"""Meters in a mm: a Skin counts in mm, the cover's physics in m."""
 
 
 @dataclasses.dataclass(frozen=True)

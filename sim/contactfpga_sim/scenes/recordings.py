@@ -28,7 +28,7 @@ class Recording:
     pressed: np.ndarray
     """(frames, rows, columns) bool."""
     rate_hz: float = DEFAULT_HZ
-    """Frames a second; :data:`DEFAULT_HZ` where the file says nothing."""
+    """Frames per second; :data:`DEFAULT_HZ` where the file says nothing."""
     pitch_mm: float | None = None
     """Distance of rows and columns; None where the file does not say."""
     what: str = "the recording"

@@ -72,7 +72,7 @@ unsigned __int128 get(const cxxrtl::wire<Bits> &port) {
 // The clock never falls: nothing in the gateware looks at that edge, and it would cost an evaluation.
 class Clocked {
 public:
-    cxxrtl_design::p_top top;
+    cxxrtl_design::i_design top;
 
     Clocked() { loops_ = !top.eval(); }
 

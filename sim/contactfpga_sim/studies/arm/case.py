@@ -11,7 +11,7 @@ from contactfpga.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga_sim.studies.arm.parts import BEHAVIOURS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
+from contactfpga_sim.studies.arm.parts import BEHAVIORS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
 
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz")
@@ -41,7 +41,7 @@ class Case:
     """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.cover.press`)."""
 
     def __post_init__(self) -> None:
-        _one_of("behaviour", self.control.behaviour, BEHAVIOURS)
+        _one_of("behavior", self.control.behavior, BEHAVIORS)
         _one_of("model", self.model, MODELS)
         if not self.touch:
             raise CaseError("touch is empty; the arm must run into at least one thing")

@@ -38,8 +38,8 @@ class Push:
 
 def pushed(case: Case, speed_m_s: float) -> tuple[Push, Result]:
     """The case's push at another speed."""
-    if case.control.behaviour != "comply":
-        raise CaseError(f"behaviour is {case.control.behaviour!r}; a push needs 'comply'")
+    if case.control.behavior != "comply":
+        raise CaseError(f"behavior is {case.control.behavior!r}; a push needs 'comply'")
     touch = dataclasses.replace(case.touch[0], push_m_s=speed_m_s)
     result = run(case.but(touch=(touch, *case.touch[1:])), "torque")
     place = case.link.lever_m * (result.course["angle_rad"] - result.course["angle_rad"][0])

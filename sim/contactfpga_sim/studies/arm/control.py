@@ -65,7 +65,7 @@ class Controller:
         return self._old[0]
 
     def _decide(self, seconds: float, sensed: Sensed, contact: bool, over: bool, alive: bool) -> None:
-        comply = self._control.behaviour == "comply" and self.state == "moving"
+        comply = self._control.behavior == "comply" and self.state == "moving"
         contact = contact and not comply
         if self.state != "reversing" and (over or contact):
             self._turn(seconds, sensed, "contact" if contact else "torque")

@@ -75,9 +75,9 @@ def plan(case: Case, latencies: Sequence[float] = LATENCIES_S, speeds: Sequence[
 
 def check(case: Case) -> None:
     """Raise :class:`CaseError` for a case that has no charts."""
-    if case.control.behaviour != "reverse" or not case.link.speed_m_s:
+    if case.control.behavior != "reverse" or not case.link.speed_m_s:
         raise CaseError(
-            f"behaviour is {case.control.behaviour!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
+            f"behavior is {case.control.behavior!r} at {case.link.speed_m_s:g} m/s; charts need 'reverse' and a speed"
         )
 
 
@@ -118,7 +118,7 @@ def _latencies(place: Any, case: Case) -> None:
 def _force(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
     figure, place = _axes("from the switch to the controller, ms", "force, N")
     late = [1e3 * task.latency_s for task in tasks.force]
-    free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GREY, "lw": 3})
+    free: tuple[dict[str, Any], ...] = ({"color": style.SKY, "lw": 3}, {"color": style.GRAY, "lw": 3})
     held: tuple[dict[str, Any], ...] = ({"color": style.BLACK, "ls": "--"}, {"color": style.BLACK, "ls": ":"})
     for group, name, looks in ((tasks.force, "no torque limit", free), (tasks.limited, "3 Nm limit", held)):
         points = [found[task] for task in group]

@@ -9,7 +9,7 @@ import math
 from contactfpga.cover import Ball, Switch, elastic
 from contactfpga.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
 
-BEHAVIOURS = ("reverse", "comply")
+BEHAVIORS = ("reverse", "comply")
 
 
 class _Checked:
@@ -102,8 +102,8 @@ class Control(_Checked):
     """The host may be silent for this long, in s; then the arm stops."""
     delay_s: float = 0.0
     """Age of the measured speed and torque, in s, where the loop is closed over a link."""
-    behaviour: str = "reverse"
-    """One of :data:`BEHAVIOURS`."""
+    behavior: str = "reverse"
+    """One of :data:`BEHAVIORS`."""
     virtual_kgm2: float = 0.02
     """``comply``: inertia of the admittance, in kg m2."""
     virtual_damping: float = 0.5

@@ -115,8 +115,8 @@ def interval(values: Sequence[float]) -> Interval:
         return Interval(math.nan, math.nan, math.nan, 0)
     mean = float(known.mean())
     if np.isin(known, (0.0, 1.0)).all():
-        centre = (mean + Z95**2 / (2 * n)) / (1 + Z95**2 / n)
+        center = (mean + Z95**2 / (2 * n)) / (1 + Z95**2 / n)
         half = Z95 / (1 + Z95**2 / n) * math.sqrt(mean * (1 - mean) / n + Z95**2 / (4 * n**2))
-        return Interval(mean, max(0.0, centre - half), min(1.0, centre + half), n)
+        return Interval(mean, max(0.0, center - half), min(1.0, center + half), n)
     half = Z95 * float(known.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
     return Interval(mean, mean - half, mean + half, n)

@@ -77,7 +77,7 @@ def picture(points: Sequence[Point]) -> Figure:
     cells = [index for index, point in enumerate(points) if point.task.skin.report == "cells"]
     host = [index for index in cells if index not in best]
     for index, (point, place) in enumerate(zip(points, places, strict=True)):
-        color = style.BLUE if index in best else style.VERMILLION if index in host else style.GREY
+        color = style.BLUE if index in best else style.VERMILLION if index in host else style.GRAY
         _mark(panel, point, place, color, markers(points))
     _name_front(panel, [(points[index].task.method, *places[index]) for index in best])
     for index in host:
@@ -106,7 +106,7 @@ def _axes(panel: Any, points: Sequence[Point]) -> None:
 def _mark(panel: Any, point: Point, place: tuple[float, float], color: str, shapes: dict[float, str]) -> None:
     x, y = place
     hollow = error(point, "miscounted") >= MISCOUNTED
-    front_or_host = color != style.GREY
+    front_or_host = color != style.GRAY
     if front_or_host:
         panel.plot([x, point.speed.worst_us + point.host_us], [y, y], color=color, linewidth=1, alpha=0.6)
     panel.plot(
@@ -133,9 +133,9 @@ def _legend(points: Sequence[Point]) -> tuple[list[Line2D], list[str]]:
     lines = {
         "front: not beaten in both": Line2D([], [], color=style.BLUE, marker="o", markersize=7),
         "labelled on the host": Line2D([], [], color=style.VERMILLION, **mark),
-        "other methods": Line2D([], [], color=style.GREY, **mark | {"markersize": 5}),
+        "other methods": Line2D([], [], color=style.GRAY, **mark | {"markersize": 5}),
         "most scenes miscounted": Line2D([], [], color=style.BLUE, mfc=style.CARD, **mark),
     }
     for pitch, shape in markers(points).items():
-        lines[f"pitch {pitch:g} mm"] = Line2D([], [], color=style.GREY, **mark | {"marker": shape})
+        lines[f"pitch {pitch:g} mm"] = Line2D([], [], color=style.GRAY, **mark | {"marker": shape})
     return list(lines.values()), list(lines)

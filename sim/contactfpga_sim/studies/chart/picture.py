@@ -173,7 +173,7 @@ def _legend(points: Sequence[Point]) -> tuple[list[Line2D], list[str]]:
     pitches = {point.task.skin.pitch_x_mm for point in points}
     mark: dict[str, Any] = {"linestyle": "", "markersize": 7, "markeredgecolor": style.CARD}
     lines = {name: Line2D([], [], color=color, marker="o", **mark) for name, color in colors(points).items()}
-    shapes = {pitch: Line2D([], [], color=style.GREY, marker=shape, **mark) for pitch, shape in markers(points).items()}
+    shapes = {pitch: Line2D([], [], color=style.GRAY, marker=shape, **mark) for pitch, shape in markers(points).items()}
     shown = {name: line for name, line in lines.items() if name in used}
     shown |= {f"pitch {pitch:g} mm": line for pitch, line in shapes.items() if pitch in pitches}
     shown["nothing is better in both"] = Line2D([], [], color=style.INK, linewidth=0.8)

@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from contactfpga.commands import doctor
+from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
@@ -98,7 +98,7 @@ def _noise(rate_hz: float) -> Outcome:
 NOISE = Study(
     name="noise",
     title="Pulses on the line",
-    knob="pulses a second",
+    knob="pulses per second",
     amount="share of frames lost",
     values=(0, 10, 30, 100, 300, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000),
     runs={"half a bit to two bits long": _noise},
@@ -112,7 +112,7 @@ def _clock(per_cent: float) -> Outcome:
     found = heard(recorded(), recorded().read(Derived(SKIN).bit_clocks * faster))
     if found.arrived < found.sent or found.wrong:
         return _of_line(found)
-    told = ("doctor",) if [*doctor.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
+    told = ("doctor",) if [*health.clock(DOCTOR_S * faster, DOCTOR_S)] else ()
     return Outcome(per_cent <= CLOCK_PER_CENT, told, f"times {per_cent:g} % off", per_cent / 100)
 
 

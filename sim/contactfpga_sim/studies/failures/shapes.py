@@ -8,6 +8,7 @@ import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
+from contactfpga.zones.zone import Zones
 from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.scene import FINGER_MM, Scene
 from contactfpga_sim.studies.failures.knob import Outcome, Study
@@ -31,20 +32,19 @@ def arm(size: int, quarters: int) -> np.ndarray:
     return cells
 
 
+def _counted(zones: Zones, cells: np.ndarray, right: bool, what: str) -> Outcome:
+    """The outcome where the picture shows how many zones there are."""
+    return Outcome(right, faults(zones), what, len(zones), cells, places(zones))
+
+
 def _winding(skin: Skin, quarters: float) -> Outcome:
     around = arm(skin.rows, int(quarters))
     finger = np.zeros_like(around)
     middle = slice(skin.rows // 2 - 1, skin.rows // 2 + 1)
     finger[middle, middle] = True
     zones = still(skin, around | finger)
-    return Outcome(
-        right=reported(zones) == sorted([moments(around), moments(finger)]),
-        told=faults(zones),
-        what=f"{plural(len(zones), 'zone')} of 2 contacts",
-        amount=len(zones),
-        cells=around | finger,
-        zones=places(zones),
-    )
+    right = reported(zones) == sorted([moments(around), moments(finger)])
+    return _counted(zones, around | finger, right, f"{plural(len(zones), 'zone')} of 2 contacts")
 
 
 WINDING = Study(
@@ -64,14 +64,8 @@ def _crossing(skin: Skin, distance_mm: float) -> Outcome:
     scene = Scene(pair)
     cells = scene.pressed(0.0, skin)
     zones = still(skin, cells)
-    return Outcome(
-        right=len(zones) == scene.truth(0.0).count,
-        told=faults(zones),
-        what=f"{plural(len(zones), 'zone')} of {scene.truth(0.0).count} contacts",
-        amount=len(zones),
-        cells=cells,
-        zones=places(zones),
-    )
+    right = len(zones) == scene.truth(0.0).count
+    return _counted(zones, cells, right, f"{plural(len(zones), 'zone')} of {scene.truth(0.0).count} contacts")
 
 
 CROSSING = Study(
@@ -91,14 +85,8 @@ def _many(skin: Skin, count: float) -> Outcome:
     for row, column in spots:
         cells[row, column] = True
     zones = still(skin, cells)
-    return Outcome(
-        right=reported(zones) == sorted((1, column, row) for row, column in spots) and not zones.flags,
-        told=faults(zones),
-        what=f"{len(zones)} of {int(count)} zones; `total_zones` says {zones.total_zones}",
-        amount=len(zones),
-        cells=cells,
-        zones=places(zones),
-    )
+    right = reported(zones) == sorted((1, column, row) for row, column in spots) and not zones.flags
+    return _counted(zones, cells, right, f"{len(zones)} of {int(count)} zones; `total_zones` says {zones.total_zones}")
 
 
 MANY = Study(

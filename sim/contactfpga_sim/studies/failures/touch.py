@@ -107,7 +107,7 @@ def _moving(skin: Skin, speed: float) -> Outcome:
 MOVING = Study(
     name="moving",
     title="A finger of 24 mm that moves during the scan",
-    knob="pitches a raster scan",
+    knob="pitches per raster scan",
     amount="pitches off at the frame's time",
     values=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0),
     runs={

@@ -21,7 +21,7 @@ def by(labeller: Labeller) -> list[dict[str, Any]]:
 
 
 METHODS = (*(method for labeller in reversed(LABELLERS.values()) for method in by(labeller)), {"report": "cells"})
-"""Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds a zone."""
+"""Barycenters divided on the board are none: they cost more LUT4 and save a few microseconds per zone."""
 
 PITCHES_MM = (5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
 
