@@ -9,7 +9,21 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from contactfpga import __version__
-from contactfpga.commands import arm, board, build, chart, cover, doctor, failures, fit, flash, latency, replay, wire, zones
+from contactfpga.commands import (
+    arm,
+    board,
+    build,
+    chart,
+    cover,
+    doctor,
+    failures,
+    fit,
+    flash,
+    latency,
+    replay,
+    wire,
+    zones,
+)
 from contactfpga.console import interrupt
 from contactfpga.errors import MissingExtra
 

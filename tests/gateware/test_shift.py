@@ -92,7 +92,8 @@ def run(bench, skin, cells, sheet=None, requests=(), stuck=lambda cycle: 0, dist
         driven.append([row for row in range(skin.rows) if (sheet.row_levels ^ idle) >> row & 1])
         return level
 
-    sim.drive(getattr(dut.pins, sheet.drives), levels, Cat(ports))
+    (drives,) = sheet.drives
+    sim.drive(getattr(dut.pins, drives), levels, Cat(ports))
     sim.drive(dut.request, lambda cycle: int(cycle in requests))
     sim.drive(dut.heard, lambda cycle: 5 * any(at < cycle for at in requests))
     rows = sim.sink(dut.rows)

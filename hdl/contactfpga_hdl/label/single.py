@@ -1,6 +1,6 @@
 """All pressed cells are one zone: the smallest labeller, enough where there is never more than one contact."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin

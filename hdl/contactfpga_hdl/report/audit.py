@@ -132,7 +132,8 @@ class Bitmap(wiring.Component):
 class _Counts(wiring.Component):
     """What a frame's rows say of it, and whether its zones explain all of its cells.
 
-    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to. ``ends`` is the clock of the end mark.
+    Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to.
+    ``ends`` is the clock of the end mark.
     ``changed`` is captured in it, ``cells`` and ``mismatch`` as soon as the last row is counted as well; all hold until
     the next frame's.
     """

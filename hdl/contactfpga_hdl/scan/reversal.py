@@ -6,7 +6,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import HEARD_BITS, TIME_BITS, Derived
+from contactfpga.skin.derived import TIME_BITS, Derived
 from contactfpga_hdl.payloads import row_bits
 from contactfpga_hdl.scan.pins import DirectColumns
 from contactfpga_hdl.scan.ports import scan_ports
@@ -50,9 +50,9 @@ class _Turn:
 class ReversalScanner(wiring.Component):
     """Line reversal: the board *listens*, columns driven and rows let go, and then drives the rows that read touched.
 
-    Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock it is
-    driven; the row is offered three clocks later. The next row is not driven before this one is taken, and the next
-    frame does not begin before this one is packed.
+    Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
+    which it is driven; the row is offered three clocks later. The next row is not driven before this one is taken, and
+    the next frame does not begin before this one is packed.
 
     rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
     untouched sheet has one empty row. With ``report = "cells"`` all rows.

@@ -233,7 +233,8 @@ def check_timing(skin: Skin) -> None:
         )
     if skin.send == "on_change" and (derived.keep_alive_turns if derived.scan.waits else derived.keep_alive_frames) < 1:
         raise SkinError(
-            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes {derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
+            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes up to "
+            f"{derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
             + (", and at least 4 ms are needed" if derived.scan.waits else "")
         )
     if not derived.debounced:

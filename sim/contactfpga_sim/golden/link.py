@@ -19,7 +19,8 @@ class Link:
         self._byte_clocks = 10 * facts.bit_clocks
         self._hellos: list[int] = []
         self._blank: list[tuple[int, int, int]] = []
-        """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, frames sent then."""
+        """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, how many frames
+        had been sent."""
         self._frame: tuple[int, bytes] | None = None
         self._idle_from = 0
         self._uart_from = 0

@@ -67,7 +67,7 @@ class Stages:
         self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
-        """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced. The scan waits for no row."""
+        """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
         work = label.labelling(cells, self._facts.skin.connectivity, self._facts.skin.labeller)
         handed = []
         for row, offered in enumerate(one.offered):

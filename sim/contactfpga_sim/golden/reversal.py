@@ -134,7 +134,8 @@ class Scanner:
         return np.zeros(self._facts.columns, bool)
 
     def _hold(self, begun: int) -> np.ndarray:
-        """Columns that read pressed as a frame begins, or did since the last retry; from then on they are not driven."""
+        """Columns that read pressed as a frame begins, or did since the last retry: from then on they are not
+        driven."""
         _, stuck = self._timeline.at(begun - 2)
         now = np.zeros(self._facts.columns, bool) if stuck is None else np.asarray(stuck, bool)
         retry = RETRY_US * self._facts.clocks_per_us

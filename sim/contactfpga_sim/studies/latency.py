@@ -135,7 +135,8 @@ class _Bench:
                 return one.last + 10 * self._derived.bit_clocks - start, pin - start, one
 
     def moving(self, contacts: list[np.ndarray], size: int) -> float:
-        """Frames received per second while the contact moves by one place twice in the time that a frame's bits take."""
+        """Frames received per second while the contact moves by one place, twice in the time that a frame's bits
+        take."""
         hold = max(1, size * 10 * self._derived.bit_clocks // 2)
         clocks = max(MOVING_FRAMES * 2 * hold, MOVING_FRAMES // 4 * self._scan)
         self._drop()
