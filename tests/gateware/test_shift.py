@@ -389,4 +389,4 @@ def test_the_compiled_board_with_registers_is_the_golden_models_in_every_clock(r
 def test_the_sheets_pins_are_those_of_the_gateware():
     for skin in (skin_of(), skin_of((5, 2), (5, 3))):
         assert ROW_PINS[skin.row_drive] == tuple(row_pins(skin))
-        assert (*COLUMN_PINS[skin.column_read], Sheet(skin).drives) == tuple(column_pins(skin))
+        assert (*COLUMN_PINS[skin.column_read], *Sheet(skin).drives) == tuple(column_pins(skin))

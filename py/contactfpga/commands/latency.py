@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
 
     skin = Skin.load(args.skin) if args.skin else Skin()
     with pool.progress() as step:
-        found = latency.measure(skin, *args.cells, touches=args.touches, step=step)
+        found = latency.measure(skin, args.cells, args.touches, step)
     if args.json:
         print(json.dumps(dataclasses.asdict(found)))
         return 0

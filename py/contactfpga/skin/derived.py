@@ -189,9 +189,10 @@ class Derived(Widths):
     def keep_alive_turns(self) -> int:
         """Turns of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the time
         is for that frame."""
-        turn = 2**KEEP_ALIVE_BIT * self.clocks_per_us
+        turn: int = 2**KEEP_ALIVE_BIT * self.clocks_per_us
         frame = 1 + math.ceil(2 * self.frame_clocks / turn)
-        return math.floor(self.skin.keep_alive_ms * 1000 * self.clocks_per_us / turn + 1e-9) - frame
+        kept = self.skin.keep_alive_ms * 1000 * self.clocks_per_us
+        return math.floor(kept / turn + 1e-9) - frame
 
     @property
     def hello_frames(self) -> int:

@@ -68,24 +68,23 @@ def places(skin: Skin, height: int, width: int) -> list[np.ndarray]:
 
 def measure(
     skin: Skin,
-    height: int = 3,
-    width: int = 3,
+    cells: tuple[int, int] = (3, 3),
     touches: int | None = None,
     step: Callable[[str, int], None] = lambda name, of: None,
 ) -> Latency:
-    """A contact of height x width cells at every place, or at ``touches`` of them; each comes when the sheet has been
-    reported untouched, at instants spread evenly over a scan. Touches that meet a hello or a keep-alive on the wire are
-    repeated. ``step`` is called after each, with "touches" and how
-    many there are.
+    """A contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
+
+    Each comes when the sheet has been reported untouched, at instants spread evenly over a scan. Touches that meet a
+    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with "touches" and how many there are.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """
-    contacts = places(skin, height, width)
+    contacts = places(skin, *cells)
     chosen = contacts if touches is None else [contacts[i * len(contacts) // touches] for i in range(touches)]
     with _Bench(skin) as bench:
         found = []
-        for number, cells in enumerate(chosen):
-            found.append(bench.touch(cells, number * GOLDEN % 1))
+        for number, contact in enumerate(chosen):
+            found.append(bench.touch(contact, number * GOLDEN % 1))
             step("touches", len(chosen))
         size = max(one.size for _, _, one in found)
         rate = bench.moving(contacts, size)
