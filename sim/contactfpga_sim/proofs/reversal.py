@@ -19,8 +19,6 @@ from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.streams import offers_stay
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
-PACKED = 6
-"""In time means: a frame is packed so many clocks after its last row was taken, at most."""
 
 
 def skin_of(rows: int, columns: int, **changes: Any) -> Skin:
@@ -59,10 +57,17 @@ class Sheet:
         self.undriven_selected = level & ~dut.pins.rows_drive
         self.pressed = ~self.columns if skin.selects_low else self.columns
         self.read = ~self.rows if not skin.selects_low else self.rows  # rows that read touched
-        touched = proof.before(proof.before(self.read))
+        self.read_1 = proof.before(self.read)
+        self.read_2 = proof.before(self.read_1)
+        released = released_levels(skin, skin.columns)
+        columns_1 = proof.before(self.columns, init=released)
+        columns_2 = proof.before(columns_1, init=released)
+        self.columns_before = columns_1, columns_2
+        self.pressed_1 = ~columns_1 if skin.selects_low else columns_1
+        self.pressed_2 = ~columns_2 if skin.selects_low else columns_2
         counts = sum(1 << row for row in range(skin.rows) if present(skin, row))
         self.wanted = Signal(skin.rows)
-        m.d.comb += self.wanted.eq(touched & counts | busy)
+        m.d.comb += self.wanted.eq(self.read_2 & counts | busy)
         self.state, self.clock = self.inside["turn_state"], self.inside["clock"]
         self.begins = self.inside["begins"]
 
@@ -115,6 +120,14 @@ def _clock_lemmas(sheet: Sheet) -> None:
     proof.lemma((due != 1) | (clock == 0))
     proof.lemma((due != 2) | (clock == min(1, charge - 1)) & (state == CHARGE) | (clock == 1) & (state == LISTEN))
     proof.lemma(~inside["rests"] | (state == LISTEN) & (clock == settled))
+
+
+def synchronizer_lemmas(sheet: Sheet) -> None:
+    """What is in the synchronizers of columns and rows."""
+    inside, flip = sheet.inside, 0 if sheet.skin.selects_low else -1
+    for stage, seen in enumerate((sheet.read_1, sheet.read_2)):
+        sheet.proof.lemma(inside[f"rows.stage{stage}"] == (seen ^ flip)[: sheet.skin.rows])
+        sheet.proof.lemma(inside[f"reader.sync.stage{stage}"] == sheet.columns_before[stage])
 
 
 _PIN_BUGS = (

@@ -6,14 +6,12 @@ from typing import Any
 
 from amaranth.hdl import Const, Mux, Signal, Value
 
-from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.stuck import present
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.precharge import level_lemmas
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of
+from contactfpga_sim.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
 from contactfpga_sim.proofs.streams import offers_stay
 
 Say = Callable[[Value], None]
@@ -32,11 +30,9 @@ class Frames:
         before = proof.before(sheet.selected)
         self.ended = Signal()  # a row was selected in the clock before, and is no more
         m.d.comb += self.ended.eq((before != 0) & (sheet.selected == 0))
-        released = released_levels(skin, skin.columns)
-        at_pins = proof.before(sheet.columns, init=released)
         self.sample, self.sampled = Signal(skin.columns), Signal(skin.rows)
         with m.If(self.ended):
-            m.d.sync += [self.sample.eq(~at_pins if skin.selects_low else at_pins), self.sampled.eq(before)]
+            m.d.sync += [self.sample.eq(sheet.pressed_1), self.sampled.eq(before)]
         self.taken = dut.rows.valid & dut.rows.ready
         self.lowest = (self.left & -self.left)[: skin.rows]
         with m.If(self.taken & dut.rows.payload.last):
@@ -92,6 +88,13 @@ def keep_frames(sheet: Sheet, spec: Frames) -> None:
     _frame_lemmas(sheet, spec)
 
 
+def waits_to_be_taken(sheet: Sheet) -> Value:
+    """A row that was selected was sampled and is not taken."""
+    if sheet.dut.derived.skips:
+        return sheet.dut.rows.valid & sheet.dut.alone
+    return sheet.inside["driven"]
+
+
 def _say(sheet: Sheet, spec: Frames, say: Say) -> None:
     _say_of_frames(sheet, spec, say)
     if sheet.dut.derived.skips:
@@ -143,13 +146,9 @@ def _frame_lemmas(sheet: Sheet, spec: Frames) -> None:
     pin_lemmas(sheet)
     selects = state == SELECT
     fresh = selects & (clock <= 1)  # the row is still to be struck off
-    unread = inside["driven"] if not dut.derived.skips else valid & dut.alone
+    unread = waits_to_be_taken(sheet)
     open_row = selects & ~fresh | (due != 0) | unread
-    level_lemmas(proof, inside, sheet.columns, released_levels(skin, skin.columns))
-    touched = [sheet.read, proof.before(sheet.read)]
-    stages = [inside["rows.stage0"], inside["rows.stage1"]]
-    for stage, seen in zip(stages, [proof.before(touched[0]), proof.before(touched[1])]):
-        proof.lemma((stage if skin.selects_low else ~stage) == seen)
+    synchronizer_lemmas(sheet)
     proof.lemma(y < skin.rows)
     proof.lemma(spec.left == todo | Mux(open_row, row, 0))
     proof.lemma(spec.underway == ((state != LISTEN) | (due != 0) | valid))
@@ -168,9 +167,7 @@ def _frame_lemmas(sheet: Sheet, spec: Frames) -> None:
         proof.lemma(~spec.ended)
     with proof.m.If((due == 2) | unread):
         proof.lemma(spec.sampled == row)
-    with proof.m.If(due == 2):
-        second = proof.before(proof.before(sheet.pressed))
-        proof.lemma(spec.sample == second)
+    proof.lemma((due != 2) | (spec.sample == sheet.pressed_2))
     proof.lemma((due == 0) | ~valid)
     if dut.derived.skips:
         _driven_rows_lemmas(sheet, spec, row, above)
