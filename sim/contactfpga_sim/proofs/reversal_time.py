@@ -9,6 +9,7 @@ from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
 from contactfpga_sim.proofs.reversal_frames import Frames, keep_frames
@@ -45,7 +46,7 @@ def next_frame(proof: Proof, **changes: Any) -> None:
 
     Claimed: the frame after one with n rows, n > 0, begins ``Prompt.frame(n)`` clocks after it at the latest. When
     nothing was touched, and a row reads touched, a frame that includes what the pins read then begins
-    ``2 + project`` clocks later at the latest, or 3 after another frame was packed.
+    ``2 + project`` clocks later at the latest, or, if another was under way or began before, ``3 + PACKED``.
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
@@ -59,58 +60,84 @@ def next_frame(proof: Proof, **changes: Any) -> None:
     with m.Elif(since != 0):
         m.d.sync += since.eq(since + 1)
     proof.claim(since <= bound)
-    awake = Signal(range(PACKED + 8 + sheet.dut.derived.project_clocks))
-    with m.If((awake == 0) | sheet.begins & (awake >= 2)):
-        m.d.sync += awake.eq(sheet.inside["rests"] & (sheet.read != 0) & ~(sheet.begins & (awake >= 2)))
+    awake = Signal(range(PACKED + 8 + sheet.dut.derived.project_clocks))  # clocks since a touch that the solver chooses
+    alone = Signal()  # no frame has been under way since
+    with m.If(awake == 0):
+        m.d.sync += alone.eq(1)
+    with m.If(spec.underway | spec.packing | sheet.begins):
+        m.d.sync += alone.eq(0)
+    with m.If(sheet.begins & ((awake >= 2) | sheet.wanted.any())):
+        m.d.sync += awake.eq(0)
+    with m.Elif(awake == 0):
+        m.d.sync += awake.eq(proof.free(1, "this_touch") & sheet.inside["rests"] & sheet.read.any())
     with m.Else():
         m.d.sync += awake.eq(awake + 1)
-    proof.claim(awake <= max(2 + sheet.dut.derived.project_clocks, 3 + PACKED))
+    reach = 2 + sheet.dut.derived.project_clocks
+    proof.claim((awake <= reach) | ~alone & (awake <= 3 + PACKED))
     keep_frames(sheet, spec)
-    _frame_time_lemmas(sheet, spec, prompt, since, bound)
-    _awake_lemmas(sheet, spec, prompt, awake, since)
+    packing = _packing(sheet, spec, prompt)
+    _frame_time_lemmas(sheet, prompt, packing, since, bound)
+    _awake_lemmas(sheet, spec, packing, awake, alone, since)
 
 
-def _frame_time_lemmas(sheet: Sheet, spec: Frames, prompt: Prompt, since, bound) -> None:
-    """What is left of the frame, in each state."""
-    proof, derived, inside = sheet.proof, sheet.dut.derived, sheet.inside
-    state, clock, due, todo = sheet.state, sheet.clock, inside["due"], inside["todo"]
-    handing = Signal(range(8))  # until no row waits
-    packing = Signal(range(PACKED + 8))  # until a frame may begin
-    m = proof.m
+def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
+    """Clocks until a frame may begin, as far as packing goes, once the last row was sampled."""
+    m, due = sheet.proof.m, sheet.inside["due"]
+    packing = Signal(range(PACKED + 8))
     with m.If(due != 0):
-        m.d.comb += [handing.eq(5 - due), packing.eq(PACKED + 4 - due)]
+        m.d.comb += packing.eq(PACKED + 4 - due)
     with m.Elif(sheet.dut.rows.valid):
-        m.d.comb += [handing.eq(1 + inside["follows"]), packing.eq(PACKED + 1)]
+        m.d.comb += packing.eq(PACKED + 1)
     with m.Elif(spec.packing):
         m.d.comb += packing.eq(PACKED - prompt.waited)
-    slots = popcount(todo) * prompt.slot
-    select, settled = derived.settle_clocks + 1, derived.project_clocks + 2
-    proof.lemma(prompt.waited < PACKED)
-    proof.lemma(spec.packing | (prompt.waited == 0))
-    proof.lemma((since != 0) | (state == LISTEN))
-    with m.If(since != 0):
-        with m.If(state == CHARGE):
+    sheet.proof.lemma(prompt.waited < PACKED)
+    sheet.proof.lemma(spec.packing | (prompt.waited == 0))
+    return packing
+
+
+def _handing(sheet: Sheet) -> Value:
+    """Clocks until no row waits."""
+    m, due = sheet.proof.m, sheet.inside["due"]
+    handing = Signal(range(8))
+    with m.If(due != 0):
+        m.d.comb += handing.eq(5 - due)
+    with m.Elif(sheet.dut.rows.valid):
+        m.d.comb += handing.eq(1 + sheet.inside["follows"])
+    return handing
+
+
+def _frame_time_lemmas(sheet: Sheet, prompt: Prompt, packing, since, bound) -> None:
+    """What is left of the frame, in each state."""
+    m, proof, derived, inside = sheet.proof.m, sheet.proof, sheet.dut.derived, sheet.inside
+    clock, handing = sheet.clock, _handing(sheet)
+    after = popcount(inside["todo"]) * prompt.slot + prompt.end
+    row = derived.settle_clocks + 1
+    proof.lemma((since != 0) | (sheet.state == LISTEN))
+    left = Signal(range(1 << len(bound)))
+    with m.Switch(sheet.state):
+        with m.Case(CHARGE):
             charge = derived.release_clocks - 3 - clock
-            more = Mux(charge > handing, charge, handing)
-            proof.lemma(since + more + 2 + select + slots - prompt.slot + prompt.end <= bound)
-        with m.Elif(state == GAP):
-            proof.lemma(since + 1 + select + slots - prompt.slot + prompt.end <= bound)
-        with m.Elif(state == SELECT):
-            rest = Mux(clock <= 1, slots - prompt.slot, slots)
-            proof.lemma(since + derived.settle_clocks - clock + 1 + rest + prompt.end <= bound)
-        with m.Else():
-            listens = settled - clock
-            proof.lemma(since + Mux(listens > packing, listens, packing) <= bound)
-            proof.lemma(~inside["rests"])
+            m.d.comb += left.eq(Mux(charge > handing, charge, handing) + 2 + row + after - prompt.slot)
+        with m.Case(GAP):
+            m.d.comb += left.eq(1 + row + after - prompt.slot)
+        with m.Case(SELECT):
+            m.d.comb += left.eq(row - clock + after - Mux(clock <= 1, prompt.slot, 0))
+        with m.Case(LISTEN):
+            listens = derived.project_clocks + 2 - clock
+            m.d.comb += left.eq(Mux(listens > packing, listens, packing))
+    proof.lemma((since == 0) | (since + left <= bound) & ~inside["rests"])
 
 
-def _awake_lemmas(sheet: Sheet, spec: Frames, prompt: Prompt, awake, since) -> None:
-    proof, clock, rests = sheet.proof, sheet.clock, sheet.inside["rests"]
-    project = sheet.dut.derived.project_clocks
+def _awake_lemmas(sheet: Sheet, spec: Frames, packing, awake, alone, since) -> None:
+    proof, rests, project = sheet.proof, sheet.inside["rests"], sheet.dut.derived.project_clocks
     with proof.m.If(awake != 0):
         proof.lemma((sheet.state == LISTEN) & (since == 0))
-        proof.lemma(rests | (awake >= 1))
+        proof.lemma(rests | (awake <= sheet.clock) | (sheet.clock == project + 2))
+        proof.lemma(~(alone & (spec.underway | spec.packing)))
+        proof.lemma((packing == 0) | (awake + packing <= PACKED + 3))
         proof.lemma(~rests | (awake <= 2))
+        proof.lemma((awake != 1) | sheet.read_1.any())
+        proof.lemma((awake != 2) | sheet.read_2.any())
 
 
 def rises(proof: Proof, **changes: Any) -> None:
@@ -126,7 +153,32 @@ def rises(proof: Proof, **changes: Any) -> None:
     keep_frames(sheet, spec)
 
 
+def _wakes(inside: Inside):
+    return inside["rests"] & inside["touched"].any()
+
+
+_NEXT_BUGS = (
+    Bug("rests though something is touched", ReversalScanner, "rests", lambda rests, inside: rests | inside["begins"]),
+    Bug("waits for nothing", ReversalScanner, "waits", lambda waits, inside: waits | inside["touched"].any()),
+    Bug("does not wake", ReversalScanner, "rests", lambda rests, inside: rests | inside["rests"]),
+    Bug("listens anew when it wakes", ReversalScanner, "clock", lambda clock, inside: Mux(_wakes(inside), 0, clock)),
+    Bug("driven for a clock more", ReversalScanner, "clock",
+        lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
+)  # fmt: skip
+_CONTACT_BUGS = (
+    Bug("with the row", ReversalScanner, "contact",
+        lambda contact, inside: Mux(inside["strobe"] | inside["contact"], contact, 0)),
+    Bug("for one clock", ReversalScanner, "contact", lambda contact, inside: contact & ~inside["contact"]),
+    Bug("of row 0 alone", ReversalScanner, "clean", lambda _, inside: inside["touched"][0]),
+)  # fmt: skip
+_SHORT = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
+_LONG = {"settle_us": 6, "precharge_us": 9, "project_us": 12}
 CASES = (
-    Case("the next frame in time", "3x2", partial(next_frame, rows=3, columns=2), 2, (), 40),
-    Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, (), 12),
-)
+    Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **_SHORT), 2, _NEXT_BUGS, 32),
+    Case("the next frame in time", "3x2, debounced",
+         partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
+    Case("the next frame in time", "8x2, long times", partial(next_frame, rows=8, columns=2, **_LONG), 2),
+    Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
+    Case("contact in three clocks", "3x2, shortest times, row2col",
+         partial(rises, rows=3, columns=2, diodes="row2col", **_SHORT), 3),
+)  # fmt: skip
