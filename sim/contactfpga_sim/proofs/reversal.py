@@ -3,20 +3,17 @@
 from functools import partial
 from typing import Any
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_hdl.util.popcount import popcount
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.precharge import apart, level_lemmas
+from contactfpga_sim.proofs.precharge import apart
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.streams import offers_stay
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
 

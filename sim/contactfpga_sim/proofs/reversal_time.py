@@ -11,7 +11,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
+from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, SELECT, Sheet, skin_of
 from contactfpga_sim.proofs.reversal_frames import Frames, keep_frames
 
 PACKED = 6
@@ -56,7 +56,10 @@ def next_frame(proof: Proof, **changes: Any) -> None:
     since, bound = Signal(range(longest + 2)), Signal(range(longest + 1))  # 0: no frame with a row was the last one
     with m.If(sheet.begins):
         count = popcount(sheet.wanted)
-        m.d.sync += [since.eq(sheet.wanted.any()), bound.eq(Mux(sheet.wanted.any(), prompt.frame(count), 0)[: len(bound)])]
+        m.d.sync += [
+            since.eq(sheet.wanted.any()),
+            bound.eq(Mux(sheet.wanted.any(), prompt.frame(count), 0)[: len(bound)]),
+        ]
     with m.Elif(since != 0):
         m.d.sync += since.eq(since + 1)
     proof.claim(since <= bound)
@@ -171,13 +174,14 @@ _CONTACT_BUGS = (
     Bug("for one clock", ReversalScanner, "contact", lambda contact, inside: contact & ~inside["contact"]),
     Bug("of row 0 alone", ReversalScanner, "clean", lambda _, inside: inside["touched"][0]),
 )  # fmt: skip
-_SHORT = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
-_LONG = {"settle_us": 6, "precharge_us": 9, "project_us": 12}
+_SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
+_LONG: dict[str, Any] = {"settle_us": 6, "precharge_us": 9, "project_us": 12}
 CASES = (
     Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **_SHORT), 2, _NEXT_BUGS, 32),
     Case("the next frame in time", "3x2, debounced",
          partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
-    Case("the next frame in time", "8x2, long times", partial(next_frame, rows=8, columns=2, **_LONG), 2),
+    Case("the next frame in time", "8x2, long times",
+         partial(next_frame, rows=8, columns=2, **_LONG), 2, campaign=True),
     Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     Case("contact in three clocks", "3x2, shortest times, row2col",
          partial(rises, rows=3, columns=2, diodes="row2col", **_SHORT), 3),
