@@ -16,6 +16,8 @@ from contactfpga_sim.proofs.precharge import apart
 from contactfpga_sim.proofs.proof import Proof
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
+SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
+LONG: dict[str, Any] = {"settle_us": 6, "precharge_us": 9, "project_us": 12}
 
 
 def skin_of(rows: int, columns: int, **changes: Any) -> Skin:
@@ -127,6 +129,65 @@ def synchronizer_lemmas(sheet: Sheet) -> None:
         sheet.proof.lemma(inside[f"reader.sync.stage{stage}"] == sheet.columns_before[stage])
 
 
+def lasts(proof: Proof, **changes: Any) -> None:
+    """Free: the sheet, and what the stages after do in each clock. Assumed: column 0 reads released where it is driven.
+
+    Claimed: a row is selected for the settle time; before that column 0 was driven for the precharge time, or for
+    ``project + 4`` clocks if that is less; where rows count, it had been driven, with rows let go, for the projection
+    time.
+    """
+    m, sheet = proof.m, Sheet(proof, skin_of(**changes))
+    derived, driven = sheet.dut.derived, sheet.dut.pins.columns_drive[0]
+    proof.given(~(driven & sheet.pressed[0]))
+    selects, let_go = sheet.selected.any(), sheet.dut.pins.rows_drive == 0
+    selected = Signal(range(derived.settle_clocks + 2))
+    m.d.sync += selected.eq(Mux(selects, selected + 1, 0))
+    charged, projected = Signal(range(derived.precharge_clocks + 1)), Signal(range(derived.project_clocks + 1))
+    m.d.sync += charged.eq(Mux(selects, 0, _more(charged, driven, derived.precharge_clocks)))
+    m.d.sync += projected.eq(Mux(driven & let_go, _more(projected, 1, derived.project_clocks), 0))
+    proof.claim((selected == 0) | (selects == (selected != derived.settle_clocks)))
+    proof.claim(~selects | (selected != 0) | _reached(charged, derived.precharge_clocks, derived.project_clocks + 4))
+    projected_1 = proof.before(projected)
+    proof.claim(~sheet.begins | (projected_1 == derived.project_clocks))
+    pin_lemmas(sheet)
+    synchronizer_lemmas(sheet)
+    _lasts_lemmas(sheet, selected, charged, projected, projected_1)
+
+
+def _more(count: Signal, one, most: int):
+    return Mux((count != most) & one, count + 1, count)
+
+
+def _reached(count, *least):
+    """All of them, or the least."""
+    return sum((count >= one for one in least), Const(0)) != 0
+
+
+def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> None:
+    proof, state, clock, derived = sheet.proof, sheet.state, sheet.clock, sheet.dut.derived
+    before, precharge, project = proof.before(state, init=LISTEN), derived.precharge_clocks, derived.project_clocks
+    proof.lemma(sheet.inside["precharge.free"][0])
+    proof.lemma(sheet.dut.pins.columns_drive[0] == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
+    proof.lemma((charged <= precharge) & (projected <= project))
+    proof.lemma(
+        (sheet.inside["y"] < sheet.skin.rows) & ((state == LISTEN) | (state == SELECT) | sheet.inside["todo"].any())
+    )
+    now = Mux(state == SELECT, Mux(clock == 0, 0, clock - 1), Mux(sheet.inside["due"] == 1, derived.settle_clocks, 0))
+    proof.lemma(selected == now)
+    with proof.m.If(state == LISTEN):
+        proof.lemma((clock < 2) | ~sheet.pressed_1[0])
+        proof.lemma((clock < 3) | ~sheet.pressed_2[0])
+        proof.lemma((clock == 0) | _reached(charged, precharge, clock - 1))
+        proof.lemma((clock == 0) | _reached(projected, project, clock - 1))
+        proof.lemma((clock < 2) | _reached(projected_1, project, clock - 2))
+    with proof.m.If(state == CHARGE):
+        proof.lemma((clock == 0) | _reached(charged, precharge, clock - 1, project + 2))
+    with proof.m.If(state == GAP):
+        proof.lemma(_reached(charged, precharge, derived.release_clocks - 3, project + 3))
+    with proof.m.If((state == SELECT) & (clock <= 1)):
+        proof.lemma(_reached(charged, precharge, project + 4))
+
+
 _PIN_BUGS = (
     Bug("driven while a row is selected", Precharge, "pins", lambda _, inside: inside["free"]),
     Bug("no gap before a row", ReversalScanner, "charges",
@@ -137,9 +198,24 @@ _PIN_BUGS = (
     Bug("two rows at once", ReversalScanner, "selected", lambda rows, _: rows | rows << 1),
     Bug("let go while selected", ReversalScanner, "listens", lambda listens, inside: inside["todo"] == 0),
 )  # fmt: skip
+_LASTS_BUGS = (
+    Bug("driven for a clock more", ReversalScanner, "clock",
+        lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
+    Bug("a short precharge", ReversalScanner, "clock",
+        lambda clock, inside: Mux(inside["due"][0], inside.component.derived.release_clocks - 3, clock)),
+    Bug("rows are read too early", ReversalScanner, "settled",
+        lambda _, inside: inside["clock"] == inside.component.derived.project_clocks + 1),
+    Bug("rows are let go too late", ReversalScanner, "listens",
+        lambda listens, inside: listens & (inside["clock"] != 0)),
+)  # fmt: skip
 CASES = (
     Case("pins never meet", "3x2, col2row", partial(pins, rows=3, columns=2, diodes="col2row"), 2, _PIN_BUGS, 16),
     Case("pins never meet", "3x2, row2col", partial(pins, rows=3, columns=2, diodes="row2col"), 2),
     Case("pins never meet", "2x1, shortest times",
-         partial(pins, rows=2, columns=1, settle_us=1, release_us=1, precharge_us=1, project_us=1), 2),
+         partial(pins, rows=2, columns=1, **SHORT), 2),
+    Case("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
+    Case("times of a line reversal", "3x2, shortest times, row2col",
+         partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
+    Case("times of a line reversal", "3x2, long release",
+         partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),
 )  # fmt: skip

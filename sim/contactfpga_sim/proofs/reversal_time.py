@@ -11,7 +11,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, SELECT, Sheet, skin_of
+from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of
 from contactfpga_sim.proofs.reversal_frames import Frames, keep_frames
 
 PACKED = 6
@@ -174,15 +174,13 @@ _CONTACT_BUGS = (
     Bug("for one clock", ReversalScanner, "contact", lambda contact, inside: contact & ~inside["contact"]),
     Bug("of row 0 alone", ReversalScanner, "clean", lambda _, inside: inside["touched"][0]),
 )  # fmt: skip
-_SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
-_LONG: dict[str, Any] = {"settle_us": 6, "precharge_us": 9, "project_us": 12}
 CASES = (
-    Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **_SHORT), 2, _NEXT_BUGS, 32),
+    Case("the next frame in time", "2x2", partial(next_frame, rows=2, columns=2, **SHORT), 2, _NEXT_BUGS, 32),
     Case("the next frame in time", "3x2, debounced",
          partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
     Case("the next frame in time", "8x2, long times",
-         partial(next_frame, rows=8, columns=2, **_LONG), 2, campaign=True),
+         partial(next_frame, rows=8, columns=2, **LONG), 2, campaign=True),
     Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     Case("contact in three clocks", "3x2, shortest times, row2col",
-         partial(rises, rows=3, columns=2, diodes="row2col", **_SHORT), 3),
+         partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
 )  # fmt: skip
