@@ -169,7 +169,7 @@ class Conversation:
             self.sheet = self._widths = None
             return SkinMismatch(f"{self.port} was built from {difference(hello, expected)}")
         self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
-        self._requests.take_hello(hello.heard)
+        self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud
         if self.sheet != hello.sheet:

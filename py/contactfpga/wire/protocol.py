@@ -24,6 +24,7 @@ from contactfpga.wire.framing import (
     digits,
     kind_of,
     last_byte,
+    pulses,
     seal,
     unseal,
 )
@@ -88,11 +89,13 @@ REQUEST_HELLO = 1
 """Flag of a request that asks for a hello as well."""
 
 
-def encode_request(number: int, hello: bool = False) -> bytes:
-    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end."""
+def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> bytes:
+    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end;
+    ``pulsed``: as :func:`~contactfpga.wire.framing.pulses`."""
     assert may_number(number), f"{number} is no number of a request"
     plain = digits(number, HEARD_DIGITS) + bytes([last_byte(KIND_REQUEST, REQUEST_HELLO * hello)])
-    return bytes([DELIMITER]) + seal(plain)
+    data = bytes([DELIMITER]) + seal(plain)
+    return pulses(data) if pulsed else data
 
 
 def may_number(number: int) -> bool:
