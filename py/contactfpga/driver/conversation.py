@@ -10,17 +10,20 @@ import dataclasses
 import math
 import random
 
+import numpy as np
+
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
-from contactfpga.driver.timeline import MOST_S, Timeline
+from contactfpga.driver.timeline import MOST_S, Timeline, continues
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
-from contactfpga.wire import framing, protocol
+from contactfpga.wire import framing, many, protocol
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
+from contactfpga.zones.run import Run, frame_of
 from contactfpga.zones.zone import Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
@@ -36,6 +39,9 @@ class Arrival:
 
 
 Event = Arrival | Hello | SkinMismatch | VersionMismatch
+
+FEW, FEW_IN_RUN = 24, 8
+"""Fewer packets are decoded, and fewer frames taken, faster one by one."""
 
 
 class Conversation:
@@ -81,18 +87,62 @@ class Conversation:
     def receive(self, data: bytes, now: float) -> list[Event]:
         """What ``data`` completes, in order. ``now`` is the time of its arrival in seconds; call it every now and then
         also when nothing came, as then a request may have to be sent again."""
+        packets = self._split(data, now)
+        events = [event for packet in packets if (event := self._packet(packet, now)) is not None]
+        self._end(now)
+        return events
+
+    def receive_runs(self, data: bytes, now: float) -> list[Event | Run]:
+        """The same, but most of many frames come in runs: those that answer no request that none before them does."""
+        packets = self._split(data, now)
+        events: list[Event | Run] = []
+        at = 0
+        while at < len(packets):
+            at += self._take_some(packets[at:], now, events)
+        self._end(now)
+        return events
+
+    def _split(self, data: bytes, now: float) -> list[bytes]:
         self.stats.bytes += len(data)
         self._notice(now)
         *packets, self._rest = (self._rest + data).split(b"\0")
-        events = []
-        for packet in packets:
-            if packet and (event := self._packet(packet, now)) is not None:
-                events.append(event)
+        return [packet for packet in packets if packet]
+
+    def _end(self, now: float) -> None:
         if len(self._rest) > LONGEST_PACKET:
             self._refuse("noise")
             self._rest = b""
         self._requests.poll(now, hello=not self._timeline.known)
-        return events
+
+    def _take_some(self, packets: list[bytes], now: float, events: list[Event | Run]) -> int:
+        """Take packets until the sheet changes, at least one; how many.
+
+        A frame is decoded by itself where it is not known to continue the one before, and so decides what the next
+        ones mean.
+        """
+        before, widths = self._before(), self._widths
+        table, ends = None, [0] * (len(packets) + 1)
+        if len(packets) >= FEW and widths is not None and widths.report.zones and not widths.sheet.ghosts:
+            table = many.decode(packets, widths, before)
+            ends = _stretches(continues(table.packets))
+        at = 0
+        while at < len(packets) and self._widths is widths and self._before() == before:
+            event = self._packet(packets[at], now)
+            at += 1
+            if event is not None:
+                events.append(event)
+            if table is not None and isinstance(event, Arrival) and ends[at] - at >= FEW_IN_RUN:
+                events.append(self._take_run(table, at, ends[at], now))
+                at = ends[at]
+        return at
+
+    def _take_run(self, table: many.Table, start: int, end: int, now: float) -> Run:
+        assert self._widths is not None
+        widths = self._widths
+        packets, starts = table.packets[start:end], table.starts[start : end + 1]
+        last = frame_of(packets[-1].item(), table.records[starts[-2] : starts[-1]], widths.sheet)
+        times_us = self._timeline.take_run(packets, widths, last)
+        return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None)
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
@@ -135,7 +185,7 @@ class Conversation:
         if self.hello is None and framing.unreadable(packet):
             self.stats.before_hello += 1
             return None
-        plain = framing.unseal(packet, protocol.check_prefix(self.hello) if self.hello else b"")
+        plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
             hello = self._reader.take(plain)
@@ -147,6 +197,9 @@ class Conversation:
             self.stats.foreign_skin += 1
             return None
         return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, now)
+
+    def _before(self) -> bytes:
+        return protocol.check_prefix(self.hello) if self.hello else b""
 
     def _take_frame(self, frame: Frame, widths: Widths, now: float) -> Arrival | None:
         before = self._timeline.before
@@ -181,3 +234,10 @@ class Conversation:
             f"{self.port} now has {describe(hello)}, before it was {describe(before)}: another bitstream was "
             "loaded; frames from here on are of the new Skin"
         )
+
+
+def _stretches(found: np.ndarray) -> list[int]:
+    """For each place, and the one after the last, where the stretch of True ends that it is in, or it itself."""
+    places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
+    ends: list[int] = np.minimum.accumulate(places[::-1])[::-1].tolist()
+    return ends
