@@ -40,7 +40,7 @@ class Arrival:
 
 Event = Arrival | Hello | SkinMismatch | VersionMismatch
 
-FEW, FEW_IN_RUN = 24, 8
+FEW, FEW_IN_RUN = 16, 8
 """Fewer packets are decoded, and fewer frames taken, faster one by one."""
 
 
@@ -121,27 +121,40 @@ class Conversation:
         ones mean.
         """
         before, widths = self._before(), self._widths
-        table, ends = None, [0] * (len(packets) + 1)
+        table, ends, follows = None, [0], False
         if len(packets) >= FEW and widths is not None and widths.report.zones and not widths.sheet.ghosts:
             table = many.decode(packets, widths, before)
-            ends = _stretches(continues(table.packets))
+            ends, follows = self._stretches(table.packets, now)
         at = 0
         while at < len(packets) and self._widths is widths and self._before() == before:
+            if follows and table is not None and ends[at] - at >= FEW_IN_RUN:
+                events.append(self._take_run(table, at, ends[at], now))
+                at, follows = ends[at], False
+                continue
             event = self._packet(packets[at], now)
-            at += 1
+            at, follows = at + 1, isinstance(event, Arrival)
             if event is not None:
                 events.append(event)
-            if table is not None and isinstance(event, Arrival) and ends[at] - at >= FEW_IN_RUN:
-                events.append(self._take_run(table, at, ends[at], now))
-                at = ends[at]
         return at
+
+    def _stretches(self, packets: np.ndarray, now: float) -> tuple[list[int], bool]:
+        """For each place, and the one after the last, where the stretch ends in which each frame continues the one
+        before, and whether the first one is expected."""
+        found = continues(packets)
+        _, time_us, _, heard, *_ = packets[0].item()
+        expected = bool(packets["valid"][0]) and self._timeline.expects(heard, time_us, now)
+        found[0] = expected
+        places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
+        return np.minimum.accumulate(places[::-1])[::-1].tolist(), expected
 
     def _take_run(self, table: many.Table, start: int, end: int, now: float) -> Run:
         assert self._widths is not None
         widths = self._widths
         packets, starts = table.packets[start:end], table.starts[start : end + 1]
         last = frame_of(packets[-1].item(), table.records[starts[-2] : starts[-1]], widths.sheet)
-        times_us = self._timeline.take_run(packets, widths, last)
+        times_us = self._timeline.take_run(packets, widths, last, now)
+        self._requests.take_frame(last.heard, now)  # all of them carry the same
+        self._passed()
         return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None)
 
     def _notice(self, now: float) -> None:
@@ -158,11 +171,15 @@ class Conversation:
         except PacketError as error:
             self._refuse(error.reason)
             return None
+        self._passed()
+        return event
+
+    def _passed(self) -> None:
+        """A valid packet came."""
         self._begun = True
         if self._damage:
             self._damage = False
             self.stats.resynchronised += 1
-        return event
 
     def _refuse(self, reason: str) -> None:
         if self._begun:
@@ -234,10 +251,3 @@ class Conversation:
             f"{self.port} now has {describe(hello)}, before it was {describe(before)}: another bitstream was "
             "loaded; frames from here on are of the new Skin"
         )
-
-
-def _stretches(found: np.ndarray) -> list[int]:
-    """For each place, and the one after the last, where the stretch of True ends that it is in, or it itself."""
-    places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
-    ends: list[int] = np.minimum.accumulate(places[::-1])[::-1].tolist()
-    return ends

@@ -97,16 +97,23 @@ class Timeline:
         self._now, self.before = now, frame
         return time_us
 
-    def take_run(self, packets: np.ndarray, widths: Widths, last: Frame) -> np.ndarray:
-        """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before,
-        and the first from the one explained last.
+    def expects(self, heard: int, time_us: int, now: float) -> bool:
+        """Whether a frame that carries these continues the one explained last."""
+        if self.before is None or self._time_us is None or not self._known:
+            return False
+        soon = not self._live or now - self._now <= self._patience_s
+        return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
+
+    def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
+        """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
+        the first one is expected, or the one before it was explained.
 
         ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: the last one of them.
         """
         assert self.before is not None
         assert self._time_us is not None
         before = self.before
-        lost = int(((_steps(packets["sequence"], before.sequence, _SEQUENCES) - 1) % _SEQUENCES).sum())
+        lost = int((_steps(packets["sequence"], before.sequence, _SEQUENCES) - 1 & _SEQUENCES - 1).sum())
         times_us = self._time_us + np.cumsum(_steps(packets["time_us"], before.time_us, _WRAP_US))
         self._stats.frames += len(packets)
         self._stats.lost += lost
@@ -114,7 +121,7 @@ class Timeline:
         self._stats.overwritten += int(overwritten.sum())
         self._next += lost + len(packets)
         self._time_us = self._last_us = int(times_us[-1])
-        self.before = last
+        self._now, self.before = now, last
         return times_us
 
     def _gap(self, frame: Frame) -> int:
@@ -145,12 +152,14 @@ def continues(packets: np.ndarray) -> np.ndarray:
     """
     valid, heard, time_us = packets["valid"], packets["heard"], packets["time_us"]
     found = np.zeros(len(packets), np.bool_)
-    step_us = np.diff(time_us) % _WRAP_US
+    step_us = time_us[1:] - time_us[:-1] & _WRAP_US - 1
     found[1:] = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
     return found
 
 
 def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
-    """From each value to the next, the first one from ``before``."""
-    steps: np.ndarray = np.diff(values, prepend=before) % modulus
-    return steps
+    """From each value to the next, the first one from ``before``; ``modulus`` is a power of two."""
+    steps = values.copy()
+    steps[1:] -= values[:-1]
+    steps[0] -= before
+    return steps & modulus - 1

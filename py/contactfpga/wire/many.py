@@ -54,9 +54,10 @@ def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> Table:
     The report of the sheet must have zones.
     """
     found = np.zeros(len(packets), FIELDS)
-    lengths = np.fromiter(map(len, packets), np.int64, len(packets))
+    sizes = list(map(len, packets))
+    lengths = np.array(sizes)
     groups = []
-    for length in np.unique(lengths).tolist():
+    for length in set(sizes):
         items, rest = divmod(length - CHECK_BYTES - 1 - widths.trailer_bytes, widths.item_bytes)
         if rest or not 0 <= items <= widths.max_items or length - CHECK_BYTES > _LONGEST:
             continue
@@ -88,35 +89,43 @@ def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple
     fields["flags"] = plain[:, -1] & _FLAG_MASK
     fields["items"] = items
     words = _words(plain[:, :body].reshape(len(data), items, widths.item_bytes))
-    records = np.stack(list(_split(words, widths.record_bits)), axis=-1)
+    records = np.zeros((len(data), items, 3), np.int64)
+    for column, value in enumerate(_split(words, widths.record_bits)):
+        records[..., column] = value
     if widths.report.divided and widths.cells == 1 << widths.record_bits[0]:
         records[..., 0][records[..., 0] == 0] = widths.cells
     valid &= (words >> sum(widths.record_bits) == 0).all(axis=1)
     valid &= _agrees(fields, items, widths)
     valid &= (fields["flags"] & MISMATCH > 0) | _possible(fields, records, widths)
-    fields[~valid] = 0
+    if not valid.all():
+        fields[~valid] = 0
+        records = records[valid]
     fields["valid"] = valid
-    return fields, records[valid]
+    return fields, records
 
 
 def _unstuff(stuffed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Undo COBS where no block is full: the plain bytes, and whether the blocks fit."""
     count, length = stuffed.shape
-    code = np.zeros((count, length), np.bool_)
-    following = np.zeros(count, np.int64)  # place of the next block's code
-    for place in range(length):
-        code[:, place] = following == place
-        following += np.where(code[:, place], stuffed[:, place], 0)
-    plain = np.where(code, 0, stuffed)[:, 1:]
-    return plain, following == length
+    padded = np.zeros((count, length + 2), np.uint8)  # at the two places after the end nothing moves any more
+    padded[:, :length] = stuffed
+    plain = padded[:, 1:length]
+    flat, rows = padded.reshape(-1), np.arange(0, padded.size, length + 2)
+    place = np.zeros(count, np.int64)  # of a block's code
+    while place.min() < length:
+        where = rows + place
+        place = np.minimum(place + flat[where], length + 1)
+        flat[where] = 0
+    return plain, place == length
 
 
 def _checked(data: np.ndarray, before: bytes) -> np.ndarray:
     """Whether the check bytes are right."""
     table, constant = _crc_table(data.shape[1] - CHECK_BYTES), _constant(data.shape[1] - CHECK_BYTES, before)
     crc = np.bitwise_xor.reduce(np.take(table, data[:, :-CHECK_BYTES] + _row_starts(data.shape[1])), axis=1) ^ constant
-    wanted = np.stack([0x80 | crc & 0x7F, 0x80 | crc >> 7 & 0x7F, 0x80 | crc >> 14], axis=1)
-    right: np.ndarray = (data[:, -CHECK_BYTES:] == wanted).all(axis=1)
+    right: np.ndarray = data[:, -1] == 0x80 | crc >> 14
+    right &= data[:, -2] == 0x80 | crc >> 7 & 0x7F
+    right &= data[:, -3] == 0x80 | crc & 0x7F
     return right
 
 
@@ -148,17 +157,17 @@ def _constant(length: int, before: bytes) -> int:
 
 
 def _words(data: np.ndarray) -> np.ndarray:
-    """uint64 of the last axis's bytes, lowest first."""
+    """int64 of the last axis's bytes, lowest first."""
     padded = np.zeros((*data.shape[:-1], 8), np.uint8)
     padded[..., : data.shape[-1]] = data
-    return padded.view("<u8")[..., 0]
+    return padded.view("<i8")[..., 0]
 
 
 def _split(words: np.ndarray, widths: Sequence[int]) -> Iterator[np.ndarray]:
     """Fields of words, lowest first, int64."""
     offset = 0
     for width in widths:
-        yield (words >> offset & (1 << width) - 1).astype(np.int64)
+        yield words >> offset & (1 << width) - 1
         offset += width
 
 
@@ -172,7 +181,7 @@ def _agrees(fields: np.ndarray, items: int, widths: Widths) -> np.ndarray:
 
 def _possible(fields: np.ndarray, records: np.ndarray, widths: Widths) -> np.ndarray:
     """Whether zones and cells can be of one sheet."""
-    area, x, y = np.moveaxis(records, -1, 0)
+    area, x, y = (records[..., column] for column in range(3))
     scale = 1 << widths.sheet.barycenter_bits if widths.report.divided else area
     inside = (x <= (widths.sheet.columns - 1) * scale) & (y <= (widths.sheet.rows - 1) * scale) & (area > 0)
     carried, cells = area.sum(axis=1), fields["cells"]

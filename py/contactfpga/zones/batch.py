@@ -37,7 +37,8 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 
 @dataclasses.dataclass(frozen=True)
 class Batch:
-    """Consecutive frames and all of their zones."""
+    """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
+    ``batch.frames["time_us"]`` one over all frames, in us."""
 
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
