@@ -209,7 +209,9 @@ def test_what_passes_in_a_table_is_what_passes_alone(name, rng):
             continue
         passed += 1
         fields = table.packets[index]
-        assert fields["valid"]
+        assert fields["valid"] == (len(packet) <= 257), "longer ones may hold a full block"
+        if not fields["valid"]:
+            continue
         records = table.records[table.starts[index] : table.starts[index + 1]]
         assert records.tolist() == (frame.moments if frame.barycenters is None else frame.barycenters).tolist()
     assert 300 < passed < 2900
