@@ -1,6 +1,6 @@
 """How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.board.driver_speed`.
 
-A process of its own plays a board with a moving fingertip behind a pseudo-terminal. Rates are per second of this
+A process of its own plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this
 process's processor time, all its threads together, so they do not depend on what else the machine does; the latencies
 do. No figure that a test could hold.
 """
