@@ -138,7 +138,7 @@ def told(zones):
 @pytest.mark.parametrize("live", [True, False])
 def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng):
     in_runs, answered = 0, set()
-    for turn in range(3):
+    for turn in range(2):
         known = 0
         history, stream, now = History(SKINS[name], rng), b"", 0.0
         one_by_one, in_many = (Conversation("x", None, live, random.Random(turn)) for _ in range(2))
@@ -158,8 +158,8 @@ def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng):
             known = check_answers(alone, mixed, known)
             answered.add((turn, known))
             now += rng.choice([0.001, 0.1, 0.1, 9.0])
-    assert (in_runs > 100) == (name in WITH_RUNS)
-    assert len(answered) > 9
+    assert (in_runs > 60) == (name in WITH_RUNS)
+    assert len(answered) > 5
 
 
 def state(host, name):

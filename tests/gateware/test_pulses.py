@@ -170,7 +170,7 @@ def test_no_single_wrong_pulse_makes_another_request(read):
 def test_no_change_within_sixteen_pulses_makes_another_request(read, rng):
     """From each of them on, as many others, more or fewer in their place."""
     symbols = []
-    for start, length in itertools.product(range(len(SYMBOLS)), (2, 3, 7, 16)):
+    for start, length in itertools.product(range(len(SYMBOLS)), (3, 16)):
         other = [rng.choice([ONE, ZERO, MARK]) for _ in range(rng.choice([length, length, rng.randrange(17)]))]
         symbols += [*SYMBOLS[:start], *other, *SYMBOLS[start + length :], ONE, MARK]
     assert set(read(symbols)) <= {SENT}
