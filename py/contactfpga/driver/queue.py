@@ -81,6 +81,7 @@ class FrameQueue:
             self._drop(self._length - 1)
             if error is not None:
                 raise error
+        self._unwrap()  # so that the others do not become Python's numbers with it
 
     def clear(self) -> None:
         """Drop everything."""

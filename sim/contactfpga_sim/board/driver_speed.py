@@ -98,8 +98,8 @@ class Feeder:
                 self.written_s[number] = now_s
             self._write(data)
             place += size
-            due_s += PACE_S
             if self._paced:
+                due_s = max(due_s + PACE_S, now_s)  # what came too late is not made up for
                 time.sleep(max(0.0, due_s - time.monotonic()))
         time.sleep(60.0)  # a port that is closed would take what was not read with it
 
