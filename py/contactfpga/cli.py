@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from contactfpga import __version__
-from contactfpga.commands import arm, board, build, chart, cover, doctor, failures, fit, flash, replay, wire, zones
+from contactfpga.commands import arm, board, build, chart, cover, doctor, failures, fit, flash, replay, settle, wire, zones
 from contactfpga.console import interrupt, terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import told
@@ -42,6 +42,7 @@ COMMANDS: dict[str, Command] = {
     "build": build,
     "flash": flash,
     "replay": replay,
+    "settle": settle,
     "cover": cover,
     "chart": chart,
     "fit": fit,

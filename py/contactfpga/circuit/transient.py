@@ -45,6 +45,16 @@ class _Rates:
     cell_s: np.ndarray
 
 
+def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
+    """The solution of a symmetric system in two halves: beyond some 100 lines a library may call threads for the whole,
+    which takes longer than to compute it."""
+    side = matrix[:count, count:]
+    both = np.linalg.solve(matrix[:count, :count], np.column_stack([side, right[:count]]))
+    across, alone = both[:, :-1], both[:, -1]
+    rest = np.linalg.solve(matrix[count:, count:] - side.T @ across, right[count:] - side.T @ alone)
+    return np.concatenate([alone - across @ rest, rest])
+
+
 class _Driven:
     """A network under a drive."""
 
@@ -86,7 +96,7 @@ class _Driven:
         net = self.network
         matrix, own = self.eliminated(rates, share)
         through = share * net.cell_s
-        moved = np.linalg.solve(matrix, lines + self._gathered(through * cells / own))
+        moved = _solved(matrix, lines + self._gathered(through * cells / own), net.columns)
         return State(moved, (cells + through * (moved[net.column_of] - moved[net.row_of])) / own)
 
     def solved(self, guess: State, share: float, lines: np.ndarray, cells: np.ndarray) -> tuple[State, _Rates] | None:
