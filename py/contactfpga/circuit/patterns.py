@@ -24,6 +24,9 @@ def named(rows: int, columns: int) -> Mapping[str, np.ndarray]:
     found["all but a row"][row] = False
     found["all but a column"][:, column] = False
     found["all but a cell"][row, column] = False
+    found["all, one cell of the row"], found["all, every other cell of the row"] = ~none, ~none
+    found["all, one cell of the row"][row] = np.arange(columns) == column
+    found["all, every other cell of the row"][row] = np.arange(columns) % 2 == column % 2
     found["checker"] = np.indices((rows, columns)).sum(axis=0) % 2 == (row + column) % 2
     return found
 
@@ -33,7 +36,7 @@ def middle(count: int) -> int:
     return count // 2
 
 
-SETTLE = ("one cell", "one row but a cell", "all", "all but a column", "checker")
+SETTLE = ("one row but a cell", "all", "all but a column", "all, one cell of the row", "all, every other cell of the row")
 RELEASE = ("one row", "all")
 PROJECT_ROWS = ("nothing", "one cell", "one column but a cell", "all but a row")
 PROJECT_COLUMNS = ("nothing", "one cell", "all but a column", "all")

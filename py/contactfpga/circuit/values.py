@@ -47,7 +47,7 @@ DIODE_LIMITS = {
     "grading": (0.0, 0.9),
 }
 
-SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 10.0, 0.3, 0.5)
+SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
 """A small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
 SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
 """A small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
