@@ -9,7 +9,21 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from contactfpga import __version__
-from contactfpga.commands import arm, board, build, chart, cover, doctor, failures, fit, flash, replay, settle, wire, zones
+from contactfpga.commands import (
+    arm,
+    board,
+    build,
+    chart,
+    cover,
+    doctor,
+    failures,
+    fit,
+    flash,
+    replay,
+    settle,
+    wire,
+    zones,
+)
 from contactfpga.console import interrupt, terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import told

@@ -103,9 +103,7 @@ def test_published_settle_times(changes, nanoseconds):
     [(16, 4700.0, 1.68, 0.24, 1.62, 0.10), (64, 4700.0, 2.62, 0.92, 0.68, 0.55), (64, 1e4, 2.62, 1.95, 0.68, 1.17)],
 )
 def test_published_projections(size, ohms, lift_v, rows_us, dip_v, columns_us):
-    network = Network(
-        Circuit(column_pull_ohm=ohms, row_pull_ohm=ohms), patterns.named(size, size)["one cell"]
-    )
+    network = Network(Circuit(column_pull_ohm=ohms, row_pull_ohm=ohms), patterns.named(size, size)["one cell"])
     rows = phases.passed(phases.project_rows(network, LEVELS, lifted=True))
     columns = phases.passed(phases.project_columns(network, LEVELS))
     assert rows.trace.volts[:, size].max() == pytest.approx(lift_v, rel=0.05)

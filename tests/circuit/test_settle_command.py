@@ -17,6 +17,13 @@ def asked(capsys, *options):
     return status, json.loads(capsys.readouterr().out)
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """What the sheet needs is always the same."""
+    needs = needed(Circuit(), 1, 1)
+    monkeypatch.setattr("contactfpga.circuit.needed", lambda *_: needs)
+
+
 def test_the_issues_example(capsys):
     assert cli.main(["settle", "--pf", "100", "--switch-ohm", "500"]) == 0
     said = capsys.readouterr().out
@@ -26,6 +33,7 @@ def test_the_issues_example(capsys):
     assert "worst pattern: all" in said
 
 
+@pytest.mark.usefixtures("quick")
 def test_json_and_text_say_the_same(capsys):
     _, answer = asked(capsys, "--margin", "2")
     cli.main([*SMALL, "--margin", "2"])
@@ -42,13 +50,6 @@ def test_the_margin_multiplies_what_the_model_says(capsys):
     assert answer["settle_us"] == pytest.approx(3e6 * computed, abs=0.01)
     assert answer["settle_us"] >= 3e6 * computed
     assert answer["worst"]["settle"]["us"] == pytest.approx(1e6 * computed, abs=1e-5)
-
-
-@pytest.fixture
-def quick(monkeypatch):
-    """What the sheet needs is always the same."""
-    needs = needed(Circuit(), 1, 1)
-    monkeypatch.setattr("contactfpga.circuit.needed", lambda *_: needs)
 
 
 @pytest.mark.usefixtures("quick")

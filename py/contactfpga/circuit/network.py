@@ -77,7 +77,7 @@ class Network:
 
     def pin_amperes(self, lines: np.ndarray, drive: Drive) -> np.ndarray:
         """(..., lines) out of each pin that drives, for volts of the same shape."""
-        return self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines)
+        return np.asarray(self.drive_s(drive) * (np.nan_to_num(drive.volts) - lines))
 
     def unpressed(self) -> State:
         """All lines and junctions at 0 V, to begin a search with."""
@@ -114,13 +114,12 @@ def current(diode: Diode, volts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_back(diode: Diode, volts: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The next guess of Newton's method where the one ``wanted`` is far up the exponential."""
+    """The next guess of Newton's method where the one ``wanted`` is far up the exponential: as far as the current that
+    it asks for takes the junction."""
     step, knee = diode.emission * THERMAL_V, knee_v(diode)
     far = (wanted > knee) & (np.abs(wanted - volts) > 2 * step)
     if not far.any():
         return wanted
-    grown = np.where(
-        volts > 0, volts + step * np.log1p(np.maximum(wanted - volts, 0) / step), step * np.log(np.maximum(wanted, step) / step)
-    )
-    down = wanted < volts
-    return np.where(far, np.where(down, np.maximum(wanted, volts - 10 * step), grown), wanted)
+    start = np.maximum(volts, 0.0)
+    higher = start + step * np.log1p(np.maximum(wanted - start, 0.0) / step)
+    return np.where(far, np.where(wanted > volts, higher, np.maximum(wanted, volts - 10 * step)), wanted)

@@ -36,7 +36,13 @@ def middle(count: int) -> int:
     return count // 2
 
 
-SETTLE = ("one row but a cell", "all", "all but a column", "all, one cell of the row", "all, every other cell of the row")
+SETTLE = (
+    "one row but a cell",
+    "all",
+    "all but a column",
+    "all, one cell of the row",
+    "all, every other cell of the row",
+)
 RELEASE = ("one row", "all")
 PROJECT_ROWS = ("nothing", "one cell", "one column but a cell", "all but a row")
 PROJECT_COLUMNS = ("nothing", "one cell", "all but a column", "all")

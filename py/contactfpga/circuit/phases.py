@@ -138,8 +138,8 @@ def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
 
 
 def pulled_release(network: Network, levels: Levels, dip_v: float = 0.0) -> Phase:
-    """A selected row is released, and the resistors pull its columns back: they must be high, and stay so where the next
-    row pulls them down by ``dip_v``."""
+    """A selected row is released, and the resistors pull its columns back: they must be high, and stay so where the
+    next row pulls them down by ``dip_v``."""
     most, least = _any(network)
     least[: network.columns] = min(levels.high + dip_v, FULL * network.circuit.supply_v)
     selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)

@@ -135,8 +135,8 @@ def _helps(circuit: Circuit, pull: str, worst: Callable[[Circuit], Worst]) -> st
         if one.margin_v >= NOISE_V and one.pin_ma <= circuit.pin_ma:
             return f"{pull} = {ohms:g} would do, instead of {getattr(circuit, pull):g}"
     return (
-        f"no {pull} would do: take a Schottky diode, or less of pin_ohm, series_ohm, line_ohm and switch_ohm, which are "
-        f"{circuit.pin_ohm:g}, {circuit.series_ohm:g}, {circuit.line_ohm:g} and {circuit.switch_ohm:g}"
+        f"no {pull} would do: take a Schottky diode, or less of pin_ohm, series_ohm, line_ohm and switch_ohm, which "
+        f"are {circuit.pin_ohm:g}, {circuit.series_ohm:g}, {circuit.line_ohm:g} and {circuit.switch_ohm:g}"
     )
 
 

@@ -38,7 +38,7 @@ def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
 
 def projects(skin: Skin) -> bool:
     """The Skin's scan reads rows while all columns drive."""
-    return skin.scan == "reversal"
+    return str(skin.scan) == "reversal"
 
 
 def read(values: Any) -> Circuit:

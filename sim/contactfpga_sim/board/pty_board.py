@@ -43,8 +43,8 @@ class PtyBoard:
 
     The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
     ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
-    skin, scene, cover and circuit: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a symbolic link
-    to the port. What no client reads is dropped, the oldest first, and counted.
+    skin, scene, cover and circuit: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a
+    symbolic link to the port. What no client reads is dropped, the oldest first, and counted.
     """
 
     def __init__(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -59,13 +60,17 @@ def cases() -> Iterator[Case]:
     """Some 40 circuits, the same ones each time."""
     rng = np.random.default_rng(PATTERN_SEED)
     for turn in range(ROUNDS):
-        for number, (name, (make, names)) in enumerate(PHASES.items()):
+        for number, (make, names) in enumerate(PHASES.values()):
             size = (16, 16) if turn == 0 else SIZES[(turn + number) % len(SIZES)]
             yield _case(make, [*names, "random"][turn % (len(names) + 1)], size, rng, nominal=turn == 0)
 
 
 def _case(
-    make: Callable[[Network, Levels], Phase], pattern: str, size: tuple[int, int], rng: np.random.Generator, nominal: bool
+    make: Callable[[Network, Levels], Phase],
+    pattern: str,
+    size: tuple[int, int],
+    rng: np.random.Generator,
+    nominal: bool,
 ) -> Case:
     """Circuits are drawn until one comes to levels that can be read."""
     pressed = rng.random(size) < 0.3 if pattern == "random" else patterns.named(*size)[pattern]
@@ -102,6 +107,11 @@ def compared(case: Case) -> Compared:
     phase = case.phase
     ours = phases.passed(phase)
     seconds, volts = spice.run(phase, float(ours.trace.seconds[-1]))
-    high = np.isfinite(phase.least)
-    lowest = [float(one[:, high].min(initial=np.inf)) if phase.name == "settle" else np.nan for one in (ours.trace.volts, volts)]
-    return Compared(case, ours.seconds, float(phase.arrived(seconds, volts).max()), lowest[0], lowest[1])
+    last = phase.arrived(seconds, volts).max()
+    return Compared(case, ours.seconds, float(last), _lowest(phase, ours.trace.volts), _lowest(phase, volts))
+
+
+def _lowest(phase: Phase, volts: np.ndarray) -> float:
+    if phase.name != "settle":
+        return math.nan
+    return float(volts[:, np.isfinite(phase.least)].min(initial=math.inf))

@@ -1,4 +1,4 @@
-"""A phase of the scan in ngspice, where it is installed: an opinion on the circuit model that shares none of its code."""
+"""A phase of the scan in ngspice, where it is installed: an opinion on the circuit model that shares no code."""
 
 from __future__ import annotations
 

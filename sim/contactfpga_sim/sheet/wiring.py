@@ -1,4 +1,4 @@
-"""What a faulty sheet reads as switches: which lines pressed switches join, where diodes, wires and switches have faults.
+"""What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
 
 Levels, currents and times are :mod:`contactfpga.circuit`'s; this is what they come to where switches and pins have no
 resistance beside the pulls.

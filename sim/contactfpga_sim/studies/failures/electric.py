@@ -65,7 +65,7 @@ SETTLE = Study(
     title="Columns slower than `settle_us = 5`",
     knob="capacitance of a line, pF",
     amount="cells that read pressed",
-    values=tuple(np.geomspace(10, 10_000, 25).round().tolist()),
+    values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
         "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=4700.0)),
         "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=40_000.0)),
