@@ -117,8 +117,8 @@ KNOBS = {
         values=tuple(np.geomspace(10, 1000, 25).round().tolist()),
         runs={
             "16x16, lines of 0 Ω": functools.partial(_line_us, 0.0),
+            "lines of 50 Ω": functools.partial(_line_us, 50.0),
             "lines of 100 Ω": functools.partial(_line_us, 100.0),
-            "lines of 300 Ω": functools.partial(_line_us, 300.0),
         },
         limit=SETTLE_US,
         below=True,

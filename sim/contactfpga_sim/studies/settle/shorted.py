@@ -48,7 +48,7 @@ def sheet(shorted: int, circuit: Circuit | None = None) -> Network:
 
 
 def row_time(network: Network) -> RowTime:
-    """One row of the scan, after a row whose columns were all released."""
+    """One row of the scan, after one with the same pressed switches and a gap."""
     supply = network.circuit.supply_v
     selected = np.full(network.rows, supply)
     selected[patterns.middle(network.rows)] = 0.0
@@ -59,7 +59,8 @@ def row_time(network: Network) -> RowTime:
         Drive.of(OFF, supply, network),
     )
     lasts = (PRECHARGE_US, GAP_US, SETTLE_US, GAP_US)
-    state, now = transient.at_rest(network, drives[0]), 0.0
+    before = transient.at_rest(network, drives[2])
+    state, now = transient.run(network, drives[1], before, GAP_US / US).end, 0.0
     seconds, volts, amperes, starts = [], [], [], [0.0]
     for drive, last_us in zip(drives, lasts):
         trace = transient.run(network, drive, state, last_us / US)
