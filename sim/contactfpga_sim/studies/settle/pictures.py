@@ -35,6 +35,12 @@ def _steps(axes: Any, found: RowTime) -> None:
     axes.set_xlim(0, found.starts_us[-1])
 
 
+def _thresholds(axes: Any) -> None:
+    for volts, name in ((Circuit().low_v, "VIL"), (Circuit().high_v, "VIH")):
+        axes.axhline(volts, color=style.SOFT, lw=0.8, ls=style.DASHES[2])
+        axes.text(0.01, volts + 0.05, name, color=style.SOFT)
+
+
 def _row(path: Path) -> Path:
     network = Network(Circuit(), patterns.named(SIZE, SIZE)["all but a column"])
     found = shorted.row_time(network)
@@ -50,9 +56,7 @@ def _row(path: Path) -> Path:
     }
     for name, (volts, color, dashes) in lines.items():
         axes.plot(microseconds, volts, color=color, ls=dashes, lw=1.8, label=name)
-    for volts, name in ((Circuit().low_v, "VIL"), (Circuit().high_v, "VIH")):
-        axes.axhline(volts, color=style.SOFT, lw=0.8, ls=style.DASHES[2])
-        axes.text(0.01, volts + 0.05, name, color=style.SOFT)
+    _thresholds(axes)
     axes.set_xlabel("time, µs")
     axes.set_ylabel("V")
     axes.legend(loc="center left", bbox_to_anchor=(0.05, 0.42))
@@ -96,9 +100,7 @@ def _shorted(folder: Path) -> Path:
         lower.axvline(start, color=style.GRID, lw=1)
     lower.axhline(Circuit().pin_ma, color=style.INK, lw=1, ls=style.DASHES[1])
     lower.text(0.01, Circuit().pin_ma + 1, "8 mA", color=style.SOFT)
-    for volts, name in ((Circuit().low_v, "VIL"), (Circuit().high_v, "VIH")):
-        upper.axhline(volts, color=style.SOFT, lw=0.8, ls=style.DASHES[2])
-        upper.text(0.01, volts + 0.05, name, color=style.SOFT)
+    _thresholds(upper)
     upper.set_ylabel("column, V")
     upper.legend(loc="lower left", bbox_to_anchor=(0.05, 0.0))
     lower.set_ylabel("into the selected\nrow's pin, mA")

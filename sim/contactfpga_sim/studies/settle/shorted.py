@@ -69,8 +69,7 @@ def row_time(network: Network) -> RowTime:
         amperes.append(network.pin_amperes(trace.volts, drive))
         state, now = trace.end, now + last_us / US
         starts.append(now * US)
-    parts = (np.concatenate(one) for one in (seconds, volts, amperes))
-    return RowTime(network, *parts, tuple(starts))
+    return RowTime(network, np.concatenate(seconds), np.concatenate(volts), np.concatenate(amperes), tuple(starts))
 
 
 def flowing_us(found: RowTime, row: int, above_ma: float = 1.0) -> float:
