@@ -16,7 +16,7 @@ from contactfpga.console import numbers, terminal
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
 
-HELP = "Compute which precharge, settle, release and projection times a sheet needs."
+HELP = "Compute the times that the circuit of a sheet needs."
 EXTRA = None
 
 WORDS = {
@@ -56,10 +56,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     usual = Circuit()
     values = parser.add_argument_group("circuit")
     for name, (low, high, unit) in LIMITS.items():
-        names = ["--pf", "--line-pf"] if name == "line_pf" else [_flag(name)]
+        flag = "--pf" if name == "line_pf" else _flag(name)
         words = f"{WORDS[name]} (default: {getattr(usual, name):g})."
         kind = numbers.number(low, high, unit)
-        values.add_argument(*names, dest=name, type=kind, metavar=unit.upper(), help=words)
+        values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
     diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
     diode.add_argument("--diode", choices=tuple(DIODES), help="A kind from which the values below start.")
     for name, (low, high) in DIODE_LIMITS.items():
