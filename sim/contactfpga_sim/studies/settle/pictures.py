@@ -75,6 +75,8 @@ def _breaks(path: Path) -> Path:
         axes.axhline(knob.limit, color=style.INK, lw=1, ls=style.DASHES[1])
         if name != "columns":
             axes.set_xscale("log")
+            axes.set_xlim(knob.values[0] / 1.2, 1.5 * knob.values[-1])
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:,g}")
         if knob.below:
             axes.set_ylim(0, 4 * knob.limit)
         else:
