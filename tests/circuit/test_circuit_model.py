@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contactfpga.circuit import SILICON, Circuit, needed, patterns, phases, static, transient
+from contactfpga.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static, transient
 from contactfpga.circuit.network import OFF, Drive, Network, charge
 from contactfpga.circuit.phases import Levels
 from contactfpga.circuit.values import THERMAL_V
@@ -154,3 +154,20 @@ def test_small_sheets(rows, columns):
     needs = needed(Circuit(), rows, columns)
     assert 0 < needs.settle.seconds < 1e-6
     assert 0 < needs.project.seconds < 1e-5
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"column_pull_ohm": 100.0, "row_pull_ohm": 100.0},
+        {"series_ohm": 100_000.0, "row_pull_ohm": 1e8},
+        {"switch_ohm": 1e6, "line_pf": 100_000.0, "column_pull_ohm": 1e8},
+        {"line_pf": 0.1, "crossing_pf": 0.0, "neighbor_pf": 0.0, "pin_ohm": 1.0, "switch_ohm": 0.1},
+        {"diode": Diode(1e-18, 5.0, 0.0, 0.0, 2.0, 0.0)},
+        {"diode": Diode(1e-3, 0.5, 0.0, 1000.0, 0.1, 0.9)},
+    ],
+)
+def test_extreme_values_have_an_answer(changes):
+    """A row that never gets released once made the steps grow without an end."""
+    needs = needed(Circuit(**changes), 2, 2)
+    assert needs.settle.seconds > 0

@@ -73,8 +73,12 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
     lowest = min(map(_lowest, settled), default=circuit.supply_v)
     dip = circuit.supply_v - lowest
     release, released = sheet.worst(patterns.RELEASE, phases.row_release)
-    gap = release.seconds
-    precharge, charged = sheet.worst(patterns.RELEASE, lambda network: phases.precharge(network, gap))
+
+    def precharged(network: Network) -> Phase:
+        """After the gap; a row that is never released is waited for until it does not move any more."""
+        return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
+
+    precharge, charged = sheet.worst(patterns.RELEASE, precharged)
     pulled, _ = sheet.worst(patterns.RELEASE, lambda network: phases.pulled_release(network, levels, dip))
     by_row, _ = sheet.worst(patterns.PROJECT_ROWS, lambda network: phases.project_rows(network, levels))
     lifted, _ = sheet.worst(patterns.PROJECT_ROWS, lambda network: phases.project_rows(network, levels, True))

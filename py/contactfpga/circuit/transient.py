@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from contactfpga.circuit.network import Drive, Network, State, charge, current, held_back
-from contactfpga.circuit.values import CircuitError
+from contactfpga.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
 """Share of a step that its first half takes: both halves then have the same equations."""
@@ -20,6 +20,8 @@ ERROR_V = 1e-3
 """Of a step."""
 CLOSE_V = 1e-5
 """Newton's method ends when no voltage moves by more; what is then left is far less."""
+DIVERGED_V = 1e3
+"""A line that is to move by more shows that Newton's method is lost."""
 ROUNDS, STEPS = 60, 20_000
 FOREVER_S = 1e6
 
@@ -116,7 +118,7 @@ class _Driven:
             far = max(np.abs(step.lines).max(), np.abs(step.junctions).max(initial=0.0))
             if far < CLOSE_V and not held:
                 return guess, self.rates(guess)
-            if not far < 1e12:
+            if not np.abs(step.lines).max() < DIVERGED_V:
                 return None
         return None
 
@@ -162,12 +164,12 @@ def run(
     raise CircuitError(f"these values take more than {STEPS} steps to compute; take less extreme ones")
 
 
-def _ahead(start: State, middle: State) -> State:
+def _ahead(diode: Diode, start: State, middle: State) -> State:
     """A guess of the end of a step."""
     on = (1 - GAMMA) / GAMMA
-    return State(
-        middle.lines + on * (middle.lines - start.lines), middle.junctions + on * (middle.junctions - start.junctions)
-    )
+    junctions = middle.junctions + on * (middle.junctions - start.junctions)
+    lines = middle.lines + on * (middle.lines - start.lines)
+    return State(lines, held_back(diode, middle.junctions, junctions))
 
 
 def _step(
@@ -180,7 +182,7 @@ def _step(
         return None
     half = middle[1]
     end = driven.solved(
-        _ahead(state, middle[0]),
+        _ahead(driven.diode, state, middle[0]),
         share,
         SHARE_1 * half.line_c - SHARE_0 * rates.line_c,
         SHARE_1 * half.cell_c - SHARE_0 * rates.cell_c,

@@ -75,7 +75,7 @@ def _flag(name: str) -> str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; :data:`UNSOLVED` if the sheet cannot work."""
+    """Run the command; :data:`UNSOLVED` if the sheet cannot work, or a time is never long enough."""
     skin = Skin.load(args.skin) if args.skin else Skin()
     if skin.diodes == "none" and args.diodes is None:
         raise CircuitError("diodes is 'none'; the model is of sheets with a diode per switch")
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(answer, allow_nan=False))
     else:
         _show(answer, needs, args.margin)
-    return UNSOLVED if problems else 0
+    return UNSOLVED if problems or None in answer.values() else 0
 
 
 def _changed(given: Circuit, args: argparse.Namespace) -> Circuit:

@@ -59,7 +59,7 @@ def _row(path: Path) -> Path:
     _thresholds(axes)
     axes.set_xlabel("time, µs")
     axes.set_ylabel("V")
-    axes.legend(loc="center left", bbox_to_anchor=(0.05, 0.42))
+    axes.legend(loc="center left", bbox_to_anchor=(0.05, 0.345))
     return style.save(figure, path)
 
 
