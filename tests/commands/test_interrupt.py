@@ -1,5 +1,6 @@
 """Ctrl-C: every command ends at once, without a traceback, and leaves no process behind."""
 
+import itertools
 import re
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from sample import sample
 from terminals import OnTerminal, alive, descendants, environment, listening, wait_for
 
 from contactfpga.console import interrupt
@@ -58,8 +60,10 @@ def well_ended(status, took, said):
         assert word not in said, said
 
 
-@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
-@pytest.mark.parametrize("name", POOLS)
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    sample(itertools.product(POOLS, (True, False)), quick=[("chart", True), ("fit", False), ("arm", True)]),
+)
 def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
     arguments, workers = POOLS[name]
     output = [] if name == "fit" else ["--output", tmp_path / "out"]
@@ -95,20 +99,20 @@ def test_failures_keep_the_rows_that_are_finished(tmp_path):
     assert not (tmp_path / "failures.md").exists()
 
 
-@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
+BUILDS = (("zones sim://", "elaborate"), ("zones sim://", "compile"), ("board", "yosys"), ("replay FRAMES", "elaborate"))
+
+
 @pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["zones", "sim://"], ": elaborate"),
-        (["zones", "sim://"], ": compile"),
-        (["board"], ": yosys"),
-        (["replay", "FRAMES"], ": elaborate"),
-    ],
+    ("words", "step", "keys"),
+    sample(
+        [(*build, keys) for build in BUILDS for keys in (True, False)],
+        quick=[(*build, number % 2 == 0) for number, build in enumerate(BUILDS)],
+    ),
 )
-def test_the_gateware_being_built_is_no_more_than_that(arguments, word, keys, tmp_path):
+def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_path):
     np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
-    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in arguments]
-    well_ended(*interrupted(arguments, lambda terminal: word in terminal.said, keys, tmp_path / "cache"))
+    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in words.split()]
+    well_ended(*interrupted(arguments, lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache"))
 
 
 @pytest.mark.campaign  # which has the tools for it
