@@ -99,7 +99,12 @@ def test_failures_keep_the_rows_that_are_finished(tmp_path):
     assert not (tmp_path / "failures.md").exists()
 
 
-BUILDS = (("zones sim://", "elaborate"), ("zones sim://", "compile"), ("board", "yosys"), ("replay FRAMES", "elaborate"))
+BUILDS = (
+    ("zones sim://", "elaborate"),
+    ("zones sim://", "compile"),
+    ("board", "yosys"),
+    ("replay FRAMES", "elaborate"),
+)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,6 @@ from contactfpga_sim.golden.facts import facts
 COVERING = pairwise(CHOICES)
 NAMED = ("connectivity", "labeller", "debounce", "report", "send")
 COCOTB = {
-    "small": Skin(rows=4, columns=4, settle_us=2.5),
     "reference": Skin(),
     "debounced-cells": Skin(
         rows=5,
@@ -40,13 +39,6 @@ COCOTB = {
     "serial": Skin(labeller="serial", settle_us=2.5),
     "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
 }
-SIMULATORS = [
-    "verilator",
-    pytest.param(
-        "icarus",
-        marks=pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH"),
-    ),
-]
 
 
 def name_of(choice: dict) -> str:
@@ -147,10 +139,19 @@ def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
     assert found.value.got == (None if fault == "delay" else (value ^ bit, *rest))
 
 
-@pytest.mark.parametrize("simulator", SIMULATORS)
-@pytest.mark.parametrize("name", sample(COCOTB, quick=["small"]))  # what others add is in the covering set, too
-def test_top_through_cocotb(name, simulator):
-    skin = COCOTB[name]
+@pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH")
+@pytest.mark.parametrize("name", sample(COCOTB, quick=["reference"]))
+def test_top_through_cocotb_on_icarus(name):
+    check_through_cocotb(COCOTB[name], "icarus")
+
+
+@pytest.mark.campaign  # Verilator compiles for long; `make test` has it in test_demo.py
+@pytest.mark.parametrize("name", COCOTB)
+def test_top_through_cocotb(name):
+    check_through_cocotb(COCOTB[name], "verilator")
+
+
+def check_through_cocotb(skin, simulator):
     cycles = 30_000
     timeline = stimulus(skin, cycles, seed=4)
     expected = predict(skin, timeline, cycles)

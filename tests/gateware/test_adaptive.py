@@ -66,12 +66,32 @@ def test_covering_set_in_amaranths_simulator(number):
 
 BOARDS = {
     "8x8": {"rows": 8, "columns": 8},
-    "33x17": {"rows": 33, "columns": 17, "settle_us": 6.0, "send": "on_change", "keep_alive_ms": 2.0, "zone_capacity": 5},
-    "13x6": {"rows": 13, "columns": 6, "diodes": "row2col", "report": "cells", "mask": ((3, 3), (4, 3)), "baud": 6_000_000},
+    "33x17": {
+        "rows": 33,
+        "columns": 17,
+        "settle_us": 6.0,
+        "send": "on_change",
+        "keep_alive_ms": 2.0,
+        "zone_capacity": 5,
+    },
+    "13x6": {
+        "rows": 13,
+        "columns": 6,
+        "diodes": "row2col",
+        "report": "cells",
+        "mask": ((3, 3), (4, 3)),
+        "baud": 6_000_000,
+    },
     "16x16": {"rows": 16, "columns": 16, "row_drive": "74hc595"},
     "9x4": {"rows": 9, "columns": 4, "row_drive": "74hc595", "row_chains": 3, "shift_hz": 4_000_000, "settle_us": 3.0},
     "7x5": {"rows": 7, "columns": 5, "debounce": "sym_defer_pk", "debounce_press_us": 84, "debounce_release_us": 126},
-    "7x5, eager": {"rows": 7, "columns": 5, "debounce": "asym_eager_defer_pk", "debounce_press_us": 126, "report": "cells"},
+    "7x5, eager": {
+        "rows": 7,
+        "columns": 5,
+        "debounce": "asym_eager_defer_pk",
+        "debounce_press_us": 126,
+        "report": "cells",
+    },
 }
 
 

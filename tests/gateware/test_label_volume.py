@@ -154,9 +154,7 @@ def test_random_frames_are_enough():
 
 @BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(
-    ("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30), (10, 90)])
-)
+@pytest.mark.parametrize(("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30), (10, 90)]))
 def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity, labeller):
     small = every_frame(4, 4)
     check_stalled(benches(4, 4, connectivity, labeller), small, gap, stall)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _BUILD_ARGS = {
     # The runner makes every signal public, which costs speed; ports.vlt does that for the ports alone.
-    "verilator": ["--no-public-flat-rw", "-Wno-fatal", "-CFLAGS", "-O1"],
+    "verilator": ["--no-public-flat-rw", "-Wno-fatal", "-CFLAGS", "-O0"],
     # In the newer language nothing wakes combinational blocks at time 0, and they stay unknown.
     "icarus": ["-g2005"],
 }
