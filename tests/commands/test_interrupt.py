@@ -52,7 +52,7 @@ def interrupted(arguments, ready, keys, cache, **variables):
         terminal.process.kill()
 
 
-def well_ended(status, took, said):
+def assert_well_ended(status, took, said):
     said = said[-2000:]
     assert status == 130, said
     assert took < SOON_S + SLACK_S, said
@@ -73,7 +73,7 @@ def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
         return len(descendants(terminal.process.pid)) >= workers and time.monotonic() > started + 2
 
     started = time.monotonic()
-    well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
+    assert_well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
 
 
 def test_what_the_arm_has_done_is_kept(tmp_path):
@@ -81,19 +81,20 @@ def test_what_the_arm_has_done_is_kept(tmp_path):
         return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
 
     status, took, said = interrupted(["arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache")
-    well_ended(status, took, said)
+    assert_well_ended(status, took, said)
     lines = (tmp_path / "arm-charts-so-far.csv").read_text().splitlines()
     assert len(lines) >= 4
     assert " ".join(said.split()).count(f"interrupted; {len(lines) - 1} of 191 runs are in") == 1
     assert not (tmp_path / "arm-charts.csv").exists()
 
 
+@pytest.mark.campaign  # it has a board to compile first
 def test_failures_keep_the_rows_that_are_finished(tmp_path):
     def ready(terminal):
         return any(int(done) >= 1 for done in re.findall(r"(\d+)/36", terminal.said))
 
     status, took, said = interrupted(["failures", "--output", tmp_path], ready, True, tmp_path / "cache")
-    well_ended(status, took, said)
+    assert_well_ended(status, took, said)
     assert "of the table, all that was finished, in" in " ".join(said.split())
     assert (tmp_path / "failures-so-far.md").read_text().startswith("| knob | method |")
     assert not (tmp_path / "failures.md").exists()
@@ -117,7 +118,7 @@ BUILDS = (
 def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_path):
     np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
     arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in words.split()]
-    well_ended(*interrupted(arguments, lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache"))
+    assert_well_ended(*interrupted(arguments, lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache"))
 
 
 @pytest.mark.campaign  # which has the tools for it
@@ -127,7 +128,7 @@ def test_place_and_route_ends_too(keys, tmp_path):
         return any("yosys" in line or "nextpnr" in line for line in descendants(terminal.process.pid).values())
 
     arguments = ["build", "icebreaker", "--output", tmp_path / "out"]
-    well_ended(*interrupted(arguments, ready, keys, tmp_path / "cache"))
+    assert_well_ended(*interrupted(arguments, ready, keys, tmp_path / "cache"))
 
 
 WAITS = """

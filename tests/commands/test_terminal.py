@@ -64,8 +64,7 @@ def shown(said):
     ("name", "columns"),
     sample(
         itertools.product(COMMANDS, WIDTHS),
-        quick=[(name, width) for name, width in itertools.product(COMMANDS, WIDTHS) if name not in LONG]
-        + [("push", WIDTHS[0])],
+        quick=[(name, width) for name, width in itertools.product(COMMANDS, WIDTHS) if name not in LONG],
     ),
 )
 def test_no_line_is_wider_than_the_terminal(name, columns, files):
@@ -77,7 +76,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
         assert cell_len(line.rstrip()) <= columns or str(files) in line or "sim://" in line, line
 
 
-@pytest.mark.parametrize("name", sample(COMMANDS, quick=[name for name in COMMANDS if name != "push"]))
+@pytest.mark.parametrize("name", sample(COMMANDS, quick=[name for name in COMMANDS if name not in LONG]))
 def test_no_character_ends_a_command(name, files):
     command = [sys.executable, "-m", "contactfpga.cli", *named(name, files)]
     result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)

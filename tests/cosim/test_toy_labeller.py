@@ -76,7 +76,7 @@ def test_what_is_kept_of_it_depends_on_its_file():
 
 def test_the_chart_draws_it(tmp_path):
     skins = {name: skin for name, skin in methods.by(TOY).items() if name == "toy, 20 mm"}
-    tasks = [Task(name, skin, "fingers", 4, 0) for name, skin in skins.items()]
+    tasks = [Task(name, skin, "fingers", 4, 0, checked=0) for name, skin in skins.items()]
     with ThreadPoolExecutor(1) as pool:
         points = study(tasks, pool, with_size=False)
     numbers.write(points, tmp_path / "chart.csv")

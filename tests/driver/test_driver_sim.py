@@ -47,6 +47,7 @@ def test_a_second_read_is_of_a_later_frame():
     assert second.time_us > first.time_us
 
 
+@pytest.mark.campaign
 def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
     file = tmp_path / "skin.toml"
     file.write_text(SKIN.replace(send="on_change").to_toml())
@@ -75,6 +76,7 @@ def test_simulated_board_loses_nothing():
     assert len({zones[0].x_mm for zones in frames}) > 20
 
 
+@pytest.mark.campaign  # test_addresses.py has one
 def test_simulated_board_of_a_file(tmp_path):
     skin = contactfpga.Skin(rows=5, columns=7, pitch_x_mm=3.0, report="cells", settle_us=20.0)
     file = tmp_path / "skin.toml"

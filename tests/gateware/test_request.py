@@ -120,7 +120,7 @@ def test_flags_without_a_meaning_are_ignored(listen):
 
 
 def test_no_burst_of_up_to_sixteen_bits_makes_another_request(listen, rng):
-    """Of every third start and each length one; only the bits of the check bytes that carry none of the CRC do not count."""
+    """Of every third start and each length one; bits of the check bytes that carry none of the CRC do not count."""
     whole = sealed(plain(0x12345 | 1, True))
     bits = 8 * (len(whole) - 1)
     word = int.from_bytes(whole, "little")

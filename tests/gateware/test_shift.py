@@ -377,6 +377,7 @@ def test_a_slip_in_the_gatewares_clocks_is_seen(bench, rng, monkeypatch, name):
 # ---- the compiled board
 
 
+@pytest.mark.campaign
 def test_the_compiled_board_with_registers_is_the_golden_models_in_every_clock(record_property):
     skin = Skin(rows=17, columns=19, row_drive="74hc595", row_chains=2, column_read="74hc165", column_chains=3)
     cycles = 200_000

@@ -12,7 +12,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
 from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
 
-SAMPLE = 150
+SAMPLE = 100
 
 
 @dataclasses.dataclass

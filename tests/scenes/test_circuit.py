@@ -100,6 +100,7 @@ def test_a_broken_row_of_a_bare_sheet_still_joins_its_columns():
     assert np.argwhere(read).tolist() == [[0, 0], [0, 2]]
 
 
+@pytest.mark.campaign  # test_failures.py has settle times, too
 def test_a_column_rises_and_falls_as_the_closed_form_says():
     """The row that reads a neighbor's switch, and the row that misses its own, change where the exponentials say."""
     skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)

@@ -119,7 +119,7 @@ def test_random_scenes_against_a_raster(record_property):
     x = np.arange(box.left + step / 2, box.right, step)
     y = np.arange(box.top + step / 2, box.bottom, step)[:, None]
     compared = 0
-    for seed in range(60):
+    for seed in range(25):
         parts = random_parts(np.random.default_rng(seed))
         cells = np.any([own_test(part, x, y) for part in parts], axis=0)
         labels, count = ndimage.label(cells, np.ones((3, 3)))

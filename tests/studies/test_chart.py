@@ -39,8 +39,9 @@ def results_of_this_test_only(tmp_path, monkeypatch):
     return compiled
 
 
-def task(method="run, 20 mm", family="pair", count=20, **options):
-    return Task(method, METHODS[method], family, count, seed=3, timed=4, checked=1, **options)
+def task(method="run, 20 mm", family="pair", count=20, checked=0):
+    """One that needs no compiled board unless some scenes are checked on it."""
+    return Task(method, METHODS[method], family, count, seed=3, timed=4, checked=checked)
 
 
 def test_found_and_there_are_paired_at_the_least_total_distance():
@@ -194,7 +195,7 @@ def test_exact_labellers_add_no_error_and_the_others_do():
 
 def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
-    tasks = [task(), task("single, 20 mm", "bumper", 130)]
+    tasks = [task(checked=1), task("single, 20 mm", "bumper", 130)]
     with ThreadPoolExecutor(2) as pool:
         points = study.study(tasks, pool, with_size=False)
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "others")

@@ -43,7 +43,7 @@ SHAPES = [(4, 5), (16, 16), (1, 1)]
 
 @pytest.mark.parametrize(
     ("shape", "connectivity"),
-    sample(itertools.product(SHAPES, (8, 4)), quick=[((16, 16), 8), ((4, 5), 4)]),
+    sample(itertools.product(SHAPES, (8, 4)), quick=[((16, 16), 8)]),
 )
 def test_every_frame_comes_back_once_with_scipys_zones(record_property, shape, connectivity):
     rng = np.random.default_rng(7)
@@ -80,12 +80,16 @@ def test_the_bound_is_never_below_the_zones():
     assert replay.zones_bound(np.zeros((3, 4, 4), bool), 8) == 0
 
 
+def test_scans_with_a_hello_are_left_out_of_the_plan():
+    plan = replay._Plan(replay.skin_for(2, 3, 8, 2), 200_000)
+    assert plan.frame_of.count(None) > 20
+    assert [frame for frame in plan.frame_of if frame is not None] == list(range(200_000))
+
+
+@pytest.mark.campaign
 def test_a_hello_in_the_middle_costs_no_frame():
     frames = np.random.default_rng(3).random((120, 2, 3)) < 0.5
     skin = replay.skin_for(2, 3, 8, 2)
-    plan = replay._Plan(skin, 200_000)
-    assert plan.frame_of.count(None) > 20
-    assert [frame for frame in plan.frame_of if frame is not None] == list(range(200_000))
     repeated = frames[np.arange(60_000) % 120]
     for index, result in enumerate(replay.replay(repeated, skin)):
         assert result.frame.cells == frames[index % 120].sum()
@@ -93,8 +97,8 @@ def test_a_hello_in_the_middle_costs_no_frame():
 
 
 def test_a_lost_frame_is_an_error(monkeypatch):
-    frames = np.ones((300, 4, 4), bool)
-    skin = replay.skin_for(4, 4, 8, 1)
+    frames = np.ones((300, 16, 16), bool)
+    skin = replay.skin_for(16, 16, 8, 1)
     take = replay.CompiledBoard.take
 
     def lossy(board, boundary):

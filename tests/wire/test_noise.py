@@ -58,7 +58,7 @@ class Line:
         return lost
 
 
-@pytest.fixture(params=sample(SKINS, quick=["zones", "cells"]))
+@pytest.fixture(params=sample(SKINS, quick=["zones", "barycenters"]))
 def lines(request, rng):
     return [Line(SKINS[request.param], rng) for _ in range(LINES)]
 
