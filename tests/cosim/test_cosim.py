@@ -47,7 +47,7 @@ def name_of(choice: dict) -> str:
 
 
 def cycles_for(skin: Skin) -> int:
-    return max(2_500, min(25 * facts(skin).scan_clocks, 5_000))
+    return max(3_000, min(25 * facts(skin).scan_clocks, 6_000))
 
 
 def flags_in(skin: Skin, trace: Trace) -> set[str]:
