@@ -17,9 +17,8 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.golden import zones
+from contactfpga_sim.golden import predict, zones
 from contactfpga_sim.pages import chart_page, chart_pictures, writer
 from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
@@ -116,7 +115,7 @@ def test_the_time_is_that_of_the_compiled_board():
 
 def test_a_board_that_takes_longer_is_noticed(monkeypatch):
     later = dataclasses.replace(SMALL, settle_us=6.0)
-    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: bench_amaranth.run(later, *rest))
+    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: predict(later, *rest))
     cells = np.ones((8, 8), bool)
     with pytest.raises(Mismatch):
         speed.touch(SMALL, cells, 0.5, check=True)
