@@ -121,6 +121,7 @@ def test_wiring_is_what_the_circuit_comes_to():
     assert 0 < fights < 40
 
 
+@pytest.mark.campaign  # test_failures.py has settle times, too
 def test_a_column_rises_and_falls_as_the_closed_form_says():
     """The row that reads a neighbor's switch, and the row that misses its own, change where the exponentials say."""
     skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
