@@ -44,7 +44,7 @@ class Needs:
     """From a row that is not selected any more until columns may drive."""
     pulled_release: Time
     """The same until the pulls have lifted the columns, where nothing precharges."""
-    project_rows: Time
+    project: Time
     """From rows that are let go until touched ones read touched and all others untouched."""
     project_columns: Time
     """The same for columns while all rows are selected."""
@@ -58,11 +58,6 @@ class Needs:
     row_peak_ma: float
     """While lines are charged."""
     column_peak_ma: float
-
-    @property
-    def project(self) -> Time:
-        """The longer one of both projections."""
-        return max(self.project_rows, self.project_columns, key=lambda time: time.seconds)
 
 
 def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
@@ -89,7 +84,7 @@ def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -
         settle=settle,
         release=release,
         pulled_release=pulled,
-        project_rows=max(by_row, lifted, key=lambda time: time.seconds),
+        project=max(by_row, lifted, key=lambda time: time.seconds),
         project_columns=by_column,
         pressed=static.scan(circuit, rows, columns, diodes),
         touched=static.projection(circuit, rows, columns, diodes),

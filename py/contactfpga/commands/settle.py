@@ -109,7 +109,7 @@ def _said(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: float) -> dict[str, Any]:
-    times = ("precharge", "settle", "release", "project", "project_rows", "project_columns", "pulled_release")
+    times = ("precharge", "settle", "release", "project", "project_columns", "pulled_release")
     phases: dict[str, Time] = {name: getattr(needs, name) for name in times}
     return {
         **{f"{name}_us": time.us(margin) for name, time in phases.items()},
@@ -145,7 +145,7 @@ def _given(skin: Skin, answer: dict[str, Any]) -> dict[str, Any]:
     else:
         needs["release_us"] = answer["pulled_release_us"]
     if projects(skin):
-        needs["project_us"] = answer["project_rows_us"]
+        needs["project_us"] = answer["project_us"]
     return {
         name: {
             "given": getattr(skin, name),
@@ -160,7 +160,7 @@ TITLES = {
     "precharge": "columns drive to their released level",
     "settle": "a row is selected",
     "release": "row released, columns not yet driven",
-    "project": "all lines of a side are read",
+    "project": "all columns driven, the rows are read",
     "pulled_release": "without precharge: the pulls lift the columns",
 }
 
@@ -181,7 +181,7 @@ def _show(answer: dict[str, Any], needs: Needs, margin: float) -> None:
     _show_levels(needs)
     for name, one in answer.get("skin", {}).items():
         what = "enough" if one["enough"] else f"too short, {_or_never(one['needed'])} needed"
-        terminal.say(f"the Skin's {name} = {one['given']:g}: {what} (without precharge)")
+        terminal.say(f"the Skin's {name} = {one['given']:g}: {what}")
     for problem in answer["problems"]:
         terminal.say(f"cannot work: {problem['what']}; {problem['helps']}", hang=2)
 

@@ -36,7 +36,7 @@ def needs_table() -> str:
     rows = [["16x16 unless said", "precharge", "settle", "release", "project rows", "columns", "without precharge"]]
     for name, (size, circuit) in SHEETS.items():
         needs = needed(circuit, size, size)
-        times = (needs.precharge, needs.settle, needs.release, needs.project_rows, needs.project_columns)
+        times = (needs.precharge, needs.settle, needs.release, needs.project, needs.project_columns)
         marks = "" if not problems(circuit, size, size, projects=True) else " (cannot work)"
         rows.append([name + marks, *map(_us, times), _us(needs.pulled_release)])
     return writer.table_of(rows)
