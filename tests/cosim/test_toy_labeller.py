@@ -70,10 +70,10 @@ def test_a_module_that_fails_is_refused_in_one_sentence(tmp_path, monkeypatch, t
 
 @pytest.mark.parametrize(
     ("run", "scan"),
-    [(bench_native.run, "raster"), (bench_amaranth.run, "adaptive")],
+    [(bench_native.run, "raster"), (bench_amaranth.run, "adaptive"), (bench_amaranth.run, "reversal")],
 )
 def test_it_runs_in_lockstep_with_its_golden_rule(run, scan):
-    skin = SKIN.replace(scan=scan)
+    skin = SKIN.replace(scan=scan, precharge_us=0.5 if scan == "reversal" else 0.0)
     frames = np.random.default_rng(5).random((8, 4, 6)) < 0.3
     timeline = Timeline.frames(skin, frames)
     assert compare(predict(skin, timeline, CYCLES), run(skin, timeline, CYCLES)) > 100
