@@ -14,6 +14,7 @@ from contactfpga_sim.proofs import (
     odometer,
     pack,
     precharge,
+    pulses,
     records,
     reversal,
     reversal_frames,
@@ -44,6 +45,7 @@ CASES: tuple[Case, ...] = (
     *link.CASES,
     *odometer.CASES,
     *uart.CASES,
+    *pulses.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 
