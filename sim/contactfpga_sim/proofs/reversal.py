@@ -132,9 +132,8 @@ def synchronizer_lemmas(sheet: Sheet) -> None:
 def lasts(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and what the stages after do in each clock. Assumed: column 0 reads released where it is driven.
 
-    Claimed: a row is selected for the settle time; before that column 0 was driven for the precharge time, or for
-    ``project + 4`` clocks if that is less; where rows count, it had been driven, with rows let go, for the projection
-    time.
+    Claimed: a row is selected for the settle time; before that column 0 was driven for the precharge time; where
+    rows count, it had been driven, with rows let go, for the projection time.
     """
     m, sheet = proof.m, Sheet(proof, skin_of(**changes))
     derived, driven = sheet.dut.derived, sheet.dut.pins.columns_drive[0]
@@ -146,7 +145,7 @@ def lasts(proof: Proof, **changes: Any) -> None:
     m.d.sync += charged.eq(Mux(selects, 0, _more(charged, driven, derived.precharge_clocks)))
     m.d.sync += projected.eq(Mux(driven & let_go, _more(projected, 1, derived.project_clocks), 0))
     proof.claim((selected == 0) | (selects == (selected != derived.settle_clocks)))
-    proof.claim(~selects | (selected != 0) | _reached(charged, derived.precharge_clocks, derived.project_clocks + 4))
+    proof.claim(~selects | (selected != 0) | (charged == derived.precharge_clocks))
     projected_1 = proof.before(projected)
     proof.claim(~sheet.begins | (projected_1 == derived.project_clocks))
     pin_lemmas(sheet)
@@ -158,14 +157,15 @@ def _more(count: Signal, one, most: int):
     return Mux((count != most) & one, count + 1, count)
 
 
-def _reached(count, *least):
-    """All of them, or the least."""
-    return sum((count >= one for one in least), Const(0)) != 0
+def _reached(count, most: int, least):
+    """At least that, as far as the count goes."""
+    return (count == most) | (count >= least)
 
 
 def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> None:
     proof, state, clock, derived = sheet.proof, sheet.state, sheet.clock, sheet.dut.derived
     before, precharge, project = proof.before(state, init=LISTEN), derived.precharge_clocks, derived.project_clocks
+    spare = derived.release_clocks - 2 - precharge  # clocks of a release that a precharge does not need
     proof.lemma(sheet.inside["precharge.free"][0])
     proof.lemma(sheet.dut.pins.columns_drive[0] == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
     proof.lemma((charged <= precharge) & (projected <= project))
@@ -181,11 +181,11 @@ def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> No
         proof.lemma((clock == 0) | _reached(projected, project, clock - 1))
         proof.lemma((clock < 2) | _reached(projected_1, project, clock - 2))
     with proof.m.If(state == CHARGE):
-        proof.lemma((clock == 0) | _reached(charged, precharge, clock - 1, project + 2))
+        proof.lemma(_reached(charged, precharge, clock - spare - 1))
     with proof.m.If(state == GAP):
-        proof.lemma(_reached(charged, precharge, derived.release_clocks - 3, project + 3))
+        proof.lemma(charged >= precharge - 1)
     with proof.m.If((state == SELECT) & (clock <= 1)):
-        proof.lemma(_reached(charged, precharge, project + 4))
+        proof.lemma(charged == precharge)
 
 
 _PIN_BUGS = (
@@ -216,6 +216,8 @@ CASES = (
     Case("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
     Case("times of a line reversal", "3x2, shortest times, row2col",
          partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
+    Case("times of a line reversal", "3x2, longer precharge than projection",
+         partial(lasts, rows=3, columns=2, precharge_us=12), 2),
     Case("times of a line reversal", "3x2, long release",
          partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),
 )  # fmt: skip

@@ -33,7 +33,7 @@ class Prompt:
         proof.given(sheet.dut.rows.ready)
         proof.given(~spec.packing | sheet.packed | (self.waited < PACKED - 1))
         self.slot = max(derived.release_clocks - 2, HANDED) + derived.settle_clocks + 2
-        self.first = derived.settle_clocks + 4
+        self.first = derived.settle_clocks + max(4, derived.precharge_clocks - derived.project_clocks)
         self.end = max(derived.project_clocks + 2, PACKED + 3)
 
     def frame(self, rows) -> Value:
@@ -180,6 +180,8 @@ CASES = (
          partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
     Case("the next frame in time", "8x2, long times",
          partial(next_frame, rows=8, columns=2, **LONG), 2, campaign=True),
+    Case("the next frame in time", "3x2, longer precharge than projection",
+         partial(next_frame, rows=3, columns=2, precharge_us=12), 2, campaign=True),
     Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     Case("contact in three clocks", "3x2, shortest times, row2col",
          partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
