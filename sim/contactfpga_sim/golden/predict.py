@@ -104,7 +104,7 @@ class Stages:
         facts = self._facts
         if facts.zones:
             records = [
-                (handed[zone.row] + zone.clock, self._record(zone, places[zone.row] - zone.row))
+                (handed[zone.row] + zone.clock, self._record(zone, _sum_y(zone, taken, places)))
                 for zone in work.departures
             ]
             end = handed[-1] + work.end
@@ -115,11 +115,18 @@ class Stages:
         self._scanned.append(one)
         return self._packer.take(Items(one, cells, records, end))
 
-    def _record(self, zone: label.Departure, below: int) -> int:
-        """The record of a zone whose rows lie this many rows further down than they were counted."""
+    def _record(self, zone: label.Departure, sum_y: int) -> int:
         facts = self._facts
-        sum_y = zone.sum_y + below * zone.area
         return join(((zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)))[0]
+
+
+def _sum_y(zone: label.Departure, taken: np.ndarray, places: Sequence[int]) -> int:
+    """On the sheet, where the rows that were ``taken`` lie at these ``places``. A zone has neighboring rows, unless a
+    labeller takes all cells for one."""
+    per_row = taken.sum(axis=1)
+    if zone.area == per_row.sum():
+        return int(per_row @ np.asarray(places))
+    return zone.sum_y + (places[zone.row] - zone.row) * zone.area
 
 
 class Rows:
