@@ -29,6 +29,13 @@ LONG = {
     "serial: stalls change nothing, 8 columns, 4 rows, 4-connected",
     "zones are divided, 2x2, 1 fraction bit",
     "backlog keeps each item, 18 items",
+    "pins never meet, 2x1, shortest times",
+    "frames of a line reversal, 8x2",
+    "a closed switch is reported, 8x4",
+    "the next frame in time, 8x2, long times",
+    "the next frame in time, 3x2, longer precharge than projection",
+    "times of a line reversal, 3x2, long release",
+    "contact in three clocks, 3x2, shortest times, row2col",
 }
 """Quick for `make formal`; each run of the tests holds another one of the same claim."""
 

@@ -113,5 +113,5 @@ CASES = (
     Case("a closed switch is reported", "3x2, row2col, debounced",
          partial(closed, rows=3, columns=2, diodes="row2col", debounce="sym_defer_pk"), 2),
     Case("a closed switch is reported", "2x3, cells", partial(closed, rows=2, columns=3, report="cells"), 2),
-    Case("a closed switch is reported", "8x4", partial(closed, rows=8, columns=4), 2, campaign=True),
+    Case("a closed switch is reported", "8x4", partial(closed, rows=8, columns=4), 2),
 )  # fmt: skip
