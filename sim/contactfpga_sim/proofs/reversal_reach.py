@@ -76,10 +76,11 @@ def closed(proof: Proof, **changes: Any) -> None:
     proof.claim(~(report.row_offered & report.due) | report.offered)
     proof.claim(~(spec.taken & sheet.dut.rows.payload.last & report.due) | report.told | report.offered)
     keep_frames(sheet, spec)
-    _closed_lemmas(sheet, spec, switch, report)
+    closed_lemmas(sheet, spec, switch, report)
 
 
-def _closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) -> None:
+def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) -> None:
+    """What the pins have shown of the switch, and what became of it."""
     proof, inside, state, due = sheet.proof, sheet.inside, sheet.state, sheet.inside["due"]
     before, row = proof.before(state, init=LISTEN), switch.row
     driven = switch.of_column(sheet.dut.pins.columns_drive)

@@ -13,6 +13,7 @@ from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of
 from contactfpga_sim.proofs.reversal_frames import Frames, keep_frames
+from contactfpga_sim.proofs.reversal_reach import Report, Switch, closed_lemmas
 
 PACKED = 6
 """Clocks from when a frame's last row is taken until it is packed, at most."""
@@ -36,9 +37,24 @@ class Prompt:
         self.first = derived.settle_clocks + max(4, derived.precharge_clocks - derived.project_clocks)
         self.end = max(derived.project_clocks + 2, PACKED + 3)
 
-    def frame(self, rows) -> Value:
+        self.longest: int = self.frame(sheet.skin.rows)
+
+    def frame(self, rows):
         """The most clocks from the begin of a frame with so many rows, one at least, to that of the next."""
         return self.first + (rows - 1) * self.slot + self.end
+
+
+def _frame_time(sheet: Sheet, prompt: Prompt) -> tuple[Signal, Signal]:
+    """Clocks since the last frame began, and the most there can be; 0 if it has no row."""
+    m, longest = sheet.proof.m, prompt.longest
+    since, bound = Signal(range(longest + 2)), Signal(range(longest + 1))
+    count = popcount(sheet.wanted)
+    with m.If(sheet.begins):
+        m.d.sync += since.eq(count != 0)
+        m.d.sync += bound.eq(Mux(count != 0, prompt.frame(count), 0)[: len(bound)])
+    with m.Elif(since != 0):
+        m.d.sync += since.eq(since + 1)
+    return since, bound
 
 
 def next_frame(proof: Proof, **changes: Any) -> None:
@@ -51,17 +67,8 @@ def next_frame(proof: Proof, **changes: Any) -> None:
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
     prompt = Prompt(sheet, spec)
-    m, rows = proof.m, sheet.skin.rows
-    longest = prompt.first + (rows - 1) * prompt.slot + prompt.end
-    since, bound = Signal(range(longest + 2)), Signal(range(longest + 1))  # 0: no frame with a row was the last one
-    with m.If(sheet.begins):
-        count = popcount(sheet.wanted)
-        m.d.sync += [
-            since.eq(sheet.wanted.any()),
-            bound.eq(Mux(sheet.wanted.any(), prompt.frame(count), 0)[: len(bound)]),
-        ]
-    with m.Elif(since != 0):
-        m.d.sync += since.eq(since + 1)
+    m = proof.m
+    since, bound = _frame_time(sheet, prompt)
     proof.claim(since <= bound)
     awake = Signal(range(PACKED + 8 + sheet.dut.derived.project_clocks))  # clocks since a touch that the solver chooses
     alone = Signal()  # no frame has been under way since
@@ -143,6 +150,48 @@ def _awake_lemmas(sheet: Sheet, spec: Frames, packing, awake, alone, since) -> N
         proof.lemma((awake != 2) | sheet.read_2.any())
 
 
+def in_two_frames(proof: Proof, **changes: Any) -> None:
+    """Free: one switch and all that the pins read but for what it sees to. Assumed: see ``Prompt`` and ``Switch``.
+
+    Claimed: a switch that stays closed is offered before two frames of all rows are over, less ``PACKED``; and then
+    again and again.
+    """
+    m = proof.m
+    sheet = Sheet(proof, skin_of(**changes))
+    spec, switch = Frames(sheet), Switch(sheet)
+    report, prompt = Report(sheet, spec, switch), Prompt(sheet, spec)
+    since, bound = _frame_time(sheet, prompt)
+    most = 2 * prompt.longest - PACKED
+    age = Signal(range(most + 2))  # clocks for which the switch was closed, and not offered
+    m.d.sync += age.eq(Mux(switch.closed & ~report.offered, age + 1, 0))
+    proof.claim(age <= most)
+    keep_frames(sheet, spec)
+    closed_lemmas(sheet, spec, switch, report)
+    packing = _packing(sheet, spec, prompt)
+    _frame_time_lemmas(sheet, prompt, packing, since, bound)
+    _age_lemmas(sheet, switch, report, prompt, spec.underway, packing, age, since, bound)
+
+
+def _age_lemmas(
+    sheet: Sheet, switch: Switch, report: Report, prompt: Prompt, underway, packing, age, since, bound
+) -> None:
+    proof, rests, clock = sheet.proof, sheet.inside["rests"], sheet.clock
+    listened = sheet.dut.derived.project_clocks + 2
+    proof.lemma(bound <= prompt.longest)
+    proof.lemma(~report.due | report.told | underway)
+    proof.lemma((age == 0) | switch.closed_1)
+    proof.lemma((age <= 1) | switch.closed_2)
+    with proof.m.If(since == 0):
+        proof.lemma(~rests | (age <= 2))
+        proof.lemma(rests | (age <= clock) | (clock == listened))
+        proof.lemma((packing == 0) | (age + packing <= PACKED + 3))
+        proof.lemma(age <= max(listened, PACKED + 3))
+    with proof.m.Elif(report.due & ~report.told):
+        proof.lemma(age <= since + prompt.longest + 1)
+    with proof.m.Else():
+        proof.lemma(age <= since + 1)
+
+
 def rises(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and when rows are taken. Assumed: no frame is packed before its last row is taken.
 
@@ -168,6 +217,11 @@ _NEXT_BUGS = (
     Bug("driven for a clock more", ReversalScanner, "clock",
         lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
 )  # fmt: skip
+_TWO_BUGS = (
+    Bug("does not wake", ReversalScanner, "rests", lambda rests, inside: rests | inside["rests"]),
+    Bug("one row at most", ReversalScanner, "todo",
+        lambda rows, inside: Mux(inside["begins"], rows & (~rows + 1), rows)),
+)  # fmt: skip
 _CONTACT_BUGS = (
     Bug("with the row", ReversalScanner, "contact",
         lambda contact, inside: Mux(inside["strobe"] | inside["contact"], contact, 0)),
@@ -182,6 +236,9 @@ CASES = (
          partial(next_frame, rows=8, columns=2, **LONG), 2),
     Case("the next frame in time", "3x2, longer precharge than projection",
          partial(next_frame, rows=3, columns=2, precharge_us=12), 2),
+    Case("reported within two frames", "2x2", partial(in_two_frames, rows=2, columns=2, **SHORT), 2, _TWO_BUGS, 54),
+    Case("reported within two frames", "3x2, debounced",
+         partial(in_two_frames, rows=3, columns=2, debounce="sym_defer_pk"), 2),
     Case("contact in three clocks", "3x2", partial(rises, rows=3, columns=2), 3, _CONTACT_BUGS),
     Case("contact in three clocks", "3x2, shortest times, row2col",
          partial(rises, rows=3, columns=2, diodes="row2col", **SHORT), 3),
