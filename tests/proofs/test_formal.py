@@ -33,7 +33,7 @@ LONG = {
     "frames of a line reversal, 8x2",
     "a closed switch is reported, 8x4",
     "the next frame in time, 8x2, long times",
-    "the next frame in time, 3x2, longer precharge than projection",
+    "the next frame in time, 3x2, long precharge",
     "times of a line reversal, 3x2, long release",
     "contact in three clocks, 3x2, shortest times, row2col",
 }

@@ -216,7 +216,7 @@ CASES = (
     Case("times of a line reversal", "3x2", partial(lasts, rows=3, columns=2, precharge_us=5), 2, _LASTS_BUGS, 24),
     Case("times of a line reversal", "3x2, shortest times, row2col",
          partial(lasts, rows=3, columns=2, diodes="row2col", **SHORT), 2),
-    Case("times of a line reversal", "3x2, longer precharge than projection",
+    Case("times of a line reversal", "3x2, long precharge",
          partial(lasts, rows=3, columns=2, precharge_us=12), 2),
     Case("times of a line reversal", "3x2, long release",
          partial(lasts, rows=3, columns=2, **(LONG | {"release_us": 20})), 2),

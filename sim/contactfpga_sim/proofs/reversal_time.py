@@ -234,7 +234,7 @@ CASES = (
          partial(next_frame, rows=3, columns=2, debounce="sym_defer_pk"), 2),
     Case("the next frame in time", "8x2, long times",
          partial(next_frame, rows=8, columns=2, **LONG), 2),
-    Case("the next frame in time", "3x2, longer precharge than projection",
+    Case("the next frame in time", "3x2, long precharge",
          partial(next_frame, rows=3, columns=2, precharge_us=12), 2),
     Case("reported within two frames", "2x2", partial(in_two_frames, rows=2, columns=2, **SHORT), 2, _TWO_BUGS, 54),
     Case("reported within two frames", "3x2, debounced",
