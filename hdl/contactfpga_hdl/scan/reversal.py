@@ -207,7 +207,8 @@ class ReversalScanner(wiring.Component):
     def _offer_all_rows(self, m: Module, sheet: _Sheet, turn: _Turn, pressed: Value) -> None:
         rows, row = self.rows, self.rows.payload
         place = Signal(range(max(2, self.skin.rows)))  # of the row on offer
-        driven, rest = Signal(), Signal()  # rows up to the one that was driven are known; all others are
+        driven = Signal()  # rows up to the one that was driven are known
+        rest = Signal()  # all others are
         cells = Signal(self.skin.columns)
         m.d.comb += [
             rows.valid.eq(driven | rest),
