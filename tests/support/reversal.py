@@ -1,6 +1,7 @@
 """Sheets scanned by line reversal: Skins, what touches them, and what is seen at their pins."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 from scipy import ndimage
@@ -83,7 +84,7 @@ class Slot:
 def slots(changes, cycles: int) -> list[Slot]:
     """From (cycle, rows) of every change of the driven rows, one at a time."""
     found = []
-    for (begin, rows), (end, after) in zip(changes, changes[1:]):
+    for (begin, rows), (end, after) in itertools.pairwise(changes):
         if rows:
             assert rows.bit_count() == 1, f"cycle {begin}: rows {rows:#b} are driven together"
             assert after == 0, f"cycle {end}: no gap between two rows"
