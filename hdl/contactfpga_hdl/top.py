@@ -11,6 +11,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
+from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver, Transmitter
 from contactfpga_hdl.payloads import moments_layout
@@ -69,7 +70,8 @@ class Top(wiring.Component):
         m.submodules.packer = packer = Packer(self.skin, offset_bits(self.skin))
         m.submodules.link = link = Link(self.skin)
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
-        m.submodules.receiver = receiver = Receiver(bit_clocks)
+        receiver = PulseReceiver(bit_clocks) if self.derived.pulsed else Receiver(bit_clocks)
+        m.submodules.receiver = receiver
         m.submodules.request = request = RequestReader()
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)

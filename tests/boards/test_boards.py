@@ -40,7 +40,7 @@ def test_a_board_of_your_own_is_named_by_where_it_is():
 @every_board
 def test_pins_exist_on_the_platform_and_none_is_used_twice(board):
     sites = connector_sites(board)
-    pins = [*board.row_side, *board.column_side, board.contact]
+    pins = [*board.row_side, *board.column_side, board.contact, *(board.uart or ())]
     wired = [sites[pin] for pin in pins] + list(board.held_high)
     assert len(set(wired)) == len(wired)
     assert all(board.label(pin) for pin in pins)
@@ -111,6 +111,23 @@ def test_columns_of_an_ecp5_are_pulled_either_way(diodes, pull):
     lpf = plan_for(ULX3S, ULX3S.skin.replace(diodes=diodes)).files["contactfpga.lpf"]
     lpf = lpf if isinstance(lpf, str) else lpf.decode()
     assert sum("columns_0" in line and f"PULLMODE={pull}" in line for line in lpf.splitlines()) == 16
+
+
+def test_an_external_bridge_has_two_pins_and_a_line_that_rests_high_where_none_is_plugged_in():
+    board = BOARDS["ulx3s-12f-ft232h"]
+    lpf = plan_for(board, board.skin).files["contactfpga.lpf"]
+    lpf = (lpf if isinstance(lpf, str) else lpf.decode()).splitlines()
+    sites = connector_sites(board)
+    uart = [line for line in lpf if "uart" in line]
+    assert [line for line in uart if line.startswith("LOCATE")] == [
+        f'LOCATE COMP "uart_1__{name}__io" SITE "{sites[pin]}";' for name, pin in zip(("rx", "tx"), board.uart)
+    ]
+    assert [("rx" in line) for line in uart if "PULLMODE=UP" in line] == [True]
+    assert board.skin.clock_hz / board.skin.baud == 5
+    with pytest.raises(
+        SkinError, match="baud is 15000000, the FT232H of ULX3S 12F with FT232H reaches 12000000 at most"
+    ):
+        board.check(board.skin.replace(baud=15_000_000))
 
 
 # ---- what cannot be built

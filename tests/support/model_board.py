@@ -2,6 +2,9 @@
 
 from wire import EPOCH_US, Wire, requests_in
 
+from contactfpga_sim.golden.request import heard
+from contactfpga_sim.golden.uart import pulsed
+
 ZONE = (4, 10, 6)
 """The zone it reports unless told otherwise: area, sum x, sum y."""
 
@@ -25,6 +28,8 @@ class ModelBoard:
         self.heard = 0
         self.overwritten = 0
         self.stuck = 0
+        self.told = None  # the number that a hello repeats, where what follows a request may hide it
+        self._taken = 0
         self._heard_bytes = b""
 
     def frame(self, flags=(), **options) -> bytes:
@@ -43,16 +48,29 @@ class ModelBoard:
         return self.wire.zones(self.moments, flags=flags, **options)
 
     def hello(self, **options) -> bytes:
-        state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": self.heard, "stuck": self.stuck}
+        told = self.heard if self.told is None else self.told
+        state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": told, "stuck": self.stuck}
         return self.wire.hello(**state | options)
 
     def hear(self, data) -> list:
         """(number, whether a hello is asked for) of the requests that these bytes complete."""
+        if pulsed(self.wire.known.bit_clocks):
+            return self._hear_pulses(data)
         *packets, self._heard_bytes = (self._heard_bytes + data).split(b"\0")
         found = requests_in(packets)
         for number, _ in found:
             self.heard = number
         return found
+
+    def _hear_pulses(self, data) -> list:
+        self._heard_bytes += data
+        found = heard([(0, self._heard_bytes)], self.wire.known.bit_clocks)
+        new = [(one.number, one.hello) for one in found.requests][self._taken :]
+        self._taken += len(new)
+        for number, _ in new:
+            self.heard = number
+        self.told = found.numbers[-1][1] if found.numbers else 0
+        return new
 
 
 class DirectPort(ModelBoard):

@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Mapping
 
-from amaranth.build import Attrs, Pins, Platform, Resource
+from amaranth.build import Attrs, Pins, Platform, Resource, Subsignal
 from amaranth.hdl import ClockDomain, Const, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
@@ -13,6 +13,9 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board.clock import PllClock
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.top import Top
+
+_UART = 1
+"""The platform's own is 0."""
 
 
 def platform_for(board: BoardSpec) -> Platform:
@@ -41,7 +44,7 @@ class BoardTop(Elaboratable):
             m.domains.sync = ClockDomain()
             m.submodules.clock = PllClock(self.board, self.skin.clock_hz)
         platform.add_resources(self._resources())
-        uart = platform.request("uart", 0, dir="-")
+        uart = platform.request("uart", _UART if self.board.uart else 0, dir="-")
         m.submodules.rx = rx = io.Buffer("i", uart.rx)
         m.submodules.tx = tx = io.Buffer("o", uart.tx)
         m.submodules.contact = contact = io.Buffer("o", platform.request("contact", 0, dir="-"))
@@ -102,6 +105,11 @@ class BoardTop(Elaboratable):
             resources.append(
                 Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **self._pulls(name)))
             )
+        if board.uart:
+            rx, tx = board.uart  # nothing may be plugged in: received is then a line at rest
+            pulled = Attrs(**board.standard, **board.pulls["col2row"])
+            lines = Subsignal("rx", Pins(rx, dir="i"), pulled), Subsignal("tx", Pins(tx, dir="o"), attrs)
+            resources.append(Resource("uart", _UART, *lines))
         if board.held_high:
             resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))
         return resources

@@ -15,8 +15,9 @@ _CODE, _NUMBER, _KIND, _CHECK, _WHOLE = 0, 1, 1 + protocol.HEARD_DIGITS, 2 + pro
 class RequestReader(wiring.Component):
     """Finds requests bit by bit; nothing but the number and what the check needs is kept.
 
-    ``received`` is high in the middle of the good stop bit of a request's closing delimiter; ``hello`` then says if it
-    asks for one. From the next clock on ``heard`` holds the lowest bits of its number, and ``number`` all of it.
+    ``received`` is high with ``good`` of a request's closing delimiter, which has no bits where it comes as a pulse;
+    ``hello`` then says if the request asks for one. From the next clock on ``heard`` holds the lowest bits of its
+    number, and ``number`` all of it.
     ``number`` is 0 again from the clock after the first digit's first bit of any later packet.
     """
 
@@ -34,10 +35,10 @@ class RequestReader(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         place = Signal(range(_WHOLE + 2), init=_WHOLE + 1)  # bytes since the last delimiter; stays after the last
-        bit = Signal(3)
+        bit = self.bits.index
         zero = Signal(init=1)  # all bits of this byte so far
         with m.If(self.bits.bit):
-            m.d.sync += [bit.eq(bit + 1), zero.eq(zero & ~self.bits.level)]
+            m.d.sync += zero.eq(zero & ~self.bits.level)
         with m.If(self.bits.good | self.bits.bad):
             m.d.sync += zero.eq(1)
             with m.If(self.bits.good & zero):

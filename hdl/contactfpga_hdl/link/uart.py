@@ -41,13 +41,13 @@ class Transmitter(wiring.Component):
         return m
 
 
-LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "good": Out(1), "bad": Out(1)})
-"""What a receiver finds: ``bit`` is high in the middle of each data bit, whose level is then ``level``. In the middle
-of the stop bit ``good`` or ``bad`` is high for one clock."""
+LINE_BITS = wiring.Signature({"level": Out(1, init=1), "bit": Out(1), "index": Out(3), "good": Out(1), "bad": Out(1)})
+"""What a receiver finds: ``bit`` is high for a clock in each data bit, whose level is then ``level`` and whose place in
+its byte ``index``. After the last one ``good`` or ``bad`` is high for a clock."""
 
 
 class Receiver(wiring.Component):
-    """Line level in, bits out.
+    """Line level in, bits out, each taken in its middle; ``good`` and ``bad`` in that of the stop bit.
 
     pin (in): the line; it passes two synchronizer stages.
     bits (out): see :data:`LINE_BITS`.
@@ -79,4 +79,6 @@ class Receiver(wiring.Component):
                 self.bits.good.eq(stops & level),
                 self.bits.bad.eq(stops & ~level),
             ]
+        with m.If(self.bits.bit):
+            m.d.sync += self.bits.index.eq(self.bits.index + 1)
         return m

@@ -2,13 +2,15 @@
 
 from contactfpga.boards.ice40 import ICEBREAKER, ICESTICK
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.boards.ulx3s import ULX3S_12F, ULX3S_85F
+from contactfpga.boards.ulx3s import ULX3S_12F, ULX3S_12F_FT232H, ULX3S_85F
 from contactfpga.choices.choice import load_own
 from contactfpga.skin import SkinError
 
 __all__ = ["BOARDS", "find"]
 
-BOARDS: dict[str, BoardSpec] = {board.name: board for board in (ICEBREAKER, ICESTICK, ULX3S_12F, ULX3S_85F)}
+BOARDS: dict[str, BoardSpec] = {
+    board.name: board for board in (ICEBREAKER, ICESTICK, ULX3S_12F, ULX3S_85F, ULX3S_12F_FT232H)
+}
 """By name."""
 
 

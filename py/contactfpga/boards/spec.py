@@ -79,6 +79,8 @@ class BoardSpec:
     """File in constraints/; boards with the same pins share it."""
     skin: Skin
     """A sheet that fits, built unless another one is given."""
+    uart: tuple[str, str] | None = None
+    """Connector pins of an external bridge, where the board receives and where it sends; None: it has one on board."""
     held_high: tuple[str, ...] = ()
     """FPGA pins that other chips on the board want high."""
 

@@ -7,6 +7,7 @@ import dataclasses
 from contactfpga.boards.spec import BoardSpec, Bridge, Programmer
 from contactfpga.skin import Skin
 
+_FT232H = Bridge("FT232H", (0x0403, 0x6014), None, 12_000_000)  # on a module of its own
 _FT231X = Bridge("FT231X", (0x0403, 0x6015), None, 3_000_000)
 # fujprog is the maker's, but distributions package openFPGALoader. Without -f the bitstream is lost at power-off.
 _LOADER = Programmer("openFPGALoader", ("-b", "ulx3s", "-f"), "sudo apt install openfpgaloader")
@@ -44,4 +45,15 @@ ULX3S_85F = dataclasses.replace(
     title="ULX3S 85F",
     fpga="LFE5U-85F",
     platform="amaranth_boards.ulx3s:ULX3S_85F_Platform",
+)
+
+ULX3S_12F_FT232H = dataclasses.replace(
+    ULX3S_12F,
+    name="ulx3s-12f-ft232h",
+    title="ULX3S 12F with FT232H",
+    column_side=(*_pairs(18, 25), "gpio_0:27+"),
+    uart=("gpio_0:26+", "gpio_0:26-"),
+    bridge=_FT232H,
+    constraints="ulx3s-ft232h.lpf",
+    skin=Skin(clock_hz=60_000_000, baud=12_000_000),
 )

@@ -38,12 +38,13 @@ def run(args: argparse.Namespace) -> int:
         return 0
     height, width = args.cells
     sheet = f"{skin.rows}x{skin.columns}, scan {skin.scan!r}, {skin.clock_hz / 1e6:g} MHz, {skin.baud / 1e6:g} Mbaud"
-    last, pin = found.touch_to_last_byte_us, found.touch_to_contact_us
+    last, pin, change = found.touch_to_last_byte_us, found.touch_to_contact_us, found.change_to_last_byte_us
     for title, what in (
         ("sheet", sheet),
         ("contact", f"{height}x{width} cells at {found.touches} places, on the compiled gateware"),
         ("touch to last byte", f"{last.median:.1f} us median, {last.worst:.1f} us worst"),
         ("touch to contact pin", f"{pin.median:.2f} us median, {pin.worst:.2f} us worst"),
+        ("change to last byte", f"{change.median:.1f} us median, {change.worst:.1f} us worst, with frames on the wire"),
         ("frames per second", f"{found.frames_per_s:,.0f} while it moves"),
         ("bytes", f"{found.bytes} in a frame with the contact"),
     ):

@@ -10,17 +10,20 @@ import dataclasses
 import math
 import random
 
+import numpy as np
+
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
-from contactfpga.driver.timeline import MOST_S, Timeline
+from contactfpga.driver.timeline import MOST_S, Timeline, continues
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
-from contactfpga.wire import framing, protocol
+from contactfpga.wire import framing, many, protocol
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
+from contactfpga.zones.run import Run, frame_of
 from contactfpga.zones.zone import Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
@@ -36,6 +39,9 @@ class Arrival:
 
 
 Event = Arrival | Hello | SkinMismatch | VersionMismatch
+
+FEW, FEW_IN_RUN = 16, 8
+"""Fewer packets are decoded, and fewer frames taken, faster one by one."""
 
 
 class Conversation:
@@ -81,18 +87,75 @@ class Conversation:
     def receive(self, data: bytes, now: float) -> list[Event]:
         """What ``data`` completes, in order. ``now`` is the time of its arrival in seconds; call it every now and then
         also when nothing came, as then a request may have to be sent again."""
+        packets = self._split(data, now)
+        events = [event for packet in packets if (event := self._packet(packet, now)) is not None]
+        self._end(now)
+        return events
+
+    def receive_runs(self, data: bytes, now: float) -> list[Event | Run]:
+        """The same, but most of many frames come in runs: those that answer no request that none before them does."""
+        packets = self._split(data, now)
+        events: list[Event | Run] = []
+        at = 0
+        while at < len(packets):
+            at += self._take_some(packets[at:], now, events)
+        self._end(now)
+        return events
+
+    def _split(self, data: bytes, now: float) -> list[bytes]:
         self.stats.bytes += len(data)
         self._notice(now)
         *packets, self._rest = (self._rest + data).split(b"\0")
-        events = []
-        for packet in packets:
-            if packet and (event := self._packet(packet, now)) is not None:
-                events.append(event)
+        return [packet for packet in packets if packet]
+
+    def _end(self, now: float) -> None:
         if len(self._rest) > LONGEST_PACKET:
             self._refuse("noise")
             self._rest = b""
         self._requests.poll(now, hello=not self._timeline.known)
-        return events
+
+    def _take_some(self, packets: list[bytes], now: float, events: list[Event | Run]) -> int:
+        """Take packets until the sheet changes, at least one; how many.
+
+        A frame is decoded by itself where it is not known to continue the one before, and so decides what the next
+        ones mean.
+        """
+        before, widths = self._before(), self._widths
+        table, ends, follows = None, [0], False
+        if len(packets) >= FEW and widths is not None and widths.report.zones and not widths.sheet.ghosts:
+            table = many.decode(packets, widths, before)
+            ends, follows = self._stretches(table.packets, now)
+        at = 0
+        while at < len(packets) and self._widths is widths and self._before() == before:
+            if follows and table is not None and ends[at] - at >= FEW_IN_RUN:
+                events.append(self._take_run(table, at, ends[at], now))
+                at, follows = ends[at], False
+                continue
+            event = self._packet(packets[at], now)
+            at, follows = at + 1, isinstance(event, Arrival)
+            if event is not None:
+                events.append(event)
+        return at
+
+    def _stretches(self, packets: np.ndarray, now: float) -> tuple[list[int], bool]:
+        """For each place, and the one after the last, where the stretch ends in which each frame continues the one
+        before, and whether the first one is expected."""
+        found = continues(packets)
+        _, time_us, _, heard, *_ = packets[0].item()
+        expected = bool(packets["valid"][0]) and self._timeline.expects(heard, time_us, now)
+        found[0] = expected
+        places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
+        return np.minimum.accumulate(places[::-1])[::-1].tolist(), expected
+
+    def _take_run(self, table: many.Table, start: int, end: int, now: float) -> Run:
+        assert self._widths is not None
+        widths = self._widths
+        packets, starts = table.packets[start:end], table.starts[start : end + 1]
+        last = frame_of(packets[-1].item(), table.records[starts[-2] : starts[-1]], widths.sheet)
+        times_us = self._timeline.take_run(packets, widths, last, now)
+        self._requests.take_frame(last.heard, now)  # all of them carry the same
+        self._passed()
+        return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None)
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
@@ -108,11 +171,15 @@ class Conversation:
         except PacketError as error:
             self._refuse(error.reason)
             return None
+        self._passed()
+        return event
+
+    def _passed(self) -> None:
+        """A valid packet came."""
         self._begun = True
         if self._damage:
             self._damage = False
             self.stats.resynchronized += 1
-        return event
 
     def _refuse(self, reason: str) -> None:
         if self._begun:
@@ -135,7 +202,7 @@ class Conversation:
         if self.hello is None and framing.unreadable(packet):
             self.stats.before_hello += 1
             return None
-        plain = framing.unseal(packet, protocol.check_prefix(self.hello) if self.hello else b"")
+        plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
             hello = self._reader.take(plain)
@@ -147,6 +214,9 @@ class Conversation:
             self.stats.foreign_skin += 1
             return None
         return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, now)
+
+    def _before(self) -> bytes:
+        return protocol.check_prefix(self.hello) if self.hello else b""
 
     def _take_frame(self, frame: Frame, widths: Widths, now: float) -> Arrival | None:
         before = self._timeline.before
@@ -169,7 +239,7 @@ class Conversation:
             self.sheet = self._widths = None
             return SkinMismatch(f"{self.port} was built from {difference(hello, expected)}")
         self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
-        self._requests.take_hello(hello.heard)
+        self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud
         if self.sheet != hello.sheet:

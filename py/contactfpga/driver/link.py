@@ -13,6 +13,7 @@ from contactfpga.driver.transport import Transport
 from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
+from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 TURN_S = 0.05
@@ -28,7 +29,7 @@ Found = Zones | ContactFPGAError | Hello | bool
 class Listener(Protocol):
     """Takes what comes over a port."""
 
-    def put(self, item: Zones | ContactFPGAError) -> None:
+    def put(self, item: Zones | Run | ContactFPGAError) -> None:
         """Add what came; the lock :attr:`Link.changed` is held."""
 
 
@@ -139,7 +140,7 @@ class Link:
         return len(data)
 
     def _take(self, data: bytes) -> None:
-        for event in self.conversation.receive(data, self.transport.clock()):
+        for event in self.conversation.receive_runs(data, self.transport.clock()):
             self._pass_on(event)
         self.changed.notify_all()
         if not self.transport.threaded:
@@ -151,12 +152,14 @@ class Link:
             while self._turning is None and self._turn(0.0):
                 pass
 
-    def _pass_on(self, event: Event) -> None:
+    def _pass_on(self, event: Event | Run) -> None:
         if isinstance(event, Hello):
             return
         item = event.zones if isinstance(event, Arrival) else event
         for listener in self.listeners:
             listener.put(item)
+        if isinstance(event, Run):  # what it answers, the frame before it has answered
+            return
         for waiter in self._waiters:
             if waiter.found is not None:
                 continue

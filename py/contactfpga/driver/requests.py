@@ -34,6 +34,8 @@ class Requests:
     def __init__(self, rng: random.Random | None = None):
         self.retry_s = 0.5
         """A request that is unanswered for this long is sent again, as long as someone waits for it."""
+        self.pulsed: bool | None = None
+        """Whether the board reads pulses; None: unknown, so it is sent both, of which it takes one for a request."""
         self.answered = 0
         """All tickets up to this one are answered."""
         self._rng = rng or random.SystemRandom()
@@ -70,10 +72,15 @@ class Requests:
         """Whether this is the number sent last, and was sent since that moment."""
         return number == self._number and self._sent_at >= moment
 
-    def take_hello(self, heard: int) -> None:
-        """A hello that repeats this number."""
-        if self._stage is _Stage.GREETING and heard == self._number:
+    def take_hello(self, heard: int, pulsed: bool, now: float) -> None:
+        """A hello that repeats this number, of a board that reads pulses or does not."""
+        learned, self.pulsed = pulsed and not self.pulsed, pulsed
+        if self._stage is not _Stage.GREETING:
+            return
+        if heard == self._number:
             self._stage = _Stage.ECHOING
+        elif learned and self._tickets > self.answered:  # the other form, which came last, hid the number
+            self._put(self._random(), now, hello=True)
 
     def take_frame(self, heard: int, now: float) -> None:
         """A frame that carries these lowest bits."""
@@ -110,7 +117,9 @@ class Requests:
     def _put(self, number: int, now: float, hello: bool) -> None:
         self._number, self._sent_at = number, now
         self._recent.append(_low(number))
-        self._out += protocol.encode_request(number, hello)
+        for pulsed in (True, False):  # last what most boards read: whatever follows a request hides its number
+            if self.pulsed in (None, pulsed):
+                self._out += protocol.encode_request(number, hello, pulsed)
 
     def _random(self) -> int:
         """A number whose lowest bits, and the next ones, have not been sent in this order of late: a frame and the one

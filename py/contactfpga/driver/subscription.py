@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import collections
 import contextlib
 from collections.abc import AsyncIterator, Iterator
 
 from contactfpga.driver.link import Link
+from contactfpga.driver.queue import FrameQueue
 from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 
@@ -23,15 +24,22 @@ class Subscription:
     def __init__(self, link: Link, maxsize: int, board: object = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
-        self.maxsize = maxsize
-        self.dropped = 0
-        """Frames that were not taken in time."""
+        self._frames = FrameQueue(maxsize)
         self._link = link
         self._board = board  # stays open as long as someone may take frames here
-        self._items: collections.deque[Zones | ContactFPGAError] = collections.deque()
         self._closed = False
         with link.changed:
             link.listeners.add(self)
+
+    @property
+    def maxsize(self) -> int:
+        """Frames that wait at most."""
+        return self._frames.maxsize
+
+    @property
+    def dropped(self) -> int:
+        """Frames that were not taken in time."""
+        return self._frames.dropped
 
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order; errors as for :meth:`Board.next`."""
@@ -46,10 +54,7 @@ class Subscription:
             with contextlib.suppress(ReadTimeout, PortLost):  # whatever is lost, the next call says so
                 link.wait_for(lambda: None, until, max_s)
         with link.changed:
-            frames = []
-            while self._items and isinstance(item := self._items[0], Zones):
-                frames.append(item)
-                self._items.popleft()
+            frames = self._frames.pop_frames()
         return Batch.of(frames or [self.next(timeout)])
 
     def close(self) -> None:
@@ -57,7 +62,7 @@ class Subscription:
         with self._link.changed:
             self._closed = True
             self._link.listeners.discard(self)
-            self._items.clear()
+            self._frames.clear()
             self._link.changed.notify_all()
 
     def __enter__(self) -> Subscription:
@@ -76,7 +81,7 @@ class Subscription:
     async def __aiter__(self) -> AsyncIterator[Zones]:
         while True:
             try:
-                if self._items:
+                if self._frames:
                     await asyncio.sleep(0)  # others get their turn
                 else:
                     await asyncio.to_thread(self._wait, 1.0)
@@ -86,45 +91,39 @@ class Subscription:
 
     def _wait(self, timeout: float) -> None:
         timeout = checked(timeout)
-        self._link.wait_for(lambda: True if self._items else None, self._link.clock() + timeout, timeout)
+        self._link.wait_for(lambda: True if self._frames else None, self._link.clock() + timeout, timeout)
 
     def _pop(self) -> Zones | ContactFPGAError | None:
         if self._closed:
             raise BoardClosed(f"{self._link.transport.name}: this subscription was closed; subscribe again")
-        return self._items.popleft() if self._items else None
+        return self._frames.pop()
 
     # ---- for the board
 
-    def put(self, item: Zones | ContactFPGAError) -> None:
+    def put(self, item: Zones | Run | ContactFPGAError) -> None:
         """Add what came; the board's lock is held."""
-        self._items.append(item)
-        while len(self._items) > self.maxsize:
-            self.dropped += isinstance(self._items.popleft(), Zones)
+        self._frames.put(item)
 
     def put_back(self, zones: Zones) -> None:
         """Have this frame come next."""
         with self._link.changed:
-            self._items.appendleft(zones)
+            self._frames.put_back(zones)
 
     def skip_to(self, zones: Zones) -> None:
         """Drop this frame and all that came before it."""
         with self._link.changed:
-            if zones in self._items:
-                while self._items.popleft() is not zones:
-                    pass
+            self._frames.skip_to(zones)
 
     def keep_last(self) -> None:
         """Drop all frames but the last one; raises what a hello gave cause for."""
         with self._link.changed:
-            while len(self._items) > 1:
-                if isinstance(item := self._items.popleft(), ContactFPGAError):
-                    raise item
+            self._frames.keep_last()
 
     def raise_first(self) -> None:
         """Raise what a hello gave cause for before the first frame."""
         with self._link.changed:
-            if self._items and isinstance(item := self._items[0], ContactFPGAError):
-                raise item
+            if (error := self._frames.first_error()) is not None:
+                raise error
 
 
 def frame_of(found: object) -> Zones:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from contactfpga.driver.stats import Stats
 from contactfpga.skin.derived import EPOCH_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS, TIME_BITS, Widths
@@ -95,6 +97,33 @@ class Timeline:
         self._now, self.before = now, frame
         return time_us
 
+    def expects(self, heard: int, time_us: int, now: float) -> bool:
+        """Whether a frame that carries these continues the one explained last."""
+        if self.before is None or self._time_us is None or not self._known:
+            return False
+        soon = not self._live or now - self._now <= self._patience_s
+        return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
+
+    def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
+        """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
+        the first one is expected, or the one before it was explained.
+
+        ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: the last one of them.
+        """
+        assert self.before is not None
+        assert self._time_us is not None
+        before = self.before
+        lost = int((_steps(packets["sequence"], before.sequence, _SEQUENCES) - 1 & _SEQUENCES - 1).sum())
+        times_us = self._time_us + np.cumsum(_steps(packets["time_us"], before.time_us, _WRAP_US))
+        self._stats.frames += len(packets)
+        self._stats.lost += lost
+        overwritten = _steps(packets["overwritten"], before.overwritten, 1 << widths.overwritten_bits)
+        self._stats.overwritten += int(overwritten.sum())
+        self._next += lost + len(packets)
+        self._time_us = self._last_us = int(times_us[-1])
+        self._now, self.before = now, last
+        return times_us
+
     def _gap(self, frame: Frame) -> int:
         return (frame.sequence - self._next) % _SEQUENCES
 
@@ -114,3 +143,23 @@ class Timeline:
             return time_us if time_us > self._last_us else None
         step_us = (frame.time_us - self._time_us) % _WRAP_US
         return self._time_us + step_us if 0 < step_us <= MOST_US else None
+
+
+def continues(packets: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether each frame's time follows from the one before it, if that one's is known.
+
+    ``packets``: of :data:`contactfpga.wire.many.FIELDS`, as they came one after the other.
+    """
+    valid, heard, time_us = packets["valid"], packets["heard"], packets["time_us"]
+    found = np.zeros(len(packets), np.bool_)
+    step_us = time_us[1:] - time_us[:-1] & _WRAP_US - 1
+    found[1:] = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
+    return found
+
+
+def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
+    """From each value to the next, the first one from ``before``; ``modulus`` is a power of two."""
+    steps = values.copy()
+    steps[1:] -= values[:-1]
+    steps[0] -= before
+    return steps & modulus - 1

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from contactfpga.choices import debounces, labellers, scans
 from contactfpga.choices.labellers import Labeller
 from contactfpga.choices.scans import Scan
+from contactfpga.skin import rates
 from contactfpga.skin.widths import CHECK_BYTES as CHECK_BYTES
 from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
@@ -150,7 +151,12 @@ class Derived(Widths):
 
     @property
     def bit_clocks(self) -> int:
-        return round(self.skin.clock_hz / self.skin.baud)
+        return rates.bit_clocks(self.skin.clock_hz, self.skin.baud)
+
+    @property
+    def pulsed(self) -> bool:
+        """Requests come as pulses: a bit is too short to be sampled."""
+        return rates.pulsed(self.skin.clock_hz, self.skin.baud)
 
     @property
     def min_row_clocks(self) -> int:

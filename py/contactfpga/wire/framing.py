@@ -105,6 +105,17 @@ def check_bytes(stuffed: bytes, before: bytes = b"") -> bytes:
     return bytes([0x80 | crc & 0x7F, 0x80 | crc >> 7 & 0x7F, 0x80 | crc >> 14])
 
 
+_MARK, _ONE, _ZERO = 0xF0, 0xFF, 0x00
+_PULSES = [bytes(_ONE if byte >> bit & 1 else _ZERO for bit in range(8)) for byte in range(256)]
+_PULSES[DELIMITER] = bytes([_MARK])
+
+
+def pulses(data: bytes) -> bytes:
+    """Bytes for a board whose bits on the line are too short to be sampled: each zero byte as a low level of 5 bits,
+    each bit of the others, lowest first, as one of 9 bits for a zero and of 1 for a one."""
+    return b"".join(_PULSES[byte] for byte in data)
+
+
 def seal(plain: bytes, before: bytes = b"") -> bytes:
     """A packet's bytes on the wire: stuffed, check bytes, delimiter. ``before`` as for :func:`check_bytes`."""
     stuffed = cobs_encode(plain)

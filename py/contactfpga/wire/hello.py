@@ -8,6 +8,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from contactfpga.choices.reports import REPORTS
+from contactfpga.skin.rates import pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
 
@@ -68,6 +69,11 @@ class Hello:
     """Number of the last request received; see :func:`contactfpga.wire.protocol.may_number`."""
     stuck: int
     """Columns that read pressed while no row was driven, in the frame packed last; 7 stands for 7 or more."""
+
+    @property
+    def pulsed(self) -> bool:
+        """Whether requests go to the board as pulses: it has fewer than 4 clocks per bit."""
+        return pulsed(self.clock_hz, self.baud)
 
 
 def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0) -> bytes:

@@ -24,6 +24,7 @@ from contactfpga.wire.framing import (
     digits,
     kind_of,
     last_byte,
+    pulses,
     seal,
     unseal,
 )
@@ -48,11 +49,13 @@ __all__ = [
     "EPOCH_DIGITS",
     "FLAGS",
     "FLAG_BITS",
+    "FLAG_SETS",
     "HEARD_DIGITS",
     "KINDS",
     "KIND_BITS",
     "KIND_HELLO",
     "KIND_REQUEST",
+    "NO_RECORDS",
     "REQUEST_HELLO",
     "SENT_DIGITS",
     "STATE_DIGITS",
@@ -88,11 +91,13 @@ REQUEST_HELLO = 1
 """Flag of a request that asks for a hello as well."""
 
 
-def encode_request(number: int, hello: bool = False) -> bytes:
-    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end."""
+def encode_request(number: int, hello: bool = False, pulsed: bool = False) -> bytes:
+    """A request with a number that :func:`may_number` allows, as on the wire, with a delimiter at either end;
+    ``pulsed``: as :func:`~contactfpga.wire.framing.pulses`."""
     assert may_number(number), f"{number} is no number of a request"
     plain = digits(number, HEARD_DIGITS) + bytes([last_byte(KIND_REQUEST, REQUEST_HELLO * hello)])
-    return bytes([DELIMITER]) + seal(plain)
+    data = bytes([DELIMITER]) + seal(plain)
+    return pulses(data) if pulsed else data
 
 
 def may_number(number: int) -> bool:
@@ -150,7 +155,7 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
         int.from_bytes(plain[body:-1], "little"),
         *(TIME_BITS, SEQUENCE_BITS, HEARD_BITS, widths.area_bits, widths.zones_bits),
     )
-    flags = _FLAG_SETS[plain[-1] & (1 << len(FLAGS)) - 1]
+    flags = FLAG_SETS[plain[-1] & (1 << len(FLAGS)) - 1]
     expected = sheet.rows if sheet.report == "cells" else zones
     carried = min(expected, widths.max_items)
     if items != carried or ("overflow" in flags) != (carried < expected):
@@ -165,7 +170,7 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
         heard=heard,
         zones=zones,
         cells=cells,
-        moments=_records(plain[:body], items, widths) if sheet.report == "moments" else _NO_RECORDS,
+        moments=_records(plain[:body], items, widths) if sheet.report == "moments" else NO_RECORDS,
         bitmap=_bitmap(plain[:body], widths) if sheet.report == "cells" else None,
         barycenters=_barycenters(plain[:body], items, widths) if sheet.report == "barycenter" else None,
     )
@@ -174,9 +179,10 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
     return frame
 
 
-_NO_RECORDS = np.zeros((0, 3), np.int64)
-_NO_RECORDS.flags.writeable = False
-_FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
+NO_RECORDS = np.zeros((0, 3), np.int64)
+NO_RECORDS.flags.writeable = False
+FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
+"""The flags of a frame by the bits of its last byte."""
 
 
 def _check_sums(frame: Frame, widths: Widths) -> None:
@@ -205,7 +211,7 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
 def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
     """(zones, 3) int64: the fields of zone records."""
     if not zones:
-        return _NO_RECORDS
+        return NO_RECORDS
     size = widths.record_bytes
     area_bits, x_bits, y_bits = widths.record_bits
     area_mask, x_mask, shift = (1 << area_bits) - 1, (1 << x_bits) - 1, area_bits + x_bits

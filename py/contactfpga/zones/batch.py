@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones, on_surface
+from contactfpga.wire.many import FAULT, MISMATCH, OVERFLOW
+from contactfpga.zones.run import Run
+from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
 
 FRAME_DTYPE = np.dtype(
     [
@@ -35,40 +37,75 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 
 @dataclasses.dataclass(frozen=True)
 class Batch:
-    """Consecutive frames and all of their zones."""
+    """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
+    ``batch.frames["time_us"]`` one over all frames, in us."""
 
     frames: np.ndarray
     """(n,) of :data:`FRAME_DTYPE`, in order."""
     zones: np.ndarray
     """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and within these of the zones."""
 
+    @property
+    def starts(self) -> np.ndarray:
+        """(n + 1,) int64: the zones of frame i are ``zones[starts[i] : starts[i + 1]]``."""
+        starts: np.ndarray = np.searchsorted(self.zones["frame"], np.arange(len(self.frames) + 1))
+        return starts
+
     @classmethod
-    def of(cls, frames: Sequence[Zones]) -> Batch:
+    def of(cls, frames: Sequence[Zones | Run]) -> Batch:
         """Of frames of one sheet."""
-        rows = [
-            (
-                one.time_us,
-                math.nan if one.host_time_s is None else one.host_time_s,
-                one.sequence,
-                one.overwritten,
-                one.pressed,
-                one.total_zones,
-                *(flag in one.flags for flag in ("overflow", "mismatch", "fault")),
-            )
-            for one in frames
-        ]
-        return cls(np.array(rows, FRAME_DTYPE), _zones(frames))
+        described = np.zeros(sum(len(one) if isinstance(one, Run) else 1 for one in frames), FRAME_DTYPE)
+        counts = np.zeros(len(described), np.int64)
+        start = 0
+        for one in frames:
+            if isinstance(one, Run):
+                stop = start + len(one)
+                _describe(one, described[start:stop])
+                counts[start:stop] = one.packets["items"]
+                start = stop
+            else:
+                described[start], counts[start] = _row(one), len(one)
+                start += 1
+        return cls(described, _zones(frames, described, counts))
 
 
-def _zones(frames: Sequence[Zones]) -> np.ndarray:
-    sheet = frames[0].sheet
+def _row(one: Zones) -> tuple[float, ...]:
+    """Of :data:`FRAME_DTYPE`."""
+    return (
+        one.time_us,
+        math.nan if one.host_time_s is None else one.host_time_s,
+        one.sequence,
+        one.overwritten,
+        one.pressed,
+        one.total_zones,
+        *(flag in one.flags for flag in ("overflow", "mismatch", "fault")),
+    )
+
+
+_SENT = {"sequence": "sequence", "overwritten": "overwritten", "pressed": "cells", "total_zones": "zones"}
+_FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT}
+
+
+def _describe(run: Run, out: np.ndarray) -> None:
+    """The same of the frames of a run."""
+    out["time_us"] = run.times_us
+    out["host_time_s"] = math.nan if run.host_time_s is None else run.host_time_s
+    for name, sent in _SENT.items():
+        out[name] = run.packets[sent]
+    for name, bit in _FLAGS.items():
+        out[name] = run.packets["flags"] & bit > 0
+
+
+def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    sheet = items[0].sheet
     divided = sheet.report == "barycenter"
-    records = np.concatenate([one.records for one in frames])
+    records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])
     area, x, y = records.T
     out = np.zeros(len(records), DIVIDED_ZONE_DTYPE if divided else ZONE_DTYPE)
-    out["frame"] = np.repeat(np.arange(len(frames)), [len(one) for one in frames])
-    out["time_us"] = np.array([one.time_us for one in frames])[out["frame"]]
-    out["sequence"] = np.array([one.sequence for one in frames])[out["frame"]]
+    which = np.repeat(np.arange(len(frames)), counts)
+    out["frame"] = which
+    out["time_us"] = frames["time_us"][which]
+    out["sequence"] = frames["sequence"][which]
     out["area_cells"] = area
     out["area_mm2"] = area * (sheet.pitch_x_mm * sheet.pitch_y_mm)
     if not divided:
@@ -80,7 +117,7 @@ def _zones(frames: Sequence[Zones]) -> np.ndarray:
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
     _place(out, sheet.radius_mm)
     if sheet.ghosts:
-        out["ghost"] = [suspect for one in frames for suspect in one.suspects]
+        out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]
 
 
@@ -91,6 +128,9 @@ def _place(out: np.ndarray, radius_mm: float | None) -> None:
         out["point_mm"][:, 0], out["point_mm"][:, 1] = out["x_mm"], out["y_mm"]
         out["normal"][:, 2] = 1.0
     else:
-        for row in np.flatnonzero(~nowhere):
-            out["point_mm"][row], out["normal"][row] = on_surface(out["x_mm"][row], out["y_mm"][row], radius_mm)
+        angles = (np.where(nowhere, 0.0, out["x_mm"]) / radius_mm).tolist()
+        for axis, function in enumerate((math.cos, math.sin)):  # numpy's may differ in the last bit
+            out["normal"][:, axis] = [function(angle) for angle in angles]
+            out["point_mm"][:, axis] = radius_mm * out["normal"][:, axis]
+        out["point_mm"][:, 2] = out["y_mm"]
     out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan

@@ -180,7 +180,7 @@ def traffic(
     byte = 10 * facts(skin).bit_clocks
     sent = []
     for gap in gaps:
-        data = _packet(rng)
+        data = _packet(rng, facts(skin).bit_clocks)
         if start + len(data) * byte > cycles:
             break
         sent.append((start, data))
@@ -188,8 +188,8 @@ def traffic(
     return sent
 
 
-def _packet(rng: np.random.Generator) -> bytes:
-    data = bytearray(request(int(rng.integers(1, 1 << 21)), bool(rng.random() < 0.5)))
+def _packet(rng: np.random.Generator, bit_clocks: int) -> bytes:
+    data = bytearray(request(int(rng.integers(1, 1 << 21)), bool(rng.random() < 0.5), bit_clocks))
     match rng.choice(["whole", "flip", "cut", "kind", "bytes"], p=[0.6, 0.15, 0.1, 0.05, 0.1]):
         case "flip":
             data[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))

@@ -37,11 +37,20 @@ class Heard:
         return self.numbers[index - 1][1] if index else 0
 
 
-def request(number: int, hello: bool = False) -> bytes:
-    """A request as on the wire, with a delimiter at either end."""
+def request(number: int, hello: bool = False, bit_clocks: int = 4) -> bytes:
+    """A request as on the wire, with a delimiter at either end, for a board with so many clocks per bit."""
     packet = Packet()
     packet.push(bytes(128 + number // 128**place % 128 for place in range(3)) + bytes([KIND << 4 | hello]))
-    return b"\0" + packet.wire()
+    data = b"\0" + packet.wire()
+    return pulses(data) if uart.pulsed(bit_clocks) else data
+
+
+def pulses(data: bytes) -> bytes:
+    """The same bytes as a board takes them whose bits are too short: a byte for each bit, lowest first, and one for
+    each zero byte."""
+    mark, one, zero = b"\xf0", b"\xff", b"\x00"
+    parts = [[one if bit == "1" else zero for bit in f"{value:08b}"[::-1]] if value else [mark] for value in data]
+    return b"".join(b"".join(part) for part in parts)
 
 
 def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
@@ -52,7 +61,7 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
     for cycle in cycles:
         if sent and cycle < sent[-1][0] + 10 * bit_clocks * len(sent[-1][1]):
             continue
-        sent.append((cycle, request(number, len(sent) % 2 == 0)))
+        sent.append((cycle, request(number, len(sent) % 2 == 0, bit_clocks)))
         number += 2 if number % 8 == 7 else 1
     return sent
 
@@ -62,9 +71,12 @@ def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int) -> Heard:
     found = Heard([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
-        if packet is not None and 1 <= len(packet) <= 3 and found.numbers and found.numbers[-1][1]:
+        in_number = packet is not None and 1 <= len(packet) <= 3
+        if byte.first_bit is not None and in_number and found.numbers and found.numbers[-1][1]:
             found.numbers.append((byte.first_bit + 1, 0))
-        if byte.value == 0:
+        if byte.value is None:
+            packet = None
+        elif byte.value == 0:
             if packet is not None and _is_request(packet):
                 number = sum(digit % 128 * 128**place for place, digit in enumerate(packet[1:4]))
                 found.requests.append(Request(byte.stop, number, bool(packet[4] & 1)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable
 
 
@@ -23,20 +24,61 @@ def line(sent: Iterable[tuple[int, int]], bit_clocks: int) -> list[tuple[int, in
 class Byte:
     """A byte that was received: when its first data bit was, and its stop bit."""
 
-    value: int
-    first_bit: int
+    value: int | None
+    """None: it was cut short."""
+    first_bit: int | None
+    """None: it had no bits, as a mark among pulses."""
     stop: int
+
+
+def pulsed(bit_clocks: int) -> bool:
+    """Whether a board with so many clocks per bit reads pulses instead of bytes."""
+    return bit_clocks in (2, 3)
 
 
 def received(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[Byte]:
     """What is received of (cycle, bytes), each of which begin at the pin back to back in that cycle."""
-    found, free = [], 0
+    starts = _starts(sent, bit_clocks)
+    if pulsed(bit_clocks):
+        return _of_pulses(starts, bit_clocks)
+    found = []
+    for cycle, value in starts:
+        middle = cycle + 2 + bit_clocks // 2
+        found.append(Byte(value, middle + bit_clocks, middle + 9 * bit_clocks))
+    return found
+
+
+def _starts(sent: Iterable[tuple[int, bytes]], bit_clocks: int) -> list[tuple[int, int]]:
+    """(cycle, byte) of every start bit at the pin."""
+    starts, free = [], 0
     for cycle, data in sent:
         if cycle < free:
             raise ValueError(f"bytes begin in cycle {cycle}; those before them take until {free}")
-        for value in data:
-            middle = cycle + 2 + bit_clocks // 2
-            found.append(Byte(value, middle + bit_clocks, middle + 9 * bit_clocks))
-            cycle += 10 * bit_clocks
-        free = cycle
-    return found
+        starts += [(cycle + 10 * bit_clocks * index, value) for index, value in enumerate(data)]
+        free = cycle + 10 * bit_clocks * len(data)
+    return starts
+
+
+def _of_pulses(starts: list[tuple[int, int]], bit_clocks: int) -> list[Byte]:
+    found: list[Byte] = []
+    bits: list[tuple[int, int]] = []  # (cycle, bit) of a byte so far
+    for start, value in starts:
+        for end, length in _lows(value):
+            cycle = start + end * bit_clocks + 2
+            if length in (4, 5, 6, 7):
+                if bits:
+                    found.append(Byte(None, bits[0][0], cycle))
+                found.append(Byte(0, None, cycle + bool(bits)))
+                bits = []
+                continue
+            bits.append((cycle, int(length < 4)))
+            if len(bits) == 8:
+                found.append(Byte(sum(bit << place for place, (_, bit) in enumerate(bits)), bits[0][0], cycle + 1))
+                bits = []
+    return [*found, Byte(None, bits[0][0], bits[-1][0])] if bits else found
+
+
+def _lows(value: int) -> list[tuple[int, int]]:
+    """(end, length) in bits of each stretch of low line in a byte, counted from the beginning of its start bit."""
+    levels = "0" + f"{value:08b}"[::-1] + "1"
+    return [(match.end(), len(match[0])) for match in re.finditer("0+", levels)]

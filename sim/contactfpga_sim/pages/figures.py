@@ -21,6 +21,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.adaptive import Scanner
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.pages import writer
+from contactfpga_sim.pages.fast_figures import latency_table, sides_table
 from contactfpga_sim.pages.label_figures import labeller_table, recorded_table
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import CONTACTS
@@ -212,6 +213,8 @@ TABLES: writer.Tables = {
     "reference": reference_table,
     "labeller": labeller_table,
     "report": report_table,
+    "fast": latency_table,
+    "sides": sides_table,
     "gain": lambda: gain_table(built_in_scenes()),
 }
 if RECORDINGS.is_dir():  # else their tables stay as they are

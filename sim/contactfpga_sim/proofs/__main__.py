@@ -13,6 +13,7 @@ from contactfpga_sim.proofs import (
     link,
     odometer,
     pack,
+    pulses,
     records,
     scan,
     seek,
@@ -34,6 +35,7 @@ CASES: tuple[Case, ...] = (
     *link.CASES,
     *odometer.CASES,
     *uart.CASES,
+    *pulses.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

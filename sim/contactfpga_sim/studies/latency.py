@@ -20,6 +20,8 @@ GOLDEN = 0.6180339887498949
 SCANS = 40
 """In which a touch must be reported, beside twice the time of its debounce."""
 
+CHANGES = 100
+
 MOVING_FRAMES = 300
 
 
@@ -42,6 +44,8 @@ class Latency:
 
     touch_to_last_byte_us: Spread
     touch_to_contact_us: Spread
+    change_to_last_byte_us: Spread
+    """Of a contact that moved before, so that frames are on the wire: it loses a corner."""
     frames_per_s: float
     """Received while the contact moves."""
     bytes: int
@@ -75,7 +79,7 @@ def measure(
     """A contact of ``cells``, rows and columns, at every place of the sheet, or at ``touches`` of them.
 
     Each comes when the sheet has been reported untouched, at instants spread evenly over a scan. Touches that meet a
-    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with "touches" and how many there are.
+    hello or a keep-alive on the wire are repeated. ``step`` is called after each, with its kind and how many there are.
 
     Raises ValueError for a contact that does not fit, and :class:`Late`.
     """
@@ -87,10 +91,15 @@ def measure(
             found.append(bench.touch(contact, number * GOLDEN % 1))
             step("touches", len(chosen))
         size = max(one.size for _, _, one in found)
+        changes = []
+        for number in range(min(CHANGES, len(chosen))):
+            changes.append(bench.change(contacts, number, size))
+            step("changes", min(CHANGES, len(chosen)))
         rate = bench.moving(contacts, size)
     return Latency(
         touch_to_last_byte_us=Spread.of([clocks for clocks, _, _ in found], skin),
         touch_to_contact_us=Spread.of([clocks for _, clocks, _ in found], skin),
+        change_to_last_byte_us=Spread.of(changes, skin),
         frames_per_s=rate,
         bytes=size,
         touches=len(found),
@@ -132,6 +141,21 @@ class _Bench:
             pin = next(int(event["cycle"]) for event in self._board.take("contact") if event["data"])
             if not kept_alive and self._receiver.hellos == hellos:
                 return one.last + 10 * self._derived.bit_clocks - start, pin - start, one
+
+    def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
+        """Clocks from a change to the last byte of the frame that shows it: the contact has moved on by some places,
+        and then loses a corner."""
+        hold = max(1, size * 10 * self._derived.bit_clocks // 2)
+        places = [contacts[(11 * number + place) % len(contacts)] for place in range(8)]
+        for cells in places:
+            self._board.hold(cells[None], hold)
+        self._board.run(round(number * GOLDEN % 1 * max(2 * hold, self._scan)))
+        self._drop()
+        start, changed = self._board.cycle, places[-1].copy()
+        changed[tuple(np.argwhere(changed)[0])] = False
+        self._board.press(changed)
+        one, _ = self._wait(int(changed.sum()))
+        return one.last + 10 * self._derived.bit_clocks - start
 
     def moving(self, contacts: list[np.ndarray], size: int) -> float:
         """Frames received per second while the contact moves by one place, twice in the time that a frame's bits

@@ -1,0 +1,198 @@
+"""How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.board.driver_speed`.
+
+A process of its own plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this
+process's processor time, all its threads together, so they do not depend on what else the machine does; the latencies
+do. No figure that a test could hold.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import select
+import statistics
+import sys
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import contactfpga
+from contactfpga.driver.conversation import Arrival, Conversation, Event
+from contactfpga.skin import Skin
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.run import Run
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.frame import join
+from contactfpga_sim.golden.hello import hello
+from contactfpga_sim.golden.packet import Packet
+from contactfpga_sim.golden.request import heard
+
+SKIN = Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5)
+FRAMES = 1 << 14
+STEP_US = (1 << 24) // FRAMES
+"""From frame to frame: a frame's time and sequence wrap where the frames begin again."""
+CHUNK = 4096
+"""Bytes that a port hands over at once."""
+PACED, PACE_S = 18, 250e-6
+"""Frames written at once and how often, 72,000 per second: what 12 Mbaud carry."""
+ROUNDS = 20
+
+
+def frame(number: int, low: int) -> bytes:
+    """A fingertip of 3x3 cells that moves along a row."""
+    known = facts(SKIN)
+    x, y = 1 + number // 40 % (SKIN.columns - 2), SKIN.rows // 2
+    counted = 24 + 8 + 3 + known.area_bits + known.zones_bits
+    room = -(-(counted + 4) // 8) * 8 - counted
+    record, _ = join(((9, known.area_bits), (9 * x, known.sum_x_bits), (9 * y, known.sum_y_bits)))
+    trailer, width = join(
+        (
+            (number * STEP_US % 2**24, 24),
+            (number % 256, 8),
+            (low, 3),
+            (9, known.area_bits),
+            (1, known.zones_bits),
+            (0, room + 4),
+            (5, 4),
+        )
+    )
+    packet = Packet()
+    packet.push(record.to_bytes(known.item_bytes, "little") + trailer.to_bytes(width // 8, "little"))
+    return packet.wire(before=known.fingerprint[:2])
+
+
+def greeting(number: int = 0) -> bytes:
+    """The hello of a board that was just powered up and has heard this request."""
+    digits = [0] * 11 + [number >> 7 * place & 127 for place in range(3)] + [0, 0]
+    return hello(facts(SKIN), digits)
+
+
+class Feeder:
+    """The board: answers requests until it is told to go, then writes all frames ``rounds`` times."""
+
+    def __init__(self, rounds: int, paced: bool):
+        self._rounds, self._paced = rounds, paced
+        context: Any = multiprocessing.get_context("fork")
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.port = os.ttyname(slave)
+        self.go = context.Event()
+        self.written_s = context.RawArray("d", rounds * FRAMES)
+        """When each frame's last byte was about to be written, on ``time.monotonic``."""
+        self.process = context.Process(target=self._run, daemon=True)
+
+    def _run(self) -> None:
+        low, sent = self._answer()
+        frames = [frame(number, low) for number in range(FRAMES)]
+        self._write(frame(sent, low))  # the reader waits until the frames are made
+        place = sent + 1
+        size = PACED if self._paced else CHUNK // len(frames[0])
+        due_s = time.monotonic()
+        while place < len(self.written_s):
+            chosen = range(place, min(place + size, len(self.written_s)))
+            data = b"".join(frames[number % FRAMES] for number in chosen)
+            now_s = time.monotonic()
+            for number in chosen:  # before the reader can have them
+                self.written_s[number] = now_s
+            self._write(data)
+            place += size
+            if self._paced:
+                due_s = max(due_s + PACE_S, now_s)  # what came too late is not made up for
+                time.sleep(max(0.0, due_s - time.monotonic()))
+        time.sleep(60.0)  # a port that is closed would take what was not read with it
+
+    def _answer(self) -> tuple[int, int]:
+        asked, taken, low, sent = b"", 0, 0, 0
+        while not self.go.is_set():
+            if not select.select([self._master], [], [], 0.01)[0]:
+                continue
+            asked += os.read(self._master, 4096)
+            for one in heard([(0, asked)], facts(SKIN).bit_clocks).requests[taken:]:
+                taken, low = taken + 1, one.number % 8
+                self._write((greeting(one.number) if one.hello else b"") + frame(sent, low))
+                sent += 1
+        return low, sent
+
+    def _write(self, data: bytes) -> None:
+        while data:
+            data = data[os.write(self._master, data) :]
+
+
+@contextmanager
+def stream(rounds: int, paced: bool = False) -> Iterator[tuple[contactfpga.Board, contactfpga.Subscription, Feeder]]:
+    """An open board, and a queue that holds all of its frames but the first."""
+    feeder = Feeder(rounds, paced)
+    feeder.process.start()
+    try:
+        with contactfpga.open(feeder.port, SKIN, timeout=10.0) as board:
+            with board.subscribe(maxsize=rounds * FRAMES) as queue:
+                feeder.go.set()
+                queue.next(10.0)
+                yield board, queue, feeder
+            assert not board.stats.lost
+    finally:
+        feeder.process.kill()
+
+
+def decoded(take: Callable[[Conversation, bytes, float], list[Event | Run]]) -> float:
+    """Frames per second from chunks of bytes to a batch for every megabyte, without a port."""
+    data = b"".join(frame(number, 1) for number in range(FRAMES))
+    best = 0.0
+    for _ in range(5):
+        host = Conversation("bytes")
+        host.receive(greeting(), 0.0)
+        started = time.process_time()
+        events = [
+            event for start in range(0, len(data), CHUNK) for event in take(host, data[start : start + CHUNK], 0.0)
+        ]
+        batch = Batch.of([event.zones if isinstance(event, Arrival) else event for event in events])  # type: ignore
+        best = max(best, len(batch.frames) / (time.process_time() - started))
+        assert len(batch.frames) == FRAMES
+    return best
+
+
+def over_a_port(take: Callable[[contactfpga.Subscription], int]) -> float:
+    """Frames per second over a pseudo-terminal."""
+    with stream(ROUNDS) as (_, queue, _):
+        count, wanted, started = 0, (ROUNDS - 1) * FRAMES, time.process_time()
+        while count < wanted:
+            count += take(queue)
+        return count / (time.process_time() - started)
+
+
+def latencies_us() -> list[float]:
+    """From the last byte's write to ``latest``, of the frames that it returns but those of the first tenth."""
+    found, rounds = [], 6
+    with stream(rounds, paced=True) as (board, queue, feeder):
+        queue.close()
+        number = 0
+        while number < rounds * FRAMES - 1:
+            number = board.latest(10.0).time_us // STEP_US
+            if number >= rounds * FRAMES // 10:
+                found.append((time.monotonic() - feeder.written_s[number]) * 1e6)
+    return found
+
+
+def main() -> int:
+    """Print the table."""
+    old = decoded(Conversation.receive)  # type: ignore[arg-type]
+    new = decoded(Conversation.receive_runs)
+    print("| one zone per frame | frames per second of one core |")
+    print("|---|---|")
+    print(f"| chunks of {CHUNK} bytes to arrays, frame by frame | {old:,.0f} |")
+    print(f"| chunks of {CHUNK} bytes to arrays, many at once | {new:,.0f}, {new / old:.1f} times as many |")
+    print(f"| `next()` on a pseudo-terminal | {over_a_port(lambda queue: queue.next(10.0) is not None):,.0f} |")
+    print(
+        f"| `batch()` on a pseudo-terminal | {over_a_port(lambda queue: len(queue.batch(timeout=10.0).frames)):,.0f} |"
+    )
+    found = sorted(latencies_us())
+    p99 = found[len(found) * 99 // 100]
+    print(f"\nLast byte written to `latest()`, {PACED / PACE_S:,.0f} frames per second: median ", end="")
+    print(f"{statistics.median(found):.0f} us, 99 % {p99:.0f} us, worst {found[-1]:.0f} us, of {len(found):,} calls")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

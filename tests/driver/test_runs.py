@@ -1,0 +1,287 @@
+"""Frames decoded in runs are those decoded one by one, with the same counters, whatever happened to the bytes."""
+
+import dataclasses
+import random
+
+import numpy as np
+import pytest
+from model_board import ModelBoard
+from wire import old_frame
+
+import contactfpga
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.queue import FrameQueue
+from contactfpga.skin.widths import Widths
+from contactfpga.wire import framing, many, protocol
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.run import Run
+from contactfpga.zones.zone import Zones
+
+SKINS = {
+    "moments": contactfpga.Skin(),
+    "barycenter": contactfpga.Skin(report="barycenter"),
+    "odd": contactfpga.Skin(
+        rows=5, columns=33, connectivity=4, zone_capacity=3, settle_us=50.0, surface="cylinder", radius_mm=70.0
+    ),
+    "large": contactfpga.Skin(rows=64, columns=64, connectivity=4, settle_us=50.0),  # a trailer of eight bytes
+    "cells": contactfpga.Skin(rows=4, columns=5, report="cells"),
+    "ghosts": contactfpga.Skin(diodes="none", rows=6, columns=6, connectivity=4),
+}
+WITH_RUNS = ("moments", "barycenter", "odd", "large")
+
+
+def random_frame(board, rng):
+    """A frame that a board may send, or one whose content cannot be."""
+    skin = board.wire.skin
+    if skin.report == "cells":
+        return board.frame()
+    most, zones, flags, options = skin.zone_capacity, [], [], {}
+    for _ in range(rng.choice([0, 1, 1, 1, 2, 3])):
+        area, x, y = rng.randrange(1, 5), rng.randrange(skin.columns), rng.randrange(skin.rows)
+        scale = 16 if skin.report == "barycenter" else area
+        zones.append((area, x * scale, y * scale))
+    if rng.random() < 0.02:
+        options["zones"] = rng.choice([len(zones) + 1, most + 1, 0])
+    if rng.random() < 0.02:
+        options["cells"] = rng.randrange(skin.rows * skin.columns + 1)
+    if rng.random() < 0.02 and zones:
+        far = 1 if skin.report == "barycenter" else (1 << board.wire.known.sum_x_bits) - 1
+        zones[0] = (rng.choice([0, 3]), rng.choice([0, far]), 0)
+    if rng.random() < 0.04:
+        flags = rng.sample(["overflow", "mismatch", "fault"], rng.randrange(1, 4))
+    if rng.random() < 0.02:  # more zones than it carries
+        zones, flags = [zones[0] if zones else (1, 0, 0)] * most, ["overflow"]
+        options |= {"zones": most + 1, "cells": min(sum(zone[0] for zone in zones) + 1, skin.rows * skin.columns)}
+    if rng.random() < 0.02:  # more cells than the sheet has, or zones
+        cells = skin.rows * skin.columns
+        if rng.random() < 0.5:
+            zones, options = [(cells - 1, 0, 0), (4, 0, 0)], {}
+        else:
+            zones, flags, options = [(1, 0, 0)] * most, ["overflow"], {"zones": skin.max_zones() + 1, "cells": cells}
+    board.moments = zones
+    return board.frame(flags, **options)
+
+
+class History:
+    """A board to which things happen."""
+
+    def __init__(self, skin, rng):
+        self.rng, self.skin = rng, skin
+        self.board = ModelBoard(skin)
+        self.first = self.board.hello()
+
+    def more(self, count, asked=b""):
+        """Bytes that it sends, in which it hears what is asked."""
+        heard_at = self.rng.randrange(count)
+        parts, self.first = [self.first], b""
+        for place in range(count):
+            if place == heard_at and any(hello for _, hello in self.board.hear(asked)):
+                parts.append(self.board.hello())
+            parts.append(random_frame(self.board, self.rng) if self.rng.random() < 0.98 else self.happening())
+        return b"".join(damaged(part, self.rng) if self.rng.random() < 0.005 else part for part in parts)
+
+    def happening(self):
+        board, rng = self.board, self.rng
+        match rng.randrange(8):
+            case 0:
+                return board.hello()
+            case 1:
+                board.heard = rng.randrange(8)
+            case 2:
+                board.time_us += rng.choice([1 << 20, 1 << 22, 1 << 23])
+            case 3:
+                board.sent += rng.choice([1, 3, 300])
+            case 4:
+                board.power_up()
+                return board.hello() if rng.random() < 0.7 else b""
+            case 5:
+                return rng.choice([old_frame(), board.wire.seal(bytes([9, 9, 0x80])), b"\0\0", rng.randbytes(20)])
+            case 6:  # another bitstream; perhaps of the same sheet
+                other = rng.choice([{"pitch_x_mm": 3.0}, {"keep_alive_ms": 7.0}])
+                self.board = ModelBoard(self.skin.replace(name="other", **other))
+                return self.board.hello() if rng.random() < 0.8 else b""
+            case 7:
+                board.overwritten += rng.choice([1, 5, 13])
+        return b""
+
+
+def damaged(packet, rng):
+    data = bytearray(packet)
+    if not data:
+        return b""
+    place = rng.randrange(len(data))
+    if rng.random() < 0.5:
+        data[place] ^= 1 << rng.randrange(8)
+    else:
+        del data[place : place + rng.randrange(1, 40)]
+    return bytes(data)
+
+
+def said(events):
+    """All that events tell, frame by frame."""
+    for event in events:
+        if isinstance(event, Run):
+            yield from map(told, event)
+        else:
+            yield told(event.zones) if isinstance(event, Arrival) else repr(event)
+
+
+def told(zones):
+    frame = zones.frame
+    arrays = tuple(
+        None if one is None else (one.dtype, one.tolist()) for one in (frame.moments, frame.bitmap, frame.barycenters)
+    )
+    return repr((dataclasses.replace(frame, moments=None, bitmap=None, barycenters=None), arrays, zones.to_dict()))
+
+
+@pytest.mark.parametrize("name", SKINS)
+@pytest.mark.parametrize("live", [True, False])
+def test_runs_hold_the_frames_that_are_found_one_by_one(name, live, rng):
+    in_runs, answered = 0, set()
+    for turn in range(2):
+        known = 0
+        history, stream, now = History(SKINS[name], rng), b"", 0.0
+        one_by_one, in_many = (Conversation("x", None, live, random.Random(turn)) for _ in range(2))
+        for _ in range(25):
+            if rng.random() < 0.5:
+                assert one_by_one.ask(now, now + 1.0) == in_many.ask(now, now + 1.0)
+            asked = one_by_one.data_to_send()
+            assert asked == in_many.data_to_send()
+            stream += history.more(rng.choice([1, 20, 60]), asked)
+            cut = rng.choice([1, len(stream) // 2, len(stream), len(stream)])
+            data, stream = stream[:cut], stream[cut:]
+            alone, mixed = one_by_one.receive(data, now), in_many.receive_runs(data, now)
+            assert list(said(mixed)) == list(said(alone))
+            assert one_by_one.stats == in_many.stats
+            assert state(one_by_one, name) == state(in_many, name)
+            in_runs += sum(len(event) for event in mixed if isinstance(event, Run))
+            known = check_answers(alone, mixed, known)
+            answered.add((turn, known))
+            now += rng.choice([0.001, 0.1, 0.1, 9.0])
+    assert (in_runs > 60) == (name in WITH_RUNS)
+    assert len(answered) > 5
+
+
+def state(host, name):
+    """Of the times."""
+    state = {**vars(host._timeline)}
+    state["before"] = state["before"] and told(Zones(state["before"], SKINS[name].sheet))
+    del state["_stats"]
+    return state
+
+
+def check_answers(alone, mixed, known):
+    """Runs answer nothing that the frame before them, which answered this, does not; what is answered at the end."""
+    answers = [event.answers for event in alone if isinstance(event, Arrival)]
+    place = 0
+    for event in mixed:
+        if isinstance(event, Arrival):
+            known, place = event.answers, place + 1
+            assert known == answers[place - 1]
+        elif isinstance(event, Run):
+            assert set(answers[place : place + len(event)]) == {known}
+            place += len(event)
+    return known
+
+
+@pytest.mark.parametrize("name", WITH_RUNS)
+def test_what_passes_in_a_table_is_what_passes_alone(name, rng):
+    """Damaged packets, resealed ones among them, and all the contents that cannot be."""
+    skin = SKINS[name]
+    widths, before = Widths(skin.sheet), protocol.check_prefix(skin)
+    board, packets = ModelBoard(skin), []
+    for _ in range(3000):
+        packet = random_frame(board, rng)[:-1]
+        if rng.random() < 0.5:
+            data = bytearray(packet[: -rng.choice([0, 3]) or None])
+            data[rng.randrange(len(data))] = rng.randrange(1, 256)
+            packet = bytes(data)
+            if len(packet) < len(data) + 1:  # the check is right, the rest may be anything
+                packet = packet[:-3] + framing.check_bytes(packet[:-3], before)
+        packets.append(packet)
+    table = many.decode(packets, widths, before)
+    passed = 0
+    for index, packet in enumerate(packets):
+        try:
+            frame = protocol.decode_frame(framing.unseal(packet, before), widths)
+        except protocol.PacketError:
+            assert not table.packets["valid"][index]
+            continue
+        passed += 1
+        fields = table.packets[index]
+        assert fields["valid"] == (len(packet) <= 257), "longer ones may hold a full block"
+        if not fields["valid"]:
+            continue
+        records = table.records[table.starts[index] : table.starts[index + 1]]
+        assert records.tolist() == (frame.moments if frame.barycenters is None else frame.barycenters).tolist()
+    assert 300 < passed < 2900
+
+
+@pytest.mark.parametrize("name", WITH_RUNS)
+def test_a_batch_of_runs_is_a_batch_of_their_frames(name, rng):
+    board = ModelBoard(SKINS[name])
+    stream = board.hello() + b"".join(random_frame(board, rng) for _ in range(400))
+    events = [event for event in Conversation("x").receive_runs(stream, 1.5) if isinstance(event, Arrival | Run)]
+    parts = [event.zones if isinstance(event, Arrival) else event for event in events]
+    assert any(isinstance(part, Run) for part in parts)
+    batch = Batch.of(parts)
+    frames = [zones for part in parts for zones in (part if isinstance(part, Run) else [part])]
+    alone = [Batch.of([zones]) for zones in frames]
+    np.testing.assert_array_equal(batch.frames, np.concatenate([one.frames for one in alone]))
+    zones = np.concatenate([one.zones for one in alone])
+    zones["frame"] = np.repeat(np.arange(len(frames)), [len(one) for one in frames])
+    np.testing.assert_array_equal(batch.zones, zones)
+    for index in rng.sample(range(len(frames)), 20):
+        part = batch.zones[batch.starts[index] : batch.starts[index + 1]]
+        assert part["area_cells"].tolist() == frames[index].array["area_cells"].tolist()
+
+
+# ---- the queue
+
+
+def runs_and_frames(rng, count):
+    """What a queue may get: frames alone, runs and errors, and the same in a plain list."""
+    board = ModelBoard(SKINS["moments"])
+    host = Conversation("x")
+    host.receive(board.hello(), 0.0)
+    for _ in range(count):
+        stream = b"".join(board.frame() for _ in range(rng.choice([1, 3, 60])))
+        for event in host.receive_runs(stream, 0.0):
+            yield event.zones if isinstance(event, Arrival) else event
+        if rng.random() < 0.1:
+            yield contactfpga.SkinMismatch("another bitstream")
+
+
+def times(items):
+    return [item if isinstance(item, Exception) else item.time_us for item in items]
+
+
+@pytest.mark.parametrize("maxsize", [1, 7, 100, 10_000])
+def test_a_queue_of_runs_is_a_queue_of_frames(maxsize, rng):
+    queue, plain, dropped = FrameQueue(maxsize), [], 0
+    for item in runs_and_frames(rng, 300):
+        queue.put(item)
+        plain += item if isinstance(item, Run) else [item]
+        gone, plain = plain[: max(0, len(plain) - maxsize)], plain[max(0, len(plain) - maxsize) :]
+        dropped += sum(isinstance(one, Zones) for one in gone)
+        assert (queue.dropped, len(queue)) == (dropped, len(plain))
+        match rng.randrange(8):
+            case 0 | 1:
+                for _ in range(min(rng.randrange(5), len(plain))):
+                    assert times([queue.pop()]) == times([plain.pop(0)])
+            case 2:
+                head = next((at for at, one in enumerate(plain) if isinstance(one, Exception)), len(plain))
+                found = [zones for one in queue.pop_frames() for zones in (one if isinstance(one, Run) else [one])]
+                assert times(found) == times(plain[:head])
+                plain = plain[head:]
+            case 3 if isinstance(item, Zones):
+                queue.skip_to(item)
+                plain = []
+            case 4 if len(plain) < maxsize and isinstance(item, Zones):
+                queue.put_back(item)
+                plain.insert(0, item)
+            case 5 if not any(isinstance(one, Exception) for one in plain):
+                queue.keep_last()
+                plain = plain[-1:]
+        assert (queue.first_error() is None) == (not plain or not isinstance(plain[0], Exception))
+    assert times(iter(queue.pop, None)) == times(plain)

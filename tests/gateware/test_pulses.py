@@ -1,0 +1,185 @@
+"""Requests as pulses, on lines of 2 and 3 clocks per bit, and what else comes there."""
+
+import itertools
+
+import pytest
+from amaranth.hdl import Elaboratable, Module
+from amaranth.lib import wiring
+
+from contactfpga.wire import framing, protocol
+from contactfpga_hdl.link.pulses import PulseReceiver
+from contactfpga_hdl.link.request import RequestReader
+from contactfpga_sim.golden.request import heard, pulses, request
+
+BITS = (2, 3)
+IDLE = 5
+ONE, MARK, ZERO = 0xFF, 0xF0, 0x00
+
+
+class Listener(Elaboratable):
+    """A receive pin and what is read from it."""
+
+    def __init__(self, bit_clocks):
+        self.receiver, self.reader = PulseReceiver(bit_clocks), RequestReader()
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules += [self.receiver, self.reader]
+        wiring.connect(m, self.receiver.bits, self.reader.bits)
+        return m
+
+
+@pytest.fixture(scope="module", params=BITS)
+def listen(bench, request):
+    """Requests (cycle, number, hello) in levels that begin in cycle ``IDLE``, and the number in each cycle."""
+    dut = Listener(request.param)
+    sim = bench(dut)
+
+    def listen(levels):
+        levels = [1] * IDLE + levels + [1] * 12
+        sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+        received, hello, low, number = (
+            sim.watch(port) for port in (dut.reader.received, dut.reader.hello, dut.reader.heard, dut.reader.number)
+        )
+        sim.run(len(levels))
+        found = [(at, number[at + 1], bool(hello[at])) for at, taken in enumerate(received.values) if taken]
+        assert all(low[at + 1] == number[at + 1] % 8 for at, _, _ in found)
+        return found, number.values
+
+    listen.bit = request.param
+    return listen
+
+
+def line(data, bit):
+    """Levels of bytes without gaps."""
+    return [
+        level for byte in data for one in (0, *(byte >> place & 1 for place in range(8)), 1) for level in [one] * bit
+    ]
+
+
+def sampled(data, bit, phase, jitter, rng):
+    """Levels at whole clocks of bytes whose bits take ``bit`` clocks, each edge moved by up to ``jitter`` clocks."""
+    edges, level = [], 1
+    for place, now in enumerate(line(data, 1)):
+        if now != level:
+            edges.append(phase + place * bit + rng.uniform(-jitter, jitter))
+            level = now
+    levels, level, clock = [], 1, 0
+    for edge in edges:
+        while clock < edge:
+            levels.append(level)
+            clock += 1
+        level ^= 1
+    return [*levels, 1]
+
+
+def test_the_encoder_and_the_models_agree():
+    assert pulses(b"\0\x01\xfe") == bytes([MARK, ONE, *[ZERO] * 7, ZERO, *[ONE] * 7])
+    for number, hello in ((0x15A2D1, False), (0x4081, True)):
+        data = protocol.encode_request(number, hello, pulsed=True)
+        assert data == request(number, hello, 2) == request(number, hello, 3)
+        assert len(data) == 2 + 64
+    assert all(framing.pulses(bytes([value])) == pulses(bytes([value])) for value in range(256))
+
+
+@pytest.mark.parametrize("error", [-0.02, 0.0, 0.02])
+def test_requests_are_taken_at_any_phase_with_jitter_and_clock_error(listen, rng, error):
+    """Each edge moved by up to 0.22 bits; what limits it is a one of 2 clocks, which must be seen, and so must the
+    line's rest between two bytes."""
+    phases = 8
+    for turn in range(phases):
+        number, hello = rng.randrange(1, 1 << 21), rng.random() < 0.5
+        data = request(number, hello, listen.bit)
+        found, _ = listen(sampled(data, listen.bit * (1 + error), turn / phases, 0.22 * listen.bit, rng))
+        assert [(got, asks) for _, got, asks in found] == [(number, hello)]
+
+
+def test_bytes_may_come_with_any_gaps(listen, rng):
+    data = request(0x15A2D1, True, listen.bit)
+    levels = []
+    for byte in data:
+        levels += line([byte], listen.bit) + [1] * rng.choice([0, 0, 1, 2, 30])
+    assert [got[1:] for got in listen(levels)[0]] == [(0x15A2D1, True)]
+
+
+def test_any_bytes_are_read_as_the_golden_model_does(listen, rng):
+    """Requests, parts of some, bytes as other boards take them, any pulses and any bytes: each clock's number."""
+    total = 0
+    for _ in range(4):
+        data = b""
+        for _ in range(8):
+            whole = request(rng.randrange(1, 1 << 21), rng.random() < 0.5, rng.choice([listen.bit, listen.bit, 4]))
+            some = bytes(rng.choice([ONE, ZERO, ZERO, MARK]) for _ in range(rng.randrange(20)))
+            data += rng.choice([whole, whole, whole[: rng.randrange(len(whole))], some, rng.randbytes(6)])
+        found, numbers = listen(line(data, listen.bit))
+        told = heard([(IDLE, data)], listen.bit)
+        assert found == [(one.cycle, one.number, one.hello) for one in told.requests]
+        assert numbers == [told.number(cycle) for cycle in range(len(numbers))]
+        total += len(found)
+    assert total > 2
+
+
+@pytest.fixture(scope="module")
+def read(bench):
+    """Requests (number, hello) among pulses, as fast as a receiver can tell them; what that makes of the line is
+    proved."""
+    dut = RequestReader()
+    sim = bench(dut)
+
+    def read(symbols):
+        events, bits = [], 0  # level, bit, index, good, bad
+        for symbol in symbols:
+            if symbol == MARK:
+                events += [(0, 0, 0, 0, 1)] * (bits > 0) + [(0, 0, 0, 1, 0)]
+                bits = 0
+                continue
+            events.append((int(symbol == ONE), 1, bits, 0, 0))
+            bits = (bits + 1) % 8
+            if not bits:
+                events.append((0, 0, 0, 1, 0))
+        events += [(1, 0, 0, 0, 0)] * 2
+        for place, name in enumerate(("level", "bit", "index", "good", "bad")):
+            sim.drive(getattr(dut.bits, name), lambda cycle, place=place: events[min(cycle, len(events) - 1)][place])
+        received, hello, number = sim.watch(dut.received), sim.watch(dut.hello), sim.watch(dut.number)
+        sim.run(len(events))
+        return [(number[at + 1], bool(hello[at])) for at, taken in enumerate(received.values) if taken]
+
+    return read
+
+
+SENT = (0x12345 | 1, True)
+SYMBOLS = list(request(*SENT, 2))
+OTHERS = ([], [ONE], [ZERO], [MARK], [ONE, ZERO], [MARK, MARK])
+
+
+def test_no_single_wrong_pulse_makes_another_request(read):
+    """Every one replaced, left out and doubled, exhaustively."""
+    assert read(SYMBOLS) == [SENT]
+    symbols, count = [MARK], 0
+    for place, other in itertools.product(range(len(SYMBOLS)), OTHERS):
+        if other != [SYMBOLS[place]]:
+            symbols += [*SYMBOLS[:place], *other, *SYMBOLS[place + 1 :], ONE, MARK]
+            count += 1
+    taken = read(symbols)
+    assert set(taken) <= {SENT}
+    # Seven bits of the check bytes carry nothing; a mark more does no harm, nor one less after another packet's.
+    assert len(taken) == 7 + 2 + 1
+    assert count == 6 * len(SYMBOLS) - len(SYMBOLS)
+
+
+def test_no_change_within_sixteen_pulses_makes_another_request(read, rng):
+    """From each of them on, as many others, more or fewer in their place."""
+    symbols = []
+    for start, length in itertools.product(range(len(SYMBOLS)), (3, 16)):
+        other = [rng.choice([ONE, ZERO, MARK]) for _ in range(rng.choice([length, length, rng.randrange(17)]))]
+        symbols += [*SYMBOLS[:start], *other, *SYMBOLS[start + length :], ONE, MARK]
+    assert set(read(symbols)) <= {SENT}
+
+
+def test_a_request_in_the_other_form_is_none(listen, rng):
+    """Hosts that do not know the board send both, the pulses first; neither board takes the other's."""
+    for number in (1, 0x15A2D1, 0x1FFFFF):
+        both = request(number, True, listen.bit) + request(number, True)
+        assert [got[1:] for got in listen(line(both, listen.bit))[0]] == [(number, True)]
+        assert [one.number for one in heard([(0, both)], 4).requests] == [number]
+        assert heard([(0, both)], 4).numbers[-1][1] == number
