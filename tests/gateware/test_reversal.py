@@ -10,7 +10,10 @@ from contactfpga.skin import Skin
 from contactfpga.skin.widths import Widths
 from contactfpga_sim.cosim import bench_amaranth, record
 from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.cosim.covering import REVERSAL, pairwise, skin_for, stimulus
 from contactfpga_sim.golden import Timeline, Trace, driven, predict
+
+COVERING = pairwise(REVERSAL)
 
 
 @pytest.fixture
@@ -126,6 +129,16 @@ SAMPLE = [
 @pytest.mark.parametrize("fields", SAMPLE, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
 def test_gateware_does_what_the_golden_model_says_and_frames_are_true(rng, pins, fields):
     assert check_life(small(**fields), rng, 2500, pins) > 200
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(len(COVERING)))
+def test_covering_set_in_amaranths_simulator(pins, number):
+    """Every pair of choices; what comes and goes here is slower than above, and stuck columns are more."""
+    skin, cycles = skin_for(COVERING[number]), 5000
+    timeline = stimulus(skin, cycles, number)
+    assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 300
+    check_pins(skin, pins)
 
 
 @pytest.mark.campaign
