@@ -13,6 +13,7 @@ from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.golden.work import Departure
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -104,7 +105,7 @@ class Stages:
         facts = self._facts
         if facts.zones:
             records = [
-                (handed[zone.row] + zone.clock, self._record(zone, places[zone.row] - zone.row))
+                (handed[zone.row] + zone.clock, self._record(zone, _sum_y(zone, taken, places)))
                 for zone in work.departures
             ]
             end = handed[-1] + work.end
@@ -115,10 +116,8 @@ class Stages:
         self._scanned.append(one)
         return self._packer.take(Items(one, cells, records, end))
 
-    def _record(self, zone: label.Departure, below: int) -> int:
-        """The record of a zone whose rows lie this many rows further down than they were counted."""
+    def _record(self, zone: Departure, sum_y: int) -> int:
         facts = self._facts
-        sum_y = zone.sum_y + below * zone.area
         return join(((zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)))[0]
 
 
@@ -168,6 +167,15 @@ class Rows:
             left -= cycle not in passing
             cycle += 1
         return cycle
+
+
+def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
+    """Of a zone in rows ``taken`` at these ``places`` of the sheet, that the labelling counted from 0 on. Its rows are
+    neighbors, unless it holds all cells, as every zone of ``single`` does."""
+    pressed = taken.sum(axis=1)
+    if zone.area == pressed.sum():
+        return int(pressed @ np.array(places))
+    return zone.sum_y + (places[zone.row] - zone.row) * zone.area
 
 
 def _word(cells: np.ndarray) -> int:
