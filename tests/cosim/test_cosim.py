@@ -38,6 +38,8 @@ COCOTB = {
     ),
     "serial": Skin(labeller="serial", settle_us=2.5),
     "barycenter": Skin(rows=9, columns=7, report="barycenter", barycenter_bits=2, settle_us=2.5),
+    "precharge": Skin(rows=6, columns=8, diodes="row2col", settle_us=1.5, precharge_us=0.5),
+    "reversal": Skin(rows=6, columns=8, scan="reversal", settle_us=0.5, precharge_us=0.25, send="on_change"),
 }
 
 

@@ -6,6 +6,7 @@ from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
+from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.cosim import bench_unknown
 from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialized
@@ -14,8 +15,10 @@ from contactfpga_sim.cosim.covering import stimulus
 from contactfpga_sim.golden import predict
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.sheet.matrix import Contention
 
 SMALL = Skin(rows=8, columns=8)
+REVERSAL = {"scan": "reversal", "precharge_us": 0.5, "settle_us": 2.0}
 SKINS = {
     "moments": SMALL,
     "16x16": Skin(),
@@ -34,16 +37,21 @@ SKINS = {
     ),
     "barycenter": SMALL.replace(report="barycenter", barycenter_bits=2),
     "cells": SMALL.replace(report="cells", diodes="row2col", send="on_change", keep_alive_ms=0.3),
+    "precharge": SMALL.replace(diodes="row2col", precharge_us=0.5),
+    "reversal": SMALL.replace(**REVERSAL),
+    "reversal, cells": SMALL.replace(**REVERSAL, report="cells", diodes="row2col", send="on_change"),
 }
 
 with_icarus = pytest.mark.skipif(not bench_unknown.available(), reason="no iverilog on PATH")
 
 
 @with_icarus
-@pytest.mark.parametrize("name", sample(SKINS, quick=["moments", "serial, 4-connected", "eager", "barycenter"]))
+@pytest.mark.parametrize(
+    "name", sample(SKINS, quick=["moments", "serial, 4-connected", "eager", "barycenter", "reversal"])
+)
 def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
     skin = SKINS[name]
-    cycles = 10 * facts(skin).scan_clocks
+    cycles = (40 if skin.scan == "reversal" else 10) * facts(skin).scan_clocks
     timeline = stimulus(skin, cycles, seed=3)
     assert compare(predict(skin, timeline, cycles).at_the_pins(), bench_unknown.run(skin, timeline, cycles)) > 400
     record_property("cases", cycles)
@@ -75,6 +83,23 @@ def test_a_register_without_a_reset_is_seen(monkeypatch):
     cycles = 3 * facts(SMALL).scan_clocks
     with pytest.raises(Unknown, match=r"cycle \d+: rows [01]{8}, tx [01], contact x"):
         bench_unknown.run(SMALL, stimulus(SMALL, cycles, seed=3), cycles)
+
+
+@with_icarus
+def test_lines_that_are_driven_against_each_other_are_told(monkeypatch):
+    """Columns that are never let go."""
+    elaborate = Precharge.elaborate
+
+    def never_let_go(self, platform):
+        m = elaborate(self, platform)
+        m.d.sync += self.pins.eq(-1)
+        return m
+
+    monkeypatch.setattr(Precharge, "elaborate", never_let_go)
+    cycles = 6 * facts(SMALL).scan_clocks
+    skin = SKINS["reversal"]
+    with pytest.raises(Contention, match=r"cycle \d+: columns [01]{8} are driven against rows [01]{8}"):
+        bench_unknown.run(skin, stimulus(skin, cycles, seed=3), cycles)
 
 
 @with_icarus

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga import ContactFPGAError, Skin, SkinError
+from contactfpga import ContactFPGAError, Skin, SkinError, examples
 from contactfpga.cover import Cover, CoverError, Switch, load_cover, table
 from contactfpga.skin.derived import Derived
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
+REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
 REFUSED = [
     ({"name": 7}, "name is 7; it must be a string"),
     ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
@@ -94,7 +95,10 @@ REFUSED = [
         {"diodes": "none", "report": "cells", "mask": [(1, 2)]},
         "mask lists 1 switches; diodes = 'none' takes none, as what a masked switch feeds could not be known",
     ),
-    ({"scan": "spiral"}, "scan is 'spiral'; it must be one of 'raster', 'adaptive', or 'module:attribute' of your own"),
+    (
+        {"scan": "spiral"},
+        "scan is 'spiral'; it must be one of 'raster', 'adaptive', 'reversal', or 'module:attribute' of your own",
+    ),
     ({"settle_us": 0}, "settle_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"release_us": 0}, "release_us is 0.0; it must be at least one clock, 0.0833333 us"),
     ({"settle_us": -5}, "settle_us is -5.0; it must lie between 0.0 and 10000.0 us"),
@@ -151,7 +155,53 @@ REFUSED = [
     ),
     (
         {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.1},
-        "keep_alive_ms is 0.1; one scan takes 0.156 ms",
+        "keep_alive_ms is 0.1; one scan takes up to 0.156 ms",
+    ),
+    # precharge and line reversal
+    (
+        {"precharge_us": 0.25, "column_read": "74hc165"},
+        "column_read is '74hc165'; precharge_us drives the columns and needs 'direct'",
+    ),
+    (
+        {"precharge_us": 0.25, "diodes": "none", "report": "cells"},
+        "diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'",
+    ),
+    (
+        {"precharge_us": 0.25, "scan": "adaptive"},
+        "precharge_us is 0.25; scan = 'adaptive' keeps rows driven and cannot drive the columns, scan = 'reversal' can",
+    ),
+    ({"precharge_us": -0.25}, "precharge_us is -0.25; it must lie between 0.0 and 10000.0 us"),
+    ({"precharge_us": 10_001}, "precharge_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
+    ({"precharge_us": float("nan")}, "precharge_us is nan; it must be a finite number"),
+    ({"precharge_us": 1e-12}, "precharge_us is 1e-12; it must be at least one clock, 0.0833333 us"),
+    ({"project_us": 2.0}, "project_us is 2.0; leave it out, or set scan = 'reversal'"),
+    (
+        {"scan": "adaptive", "project_us": 2.0},
+        "project_us is 2.0; leave it out, or set scan = 'reversal'",
+    ),
+    ({"scan": "reversal"}, "precharge_us is 0; scan = 'reversal' drives the columns, and needs a time for it"),
+    ({**REVERSAL, "project_us": 0}, "project_us is 0.0; it must be at least one clock, 0.0833333 us"),
+    ({**REVERSAL, "project_us": -1}, "project_us is -1.0; it must lie between 0.0 and 10000.0 us"),
+    ({**REVERSAL, "project_us": 10_001}, "project_us is 10001.0; it must lie between 0.0 and 10000.0 us"),
+    (
+        {**REVERSAL, "row_drive": "74hc595"},
+        "row_drive is '74hc595'; scan = 'reversal' needs row_drive = 'direct', as it reads the rows",
+    ),
+    (
+        {**REVERSAL, "column_read": "74hc165"},
+        "column_read is '74hc165'; precharge_us drives the columns and needs 'direct'",
+    ),
+    (
+        {**REVERSAL, "diodes": "none", "report": "cells"},
+        "diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'",
+    ),
+    (
+        {**REVERSAL, "send": "on_change", "keep_alive_ms": 3.0},
+        "keep_alive_ms is 3.0; scan = 'reversal' needs at least 3.072 ms for this sheet",
+    ),
+    (
+        {**REVERSAL, "send": "on_change", "keep_alive_ms": 15.3, "rows": 64, "settle_us": 100},
+        "keep_alive_ms is 15.3; scan = 'reversal' needs at least 15.36 ms for this sheet",
     ),
     # report and link
     ({"report": "images"}, "report is 'images'; it must be one of 'moments', 'barycenter', 'cells'"),
@@ -167,7 +217,7 @@ REFUSED = [
     ),
     ({"send": "never"}, "send is 'never'; it must be one of 'always', 'on_change'"),
     ({"send": "on_change", "keep_alive_ms": 101}, "keep_alive_ms is 101.0; it must lie between 0.0 and 100.0 ms"),
-    ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes 0.096 ms"),
+    ({"send": "on_change", "keep_alive_ms": 0.05}, "keep_alive_ms is 0.05; one scan takes up to 0.096 ms"),
     ({"zone_capacity": 0}, "zone_capacity is 0; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 65}, "zone_capacity is 65; it must lie between 1 and 64 for this sheet"),
     ({"zone_capacity": 1.5}, "zone_capacity is 1.5; it must be a whole number"),
@@ -252,6 +302,12 @@ JUST_WITHIN = [
     {"scan": "adaptive", "rows": 2},
     {"scan": "adaptive", "settle_us": 2.6},
     {"scan": "adaptive", "send": "on_change", "keep_alive_ms": 0.156},
+    {**REVERSAL, "rows": 1, "columns": 1},
+    {**REVERSAL, "settle_us": 0.08, "release_us": 0.08, "project_us": 0.08, "rows": 64, "columns": 64},
+    {**REVERSAL, "precharge_us": 10_000, "project_us": 10_000},
+    {**REVERSAL, "send": "on_change", "keep_alive_ms": 3.072},
+    {**REVERSAL, "send": "on_change", "keep_alive_ms": 15.36, "rows": 64, "settle_us": 100},
+    {"precharge_us": 0.01},
     {"settle_us": 10_000, "release_us": 10_000},
     {"settle_us": 0.8},
     {"debounce": "sym_defer_pk", "debounce_press_us": 393_120, "debounce_release_us": 0},
@@ -447,6 +503,7 @@ OTHER = {
     "diodes": "row2col",
     "settle_us": 6.0,
     "release_us": 2.0,
+    "precharge_us": 0.25,
     "debounce": "sym_defer_pk",
     "debounce_press_us": 4000.0,
     "debounce_release_us": 4000.0,
@@ -468,7 +525,9 @@ def test_every_field_is_in_the_fingerprint():
     others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
     divided = Skin(report="barycenter")
     others += [divided, divided.replace(barycenter_bits=3)]
-    assert set(OTHER) | {"name", "surface", "radius_mm", "scan", "barycenter_bits", *only_there} == {
+    reversal = Skin(**REVERSAL)
+    others += [reversal, reversal.replace(project_us=2.0), reversal.replace(precharge_us=0.5)]
+    assert set(OTHER) | {"name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", *only_there} == {
         field.name for field in dataclasses.fields(Skin)
     }
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
@@ -477,6 +536,20 @@ def test_every_field_is_in_the_fingerprint():
 def test_fingerprints_of_boards_that_are_in_use_stay_the_same():
     assert Skin().fingerprint.hex() == "44136fa355b3678a"
     assert Skin(rows=13, columns=6, report="cells", send="on_change").fingerprint.hex() == "d3e1f271ecb47488"
+
+
+@pytest.mark.parametrize("name", ["fast", "fast-64x64"])
+def test_examples_of_line_reversal(name, tmp_path):
+    """They load, differ in the sheet alone, and a file that is written of one is read as the same Skin."""
+    skin = Skin.load(examples() / f"{name}.toml")
+    assert (skin.scan, skin.precharge_us, skin.settle_us, skin.project_us) == ("reversal", 0.25, 0.5, 1.0)
+    assert (skin.clock_hz, skin.baud, skin.send) == (24_000_000, 12_000_000, "on_change")
+    size = 64 if "64" in name else 16
+    assert skin == Skin.load(examples() / "fast.toml").replace(rows=size, columns=size, zone_capacity=None)
+    path = tmp_path / "again.toml"
+    path.write_text(skin.to_toml())
+    assert Skin.load(path) == skin
+    assert Skin.load(path).fingerprint == skin.fingerprint != Skin().fingerprint
 
 
 def test_a_name_and_what_is_written_as_it_is_by_default_change_no_fingerprint():

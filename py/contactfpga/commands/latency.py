@@ -10,7 +10,7 @@ import re
 from contactfpga.console import numbers, terminal
 from contactfpga.skin import Skin
 
-HELP = "Measure how long a touch takes to the last byte and to the contact pin."
+HELP = "Measure the time from a touch to its last byte."
 EXTRA = "sim"
 
 CELLS = re.compile(r"([1-9][0-9]?)x([1-9][0-9]?)")
@@ -55,5 +55,6 @@ def run(args: argparse.Namespace) -> int:
 def _cells(text: str) -> tuple[int, int]:
     found = CELLS.fullmatch(text)
     if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; write rows x columns of the contact, such as 3x3")
+        shown = numbers.shortened(text)
+        raise argparse.ArgumentTypeError(f"{shown!r} is not a size; write rows x columns of the contact, such as 3x3")
     return int(found[1]), int(found[2])

@@ -25,6 +25,11 @@ def whole(low: int, high: int, unit: str = "") -> Callable[[str], int]:
     return _between(int, "whole number", low, high, unit, False, "")
 
 
+def shortened(text: str) -> str:
+    """What was typed, cut where it would fill the screen."""
+    return text if len(text) <= 40 else f"{text[:40]}..."
+
+
 def or_none(kind: Callable[[str], float]) -> Callable[[str], float | None]:
     """The same, or the word `none`."""
 
@@ -57,8 +62,7 @@ def _between(
             value = None
         # Not a number is not between anything.
         if value is None or not low <= value <= high or (above and value == low):
-            shown = text if len(text) <= 40 else f"{text[:40]}..."
-            raise argparse.ArgumentTypeError(f"{shown!r} is not {wanted}")
+            raise argparse.ArgumentTypeError(f"{shortened(text)!r} is not {wanted}")
         return value
 
     return read

@@ -220,7 +220,7 @@ def check_timing(skin: Skin) -> None:
         _within(name, getattr(skin, name), 0.0, limits.MAX_ROW_US, "us")
     derived = Derived(skin)
     megahertz = skin.clock_hz // 1_000_000
-    for name in ("settle_us", "release_us", "project_us"):
+    for name in ("settle_us", "release_us", "project_us", *(["precharge_us"] if skin.precharge_us else [])):
         if derived.clocks(getattr(skin, name)) < 1:
             raise SkinError(f"{name} is {getattr(skin, name)}; it must be at least one clock, {1 / megahertz:g} us")
     if derived.row_clocks < derived.min_row_clocks:
@@ -231,16 +231,26 @@ def check_timing(skin: Skin) -> None:
             f"{skin.zone_capacity} zones per frame need {derived.min_row_clocks} clocks "
             f"({derived.min_row_clocks / megahertz:g} us) with labeller = '{skin.labeller}'{divided}"
         )
-    if skin.send == "on_change" and (derived.keep_alive_turns if derived.scan.waits else derived.keep_alive_frames) < 1:
-        raise SkinError(
-            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes up to "
-            f"{derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
-            + (", and at least 4 ms are needed" if derived.scan.waits else "")
-        )
+    _check_keep_alive(skin, derived)
     if not derived.debounced:
         return
     for name in ("debounce_press_us", "debounce_release_us"):
         _within(name, getattr(skin, name), 0.0, limits.MAX_DEBOUNCE_SCANS * derived.frame_clocks / megahertz, "us")
+
+
+def _check_keep_alive(skin: Skin, derived: Derived) -> None:
+    if skin.send != "on_change":
+        return
+    if derived.scan.waits and derived.keep_alive_turns < 1:
+        raise SkinError(
+            f"keep_alive_ms is {skin.keep_alive_ms}; scan = {skin.scan!r} needs at least "
+            f"{derived.min_keep_alive_ms:g} ms for this sheet"
+        )
+    if not derived.scan.waits and derived.keep_alive_frames < 1:
+        raise SkinError(
+            f"keep_alive_ms is {skin.keep_alive_ms}; one scan takes up to "
+            f"{derived.max_frame_clocks / skin.clock_hz * 1e3:g} ms"
+        )
 
 
 def _within(name: str, value: float, low: float, high: float, unit: str = "") -> None:

@@ -17,14 +17,14 @@ from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
 
-CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "received")
+CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
-the transmit and of the contact pin and of the rows that are driven, and bytes decoded from the line. The order is that
-of the driver."""
+the transmit and of the contact pin, of the rows that are driven to the selecting level and of the columns that are
+driven, and bytes decoded from the line. The order is that of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven rows; and for a row whether it is the frame's last, for a record or an item
+wire, the byte, the level or the driven lines; and for a row whether it is the frame's last, for a record or an item
 whether it is the end mark."""
 
 

@@ -20,7 +20,7 @@ from contactfpga_sim.board import native
 from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
 from contactfpga_sim.cosim.record import OutOfTime, Stimulus
 from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.sheet.matrix import words
+from contactfpga_sim.sheet.matrix import Contention, words
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -66,7 +66,8 @@ def run(
     """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
 
     ``known_words``: patterns of what is known at power-up, :func:`initialized` if left out. Raises :class:`Unknown`
-    when a row, the transmit or the contact pin is not known, and :class:`OutOfTime`.
+    when a row, a line's output enable, the transmit or the contact pin is not known, :class:`Contention`, and
+    :class:`OutOfTime`.
     """
     from contactfpga_hdl.top import Top
 
@@ -110,6 +111,8 @@ def _trace(output: str, cycles: int) -> Trace:
     tx, contact = 1, 0
     for line in output.splitlines():
         what, cycle, *levels = line.split()
+        if what == "contention":
+            raise Contention(f"cycle {cycle}: columns {levels[0]} are driven against rows {levels[1]}")
         if what != "pins":
             raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}")
         if int(levels[0]) != tx:
@@ -123,32 +126,30 @@ def _trace(output: str, cycles: int) -> Trace:
 
 def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -> str:
     """Verilog that drives the pins as the timeline says and prints the outputs' changes and the first unknown one."""
-    selected, columns = ("~rows", "~reads") if skin.selects_low else ("rows", "reads")
-    reads = " | ".join(
-        ["stuck", *(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))]
-    )
     moves = _moves(skin, timeline, cycles)
     moves[1 - RESET_CLOCKS] = " ".join(f"top.{name} = {value};" for name, value in known.items())
     steps = "".join(f"        {cycle}: begin {text} end\n" for cycle, text in sorted(moves.items()))
     cells = ", ".join(f"pressed{row} = 0" for row in range(skin.rows))
+    sheet, pins = _sheet(skin)
     return f"""`timescale 1ns/1ns
 module bench;
 reg clk = 0, rst = 1, rx = 1;
 reg [{skin.columns - 1}:0] stuck = 0, {cells};
-wire [{skin.rows - 1}:0] rows;
-wire [{skin.rows - 1}:0] selected = {selected};
-wire [{skin.columns - 1}:0] reads = {reads};
-wire tx, contact;
+{sheet}wire tx, contact;
 reg [1:0] seen = 2'bxx;
 integer cycle;
-top top(.clk(clk), .rst(rst), .rx(rx), .columns({columns}), .rows(rows), .tx(tx), .contact(contact));
+top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins});
 initial for (cycle = -{RESET_CLOCKS}; cycle < {cycles}; cycle = cycle + 1) begin
     if (cycle == 0) rst = 0;
     case (cycle)
 {steps}    endcase
     #5;
-    if (cycle > -{RESET_CLOCKS} && ^{{rows, tx, contact}} === 1'bx) begin
+    if (cycle > -{RESET_CLOCKS} && ^{{rows, rows_drive, columns_drive, tx, contact}} === 1'bx) begin
         $display("unknown %0d %b %b %b", cycle, rows, tx, contact);
+        $finish;
+    end
+    if (cycle > -{RESET_CLOCKS} && |(pulled & columns_drive)) begin
+        $display("contention %0d %b %b", cycle, pulled & columns_drive, selected);
         $finish;
     end
     if (cycle >= 0 && seen !== {{tx, contact}}) $display("pins %0d %b %b", cycle, tx, contact);
@@ -160,13 +161,37 @@ endmodule
 """
 
 
+def _sheet(skin: Skin) -> tuple[str, str]:
+    """Verilog of the sheet, and the ports of the top that it is connected to.
+
+    Before the first clock of the reset nothing is known; pins that may be driven then read as unknown.
+    """
+    rows, columns = f"[{skin.rows - 1}:0]", f"[{skin.columns - 1}:0]"
+    selecting, level, let_go = ("~rows", "~reads", "touched") if skin.selects_low else ("rows", "reads", "~touched")
+    pulled = " | ".join(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))
+    feeding = ", ".join(f"|(pressed{row} & columns_drive & ~stuck)" for row in reversed(range(skin.rows)))
+    reverses = skin.scan == "reversal"
+    text = f"""wire {rows} rows;
+wire {rows} rows_drive{"" if reverses else f" = {{{skin.rows}{{1'b1}}}}"};
+wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
+wire {rows} selected = {selecting} & rows_drive;
+wire {columns} pulled = {pulled};
+wire {columns} reads = pulled | stuck;
+wire {rows} touched = {{{feeding}}};
+wire {rows} rows_read = rows & rows_drive | {let_go} & ~rows_drive;
+"""
+    pins = f", .columns({level}), .rows(rows)"
+    pins += ", .columns_drive(columns_drive)" if skin.precharge_us else ""
+    return text, pins + (", .rows_drive(rows_drive), .rows_read(rows_read)" if reverses else "")
+
+
 def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
     """Assignments to the bench's inputs, by the cycle from which they hold."""
     moves: dict[int, str] = {}
     line = Stimulus(skin, Timeline([], timeline.received))
     before = 1
     for cycle in range(cycles):
-        _, level = line.pins(cycle, {"rows": 0})
+        *_, level = line.pins(cycle, dict.fromkeys(line.reads, 0))
         if level != before:
             moves[cycle] = f"rx = {level};"
         before = level

@@ -13,6 +13,7 @@ from contactfpga.choices.debounces import DEBOUNCES
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.choices.reports import REPORTS
 from contactfpga.skin import Skin, SkinError
+from contactfpga.skin.derived import Derived
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import request
 from contactfpga_sim.golden.trace import Timeline
@@ -38,6 +39,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "column_chains": (0, 1, 3),
     "shift_hz": (8_000_000, 5_000_000),
     "row_time": ("tight", "uneven", "long"),
+    "precharge_us": (0.0, 0.1, 1.2),  # where columns are on pins of their own
     "keep_alive_scans": (1, 3, 1000),
 }
 
@@ -45,8 +47,18 @@ ADAPTIVE: dict[str, tuple[Any, ...]] = CHOICES | {
     "scan": ("adaptive",),
     "sheet": ((2, 1), (2, 9), (9, 1), (5, 7), (12, 4), (16, 16), (33, 3)),
     "column_chains": (0,),
+    "precharge_us": (0.0,),
 }
 """The same for the adaptive scan, which takes columns on pins of their own only."""
+
+REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
+    "scan": ("reversal",),
+    "row_chains": (0,),
+    "column_chains": (0,),
+    "precharge_us": (0.1, 1.2),
+    "project_us": (0.1, 1.0, 2.3),
+}
+"""The same for line reversal, which takes rows and columns on pins of their own only."""
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
@@ -97,7 +109,7 @@ def pairs_in(rows: list[list[int]]) -> set[Pair]:
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
-    """The Skin for an assignment of :data:`CHOICES` or :data:`ADAPTIVE`."""
+    """The Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE` or :data:`REVERSAL`."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
     values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
@@ -110,6 +122,10 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     elif columns > 1 and choice["mask"] == "column":
         values["mask"] = tuple((row, columns // 2) for row in range(rows))
     values |= _registers(choice)
+    if "column_read" not in values:
+        values["precharge_us"] = choice["precharge_us"]
+    if values["scan"] == "reversal":
+        values["project_us"] = choice["project_us"]
     if choice["report"] == "barycenter":
         values["barycenter_bits"] = choice["barycenter_bits"]
     most = Skin(rows=rows, columns=columns, connectivity=choice["connectivity"], settle_us=1000.0).max_zones()
@@ -123,7 +139,8 @@ def skin_for(choice: dict[str, Any]) -> Skin:
     press, back = choice["debounce_scans"]
     values |= {"debounce_press_us": press * scan_us, "debounce_release_us": back * scan_us}
     frame_us = known.frame_slots * known.row_clocks / megahertz
-    values["keep_alive_ms"] = min(100.0, (choice["keep_alive_scans"] + 0.5) * frame_us / 1000)
+    least = Derived(known.skin).min_keep_alive_ms if known.scan.waits else 0.0
+    values["keep_alive_ms"] = min(100.0, least + (choice["keep_alive_scans"] + 0.5) * frame_us / 1000)
     return Skin(**values)
 
 
@@ -155,17 +172,21 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 
 
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
-    """Random cells that come and go at any cycle, stuck columns, requests and other bytes."""
+    """Random cells that come and go at any cycle, stuck columns, requests and other bytes.
+
+    A scan that waits does not drive a column that was stuck for a long time, so of its columns only some ever are.
+    """
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)
     scan = facts(skin).scan_clocks
+    may_stick = np.arange(skin.columns) % 4 == 3 if facts(skin).scan.waits else np.ones(skin.columns, bool)
     pieces: list[tuple[int, np.ndarray, np.ndarray | None]] = []
     start = 0
     while start < cycles:
         cells = rng.random(shape) < rng.choice([0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.95, 1.0])
         if pieces and rng.random() < 0.2:
             cells = pieces[-1][1]
-        stuck = rng.random(skin.columns) < 0.3 if rng.random() < 0.25 else None
+        stuck = may_stick & (rng.random(skin.columns) < 0.3) if rng.random() < 0.25 else None
         pieces.append((start, cells, stuck))
         start += int(scan * rng.choice([0.3, 1.0, 1.0, 1.7, 3.0])) + 1
     gaps = rng.choice([0, 1, 7, scan, 5 * scan], size=6)

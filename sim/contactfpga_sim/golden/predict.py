@@ -13,6 +13,7 @@ from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.golden.work import Departure
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -115,18 +116,9 @@ class Stages:
         self._scanned.append(one)
         return self._packer.take(Items(one, cells, records, end))
 
-    def _record(self, zone: label.Departure, sum_y: int) -> int:
+    def _record(self, zone: Departure, sum_y: int) -> int:
         facts = self._facts
         return join(((zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)))[0]
-
-
-def _sum_y(zone: label.Departure, taken: np.ndarray, places: Sequence[int]) -> int:
-    """On the sheet, where the rows that were ``taken`` lie at these ``places``. A zone has neighboring rows, unless a
-    labeller takes all cells for one."""
-    per_row = taken.sum(axis=1)
-    if zone.area == per_row.sum():
-        return int(per_row @ np.asarray(places))
-    return zone.sum_y + (places[zone.row] - zone.row) * zone.area
 
 
 class Rows:
@@ -175,6 +167,15 @@ class Rows:
             left -= cycle not in passing
             cycle += 1
         return cycle
+
+
+def _sum_y(zone: Departure, taken: np.ndarray, places: Sequence[int]) -> int:
+    """Of a zone in rows ``taken`` at these ``places`` of the sheet, that the labelling counted from 0 on. Its rows are
+    neighbors, unless it holds all cells, as every zone of ``single`` does."""
+    pressed = taken.sum(axis=1)
+    if zone.area == pressed.sum():
+        return int(pressed @ np.array(places))
+    return zone.sum_y + (places[zone.row] - zone.row) * zone.area
 
 
 def _word(cells: np.ndarray) -> int:

@@ -109,6 +109,47 @@ SKINS = {
         settle_us=60.0,
         release_us=4.0,
     ),
+    "5x6, reversal": Skin(
+        rows=5,
+        columns=6,
+        scan="reversal",
+        settle_us=3.0,
+        release_us=1.0,
+        precharge_us=2.0,
+        project_us=4.0,
+        debounce="sym_defer_pk",
+        debounce_press_us=40.0,
+        debounce_release_us=70.0,
+        mask=((1, 4), *((row, 2) for row in range(5))),
+        send="on_change",
+        keep_alive_ms=4.5,
+        clock_hz=1_000_000,
+        baud=250_000,
+    ),
+    "4x5, cells, reversal": Skin(
+        rows=4,
+        columns=5,
+        diodes="row2col",
+        scan="reversal",
+        settle_us=2.0,
+        release_us=1.0,
+        precharge_us=1.0,
+        project_us=1.0,
+        report="cells",
+        mask=tuple((1, column) for column in range(5)),
+        clock_hz=1_000_000,
+        baud=250_000,
+    ),
+    "4x4, precharge": Skin(
+        rows=4,
+        columns=4,
+        settle_us=20.0,
+        release_us=2.0,
+        precharge_us=3.0,
+        mask=tuple((row, 1) for row in range(4)),
+        clock_hz=1_000_000,
+        baud=250_000,
+    ),
     "1x5, slow": Skin(rows=1, columns=5, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0),
 }
 
@@ -224,6 +265,8 @@ def _various_frames(skin: Skin) -> np.ndarray:
 
 
 def _frames(skin: Skin, name: str, frames: np.ndarray) -> Stimulus:
+    if facts(skin).scan.waits:  # its frames may take longer than a scan period, and wait for the wire
+        frames = np.repeat(frames, 4, axis=0)
     return Stimulus(name, Timeline.frames(skin, frames), (len(frames) + 2) * facts(skin).scan_clocks)
 
 

@@ -13,8 +13,9 @@ from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.mutants.stimuli import Stimulus
+from contactfpga_sim.sheet.matrix import Contention
 
-OBSERVED = (*golden.BOUNDARIES, "driven")
+OBSERVED = (*golden.BOUNDARIES, "driven", "charged")
 """Where a mutant can be told from the gateware as it should be."""
 
 _FIRST_LOOK = 512
@@ -50,11 +51,15 @@ def expected(board: CompiledBoard, stimulus: Stimulus) -> Events:
 
 
 def killed_at(board: CompiledBoard, number: int, stimulus: Stimulus, events: Events) -> str | None:
-    """The first boundary at which mutant ``number`` does something other than ``events``; None where it never does."""
+    """The first boundary at which mutant ``number`` does something other than ``events``, or "contention" where it
+    drives lines against each other; None where it never does."""
     board.restart(number)
     while (start := board.cycle) < stimulus.cycles:
         until = min(max(_FIRST_LOOK, 2 * start), stimulus.cycles)
-        _play(board, stimulus, until)
+        try:
+            _play(board, stimulus, until)
+        except Contention:
+            return "contention"
         for name in OBSERVED:
             first, last = np.searchsorted(events[name]["cycle"], (start, until))
             if not np.array_equal(board.take(name), events[name][first:last]):

@@ -8,7 +8,7 @@
 #include "clocked.h"
 #include "shift.h"
 
-enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, DRIVEN, RECEIVED, BOUNDARIES };
+enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, DRIVEN, CHARGED, RECEIVED, BOUNDARIES };
 
 struct Event {
     uint64_t cycle, data, mark;
@@ -206,7 +206,7 @@ public:
 
 private:
     Clocked model_;
-    uint64_t levels_ = 0, driven_ = 0;
+    uint64_t levels_ = 0, driven_ = 0, charged_ = 0;
     bool line_ = true, contact_ = false;
 
     void watch(uint64_t driven) {
@@ -222,6 +222,8 @@ private:
             note(CONTACT, contact_ = contact, 0, cycle);
         if (driven != driven_)
             note(DRIVEN, driven_ = driven, 0, cycle);
+        if (columns_driven() != charged_)
+            note(CHARGED, charged_ = columns_driven(), 0, cycle);
 #if PROBES
         if (get(top.p_row__transfer))
             note(ROW, static_cast<uint64_t>(get(top.p_row__cells)), get(top.p_row__last), cycle);

@@ -25,7 +25,14 @@ def by(labeller: Labeller) -> dict[str, Skin]:
 
 
 def _methods() -> dict[str, Skin]:
-    methods = {}
+    fast: dict[str, Any] = {
+        "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
+        "clock_hz": 24_000_000, "baud": 12_000_000,
+    }  # fmt: skip
+    methods = {
+        "reversal, 10 mm": sheet(10.0, settle_us=0.5, **fast),
+        "reversal, 5 mm": sheet(5.0, settle_us=0.8, project_us=2.5, **fast),
+    }
     for pitch in PITCHES_MM:
         for labeller in LABELLERS.values():
             methods[f"{labeller.title}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)
@@ -36,12 +43,6 @@ def _methods() -> dict[str, Skin]:
     for pitch in (10.0, 20.0):
         methods[f"adaptive, {pitch:g} mm"] = sheet(pitch, scan="adaptive")
     methods["adaptive, 5 mm, 24 MHz"] = sheet(5.0, scan="adaptive", clock_hz=24_000_000)
-    fast = {
-        "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
-        "clock_hz": 24_000_000, "baud": 12_000_000,
-    }  # fmt: skip
-    methods["reversal, 10 mm"] = sheet(10.0, settle_us=0.5, **fast)
-    methods["reversal, 5 mm"] = sheet(5.0, settle_us=0.8, project_us=2.5, **fast)
     methods["run, 10 mm, 4-connected"] = sheet(10.0, connectivity=4)
     methods["run, 10 mm, 1 Mbaud"] = sheet(10.0, baud=1_000_000)
     methods["run, 10 mm, debounced 0.5 ms"] = sheet(

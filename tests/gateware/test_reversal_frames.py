@@ -1,0 +1,164 @@
+"""Line reversal on the compiled board of ``examples/fast.toml``: frames of a sheet held still, and the contact pin."""
+
+import itertools
+
+import numpy as np
+import pytest
+from reversal import FAST, slots, small, zones
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.board.received import Receiver
+from contactfpga_sim.golden import Timeline, predict
+
+PROJECT, SETTLE, ROW = 24, 12, 20  # clocks: 1 us, 0.5 us, and 0.75 us with a gap of a clock on either side
+EMPTY = np.zeros((FAST.rows, FAST.columns), bool)
+DRAWS = (1 << np.arange(9)).reshape(3, 3)
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    with CompiledBoard(FAST, ("rows", "records", "bytes", "driven", "contact")) as board:
+        board.run(20_000)
+        yield board
+
+
+def drop(board: CompiledBoard) -> None:
+    for boundary in ("rows", "records", "bytes", "driven", "contact", "received"):
+        board.take(boundary)
+
+
+def let_go(board: CompiledBoard) -> None:
+    board.press(EMPTY)
+    board.run(3000)
+    drop(board)
+
+
+def draw(pattern: int, y: int, x: int) -> np.ndarray:
+    """A 3x3 pattern at a place of the sheet."""
+    cells = EMPTY.copy()
+    cells[y : y + 3, x : x + 3] = (pattern & DRAWS) != 0
+    return cells
+
+
+def touched(board: CompiledBoard, cells: np.ndarray, clocks: int = 1500):
+    """Press; returns the cycle of the touch, the slots, and the frames that were received."""
+    let_go(board)
+    touch = board.cycle
+    board.press(cells)
+    board.run(clocks)
+    driven = [(int(event["cycle"]), int(event["data"])) for event in board.take("driven")]
+    events = board.take("bytes")
+    received = list(Receiver(FAST).take(zip(events["cycle"].tolist(), events["data"].tolist())))
+    return touch, slots(driven, board.cycle), received
+
+
+def wanted_slots(touch: int, cells: np.ndarray) -> list[tuple[int, int, int]]:
+    """(row, first clock, last clock) in which each touched row is driven."""
+    found, begin = [], touch + PROJECT + 6
+    rows = np.flatnonzero(cells.any(axis=1)).tolist()
+    for row, following in itertools.zip_longest(rows, rows[1:]):
+        found.append((row, begin, begin + SETTLE - 1))
+        two_runs = (np.diff(cells[row].astype(int)) == 1).sum() > 1
+        apart = following is not None and following != row + 1
+        begin += ROW + (apart and two_runs)  # the empty row after it waits for the labeller
+    return found
+
+
+def test_every_3x3_frame_held_still_is_reported_exactly_in_a_slot_per_row(sheet, rng, record_property):
+    """Each at some place of the sheet, after a rest of any length. The touch is seen after two clocks, the rows are
+    sampled a projection time later, and driven one after the other in ascending order from the sixth clock after
+    that. The next frame, of the same cells, is not sent."""
+    for pattern in range(1, 512):
+        cells = draw(pattern, rng.randrange(FAST.rows - 2), rng.randrange(1, FAST.columns - 2))
+        sheet.run(rng.randrange(500))
+        touch, driven, received = touched(sheet, cells)
+        rows = int(cells.any(axis=1).sum())
+        assert [(slot.row, slot.begin, slot.sample) for slot in driven][:rows] == wanted_slots(touch, cells)
+        assert driven[rows].row == driven[0].row, "then the next frame begins"
+        assert len(received) == 1, "no frame is sent twice"
+        frame = received[0].frame
+        assert frame.cells == cells.sum()
+        assert sorted(map(tuple, frame.moments.tolist())) == zones(cells, FAST.connectivity)
+    record_property("cases", 511)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 9, 16])
+def test_the_last_byte_of_a_still_contact_comes_at_a_cycle_that_can_be_told(sheet, rows):
+    """The first byte begins 24 clocks after the last sample; 15 more and a delimiter follow it without a pause."""
+    cells = EMPTY.copy()
+    cells[:rows, 5] = True
+    touch, driven, received = touched(sheet, cells, 3000)
+    sample = touch + PROJECT + 6 + (rows - 1) * ROW + SETTLE - 1
+    assert driven[rows - 1].sample == sample
+    assert received[0].size == 17
+    assert received[0].last == sample + 24 + 16 * 10 * 2
+
+
+# ---- the order in which zones are reported, overflow, bitmaps: as with raster
+
+
+def still(skin: Skin, cells: np.ndarray) -> tuple[list[tuple[int, ...]], bool, np.ndarray | None]:
+    """Records, overflow and bitmap of the last frame of a sheet held still, as the golden model sends it."""
+    cycles = 12_000
+    events = predict(skin, Timeline([(0, cells, None)]), cycles).bytes
+    *_, last = Receiver(skin).take(events)
+    return list(map(tuple, last.frame.moments.tolist())), "overflow" in last.frame.flags, last.frame.bitmap
+
+
+@pytest.mark.parametrize("fields", [{}, {"zone_capacity": 3}, {"report": "cells"}, {"labeller": "serial"}], ids=str)
+def test_a_still_frame_is_reported_as_with_raster(rng, fields):
+    """The same records in the same order, of them the same ones where not all fit, the same rows. That the gateware
+    does what this model does is compared elsewhere."""
+    reversal = small(rows=8, columns=9, send="always", **fields)
+    raster = Skin(rows=8, columns=9, settle_us=2.0, **fields)
+    overflows = 0
+    for share in (0.0, 0.1, 0.3, 0.3, 0.5, 1.0):
+        cells = np.array([[rng.random() < share for _ in range(9)] for _ in range(8)])
+        cells[rng.randrange(8)] = False
+        one, other = still(reversal, cells), still(raster, cells)
+        assert one[:2] == other[:2]
+        assert (one[2] is None) == (fields.get("report") != "cells")
+        assert one[2] is None or ((one[2] == cells).all() and (other[2] == cells).all())
+        overflows += one[1]
+    assert (overflows > 0) == ("zone_capacity" in fields)
+
+
+# ---- the contact pin
+
+
+def test_contact_rises_three_clocks_after_a_touch_anywhere_at_any_instant(sheet, record_property):
+    rng = np.random.default_rng(5)
+    for y, x in itertools.product(range(FAST.rows), range(FAST.columns)):
+        cells = EMPTY.copy()
+        cells[y, x] = True
+        let_go(sheet)
+        sheet.run(int(rng.integers(1, 100)))
+        touch = sheet.cycle
+        sheet.press(cells)
+        sheet.run(150)
+        assert sheet.take("contact")["cycle"].tolist() == [touch + 3]
+        sheet.press(EMPTY)
+        released = sheet.cycle
+        sheet.run(200)
+        (fall,) = sheet.take("contact").tolist()
+        # The frame under way may still have it, and takes a projection and a slot; the next one has not.
+        assert fall[1] == 0
+        assert released < fall[0] <= released + 2 * (PROJECT + ROW) + 60
+    record_property("cases", FAST.rows * FAST.columns)
+
+
+def test_a_touch_of_a_clock_is_told_by_the_pin_and_gone_with_the_next_frame(sheet):
+    """It is too short for a frame to have it."""
+    cells = draw(511, 4, 4)
+    let_go(sheet)
+    touch = sheet.cycle
+    sheet.press(cells)
+    sheet.run(1)
+    sheet.press(EMPTY)
+    sheet.run(300)
+    rise, fall = sheet.take("contact").tolist()
+    assert rise[:2] == (touch + 3, 1)
+    assert fall[1] == 0
+    assert fall[0] <= touch + PROJECT + 10
+    assert not len(sheet.take("driven"))

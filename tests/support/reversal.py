@@ -1,0 +1,140 @@
+"""Sheets scanned by line reversal: Skins, what touches them, and what is seen at their pins."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+from scipy import ndimage
+
+from contactfpga import examples
+from contactfpga.skin import Skin
+from contactfpga_sim.golden import Timeline, requests
+from contactfpga_sim.golden.facts import facts
+
+FAST = Skin.load(examples() / "fast.toml")
+"""The reference sheet; tests share its compiled board."""
+
+PROJECTED = 6
+"""Clocks from the sample of the touched rows to the first clock in which one of them is driven."""
+
+
+def small(**fields) -> Skin:
+    """A Skin whose row times take few clocks."""
+    times = {"precharge_us": 0.04, "settle_us": 0.1, "release_us": 0.05, "project_us": 0.2}
+    rates = {"clock_hz": 24_000_000, "baud": 12_000_000, "send": "on_change"}
+    return Skin(**{"scan": "reversal", "rows": 3, "columns": 4, **times, **rates, **fields})
+
+
+def any_skin(rng) -> Skin:
+    """Any choice of what a scan by line reversal works with."""
+    rows, columns = rng.randint(1, 9), rng.randint(1, 9)
+    fields = {
+        "rows": rows,
+        "columns": columns,
+        "connectivity": rng.choice([4, 8]),
+        "diodes": rng.choice(["col2row", "row2col"]),
+        "labeller": rng.choice(["run", "serial", "projection", "single"]),
+        "report": rng.choice(["moments", "moments", "barycenter", "cells"]),
+        "send": rng.choice(["always", "on_change"]),
+        "debounce": rng.choice(["none", "sym_defer_pk", "asym_eager_defer_pk"]),
+        "precharge_us": rng.choice([0.04, 0.25]),
+        "settle_us": rng.choice([0.1, 0.5]),
+        "project_us": rng.choice([0.05, 0.2, 1.0]),
+        "baud": rng.choice([12_000_000, 6_000_000, 3_000_000]),
+        "debounce_press_us": rng.choice([0, 7, 30]),
+        "debounce_release_us": rng.choice([0, 7, 30]),
+    }
+    if fields["debounce"] == "none":
+        fields |= {"debounce_press_us": 0, "debounce_release_us": 0}
+    if rows * columns > 3:
+        masked = {(rng.randrange(rows), rng.randrange(columns)) for _ in range(rng.choice([0, 0, 2]))}
+        if columns > 1 and rng.random() < 0.2:
+            masked |= {(row, columns // 2) for row in range(rows)}
+        fields["mask"] = tuple(masked)
+    return small(**fields)
+
+
+def touches(skin: Skin, rng, cycles: int, stuck: float = 0.05) -> Timeline:
+    """Fingertips, any cells or none, for any time; columns that are stuck; requests at any time."""
+    pieces, start = [], rng.randrange(300)
+    while start < cycles:
+        cells = np.zeros((skin.rows, skin.columns), bool)
+        if (kind := rng.random()) < 0.4:
+            y, x = rng.randrange(skin.rows), rng.randrange(skin.columns)
+            cells[y : y + rng.randint(1, 3), x : x + rng.randint(1, 3)] = True
+        elif kind < 0.7:
+            share = rng.choice([0.1, 0.5, 0.9])
+            cells = np.array([[rng.random() < share for _ in range(skin.columns)] for _ in range(skin.rows)])
+        lines = np.array([rng.random() < 0.3 for _ in range(skin.columns)]) if rng.random() < stuck else None
+        pieces.append((start, cells, lines))
+        start += rng.randint(1, rng.choice([5, 60, 900]))
+    asked = sorted(rng.sample(range(cycles), 3))
+    return Timeline(pieces, requests(asked, facts(skin).bit_clocks))
+
+
+@dataclasses.dataclass(frozen=True)
+class Slot:
+    """A row that was driven from the cycle ``begin`` to the cycle ``sample``."""
+
+    row: int
+    begin: int
+    sample: int
+
+
+def slots(changes, cycles: int) -> list[Slot]:
+    """From (cycle, rows) of every change of the driven rows, one at a time."""
+    found = []
+    for (begin, rows), (end, after) in itertools.pairwise(changes):
+        if rows:
+            assert rows.bit_count() == 1, f"cycle {begin}: rows {rows:#b} are driven together"
+            assert after == 0, f"cycle {end}: no gap between two rows"
+            found.append(Slot(rows.bit_length() - 1, begin, end - 1))
+    return [slot for slot in found if slot.sample < cycles]
+
+
+def frames(found: list[Slot], ends: list[int]) -> list[list[Slot]]:
+    """The slots of each frame that has any: the next frame begins after the end mark of the one before."""
+    last = None
+    parted: list[list[Slot]] = []
+    for slot in found:
+        ended = sum(end < slot.begin for end in ends)
+        if ended != last:
+            parted.append([])
+        parted[-1].append(slot)
+        last = ended
+    return parted
+
+
+def pressed(skin: Skin, timeline: Timeline, cycle: int) -> np.ndarray:
+    """(R, C) bool: what reads pressed in a row that is driven in this cycle."""
+    cells, lines = timeline.at(cycle)
+    read = np.zeros((skin.rows, skin.columns), bool) if cells is None else np.array(cells, bool)
+    if lines is not None:
+        read |= lines
+    for place in skin.mask:
+        read[place] = False
+    return read
+
+
+def held(skin: Skin, timeline: Timeline, begin: int, end: int) -> np.ndarray:
+    """(R, C) bool: cells that are closed in each of these cycles, in columns that are not stuck in any."""
+    inside = [piece[0] for piece in timeline.pieces if begin < piece[0] <= end]
+    closed = np.ones((skin.rows, skin.columns), bool)
+    for cycle in (begin, *inside):
+        cells, lines = timeline.at(cycle)
+        closed &= False if cells is None else np.array(cells, bool)
+        if lines is not None:
+            closed &= ~lines
+    for place in skin.mask:
+        closed[place] = False
+    return closed
+
+
+def zones(cells: np.ndarray, connectivity: int) -> list[tuple[int, int, int]]:
+    """Sorted (area, sum of x, sum of y), by scipy."""
+    labels, count = ndimage.label(cells, np.ones((3, 3)) if connectivity == 8 else None)
+    found = []
+    for number in range(1, count + 1):
+        ys, xs = np.nonzero(labels == number)
+        found.append((len(ys), int(xs.sum()), int(ys.sum())))
+    return sorted(found)
