@@ -20,8 +20,8 @@ INK, SOFT, GRID = "#1d232b", "#545d68", "#d5d9df"
 SHEET, PRESSED = "#e3e6eb", "#8fbcd4"
 """A sheet of switches, and what is pressed of it."""
 
-BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GRAY = PALETTE = (
-    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c8c8c"),
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK, GRAY, BROWN = PALETTE = (
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c8c8c", "#7a4b1e"),
 )
 """Colors that the color-blind tell apart, after Okabe and Ito: without their yellow, which a light card swallows."""
 

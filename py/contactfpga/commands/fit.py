@@ -132,7 +132,7 @@ def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
         candidates.pitches_for(base, sources, args.pitch_mm),
         candidates.size_for(base, sources),
         _methods(args.labeller),
-        flags.known("--scan", args.scan, list(SCANS)),
+        flags.known("--scan", args.scan, list(SCANS)) if args.scan else None,
         args.baud,
     )
     return Task(sources, tuple(args.scenes), base or Skin(), goals, count, args.host_us, args.quick, cover=cover), tried

@@ -46,10 +46,13 @@ def candidates(
     pitches_mm: Sequence[tuple[float, float]],
     size_mm: Size,
     methods: Sequence[dict[str, Any]] = METHODS,
-    scans: Sequence[str] = tuple(SCANS),
+    scans: Sequence[str] | None = None,
     bauds: Sequence[int] | None = None,
 ) -> list[Candidate]:
-    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each method, scan and baud rate."""
+    """``base`` with each pitch (x, y) near the given ones that divides the sheet, each method, scan and baud rate;
+    without ``scans`` those that columns of ``base`` can have: they are driven with precharge, or they are not."""
+    if scans is None:
+        scans = [name for name, scan in SCANS.items() if not scan.waits or base.precharge_us]
     found = {}
     for pitch, method, scan, baud in itertools.product(pitches_mm, methods, scans, bauds or (base.baud,)):
         settings = _sheet(pitch, size_mm) | method | {"scan": scan, "baud": baud}
