@@ -5,6 +5,7 @@ import random
 import numpy as np
 import pytest
 from reversal import PROJECTED, any_skin, frames, held, pressed, slots, small, touches, zones
+from toy_labeller import TOY
 
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import Widths
@@ -122,12 +123,17 @@ SAMPLE = [
     {"rows": 5, "columns": 3, "report": "cells", "debounce": "sym_defer_pk", "send": "always", **TIMES},
     {"rows": 3, "columns": 6, "labeller": "serial", "diodes": "row2col", "debounce": "asym_eager_defer_pk", **TIMES},
     {"rows": 5, "columns": 4, "labeller": "single", "send": "always"},
+    {"rows": 4, "columns": 5, "labeller": TOY, "send": "always"},
+    {"rows": 4, "columns": 64, "labeller": "serial", "connectivity": 4},
     {"rows": 6, "columns": 2, "labeller": "projection", "report": "barycenter", "send": "always", "baud": 3_000_000},
 ]
 
 
-@pytest.mark.parametrize("fields", SAMPLE, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
+@pytest.mark.parametrize(
+    "fields", SAMPLE, ids=lambda fields: f"{fields['rows']}x{fields['columns']}-{fields.get('labeller', 'run')}"
+)
 def test_gateware_does_what_the_golden_model_says_and_frames_are_true(rng, pins, fields):
+    """The serial labeller takes up to 130 clocks for a row of 64 columns, which the scan waits for."""
     assert check_life(small(**fields), rng, 2500, pins) > 200
 
 

@@ -7,6 +7,7 @@ from amaranth.lib import wiring
 from contactfpga.choices.labellers import Labeller
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.ports import labeller_ports
+from contactfpga_hdl.util.row_number import row_number
 from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
 
 TOY = Labeller(
@@ -32,7 +33,7 @@ class RowLabeller(wiring.Component):
         m = Module()
         row, record = self.rows.payload, self.records.payload
         y, cells, pending, ends = Signal(range(64)), Signal.like(row.cells), Signal(), Signal()
-        y_next = Signal(range(64))
+        taken = self.rows.valid & self.rows.ready
         area = sum(cells[x] for x in range(len(cells)))
         m.d.comb += [
             self.rows.ready.eq(~pending & ~ends),
@@ -44,11 +45,11 @@ class RowLabeller(wiring.Component):
         ]
         with m.If(self.records.valid & self.records.ready):
             m.d.sync += [pending.eq(0), ends.eq(pending & ends)]
-        with m.If(self.rows.valid & self.rows.ready):
+        number = row_number(m, self.derived, row, taken)  # a scan may skip rows
+        with m.If(taken):
             m.d.sync += [
                 cells.eq(row.cells),
-                y.eq(y_next),
-                y_next.eq(Mux(row.last, 0, y_next + 1)),
+                y.eq(number),
                 pending.eq(row.cells.any()),
                 ends.eq(row.last),
             ]

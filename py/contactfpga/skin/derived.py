@@ -195,16 +195,16 @@ class Derived(Widths):
     def keep_alive_turns(self) -> int:
         """Turns of the clock's bit ``KEEP_ALIVE_BIT`` after which a scan that waits sends a frame; the rest of the time
         is for that frame."""
-        return math.floor(self.skin.keep_alive_ms * 1000 / 2**KEEP_ALIVE_BIT + 1e-9) - self._spare_turns
+        return math.floor(self.skin.keep_alive_ms * 1000 / (1 << KEEP_ALIVE_BIT) + 1e-9) - self._spare_turns
 
     @property
     def min_keep_alive_ms(self) -> float:
         """Of a scan that waits."""
-        return (self._spare_turns + 1) * 2**KEEP_ALIVE_BIT / 1000
+        return (self._spare_turns + 1) * (1 << KEEP_ALIVE_BIT) / 1000
 
     @property
     def _spare_turns(self) -> int:
-        return 1 + math.ceil(2 * self.frame_clocks / (2**KEEP_ALIVE_BIT * self.clocks_per_us))
+        return 1 + math.ceil(2 * self.frame_clocks / ((1 << KEEP_ALIVE_BIT) * self.clocks_per_us))
 
     @property
     def hello_frames(self) -> int:

@@ -6,13 +6,9 @@ The sheet's model needs these apart, and the compiled board knows no third level
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import column_pins, row_pins
-
-Replace = Callable[[re.Match], str]
 
 
 class WrongPins(ContactFPGAError):
@@ -30,11 +26,12 @@ def of_icebox(chip: str, skin: Skin) -> str:
     for name, width in lines(skin).items():
         port = rf"\{name}_0__io " if width > 1 else f"{name}_0__io"
         size = _size(width)
-        chip = _once(chip, rf"inout {re.escape(size + port)}", lambda _, n=name, s=size, p=port: _declared(n, s, p))
+        declared = f"input {size}{port}, output {size}{name}_0__o, output {size}{name}_0__oe"
+        chip = _put(chip, _once(chip, f"inout {re.escape(size + port)}"), declared)
         for line in range(width):
             pin = rf"\{name}_0__io[{line}] " if width > 1 else port
-            found = rf"assign {re.escape(pin)} *= (\S+) \? (\S+) : 1'bz;"
-            chip = _once(chip, found, lambda hit, n=name, at=line, w=width: _driven(n, at, w, hit[2], hit[1]))
+            hit = _once(chip, rf"assign {re.escape(pin)} *= (\S+) \? (\S+) : 1'bz;")
+            chip = _put(chip, hit, _driven(name, line, width, level=hit[2], enable=hit[1]))
     return chip
 
 
@@ -42,14 +39,14 @@ def of_ecp5(chip: str, skin: Skin) -> str:
     """The same with the Verilog of a synthesis for an ECP5."""
     for name, width in lines(skin).items():
         port, size = f"{name}_0__io", _size(width)
-        chip = _once(chip, rf"inout {re.escape(size + port)};", lambda _, n=name, s=size, p=port: _outputs(n, s, p))
-        chip = _once(
-            chip, rf"(module \w+\(.*?)\b{port}\b", lambda hit, n=name, p=port: f"{hit[1]}{p}, {n}_0__o, {n}_0__oe"
-        )
+        declared = f"input {size}{port};\n  output {size}{name}_0__o;\n  output {size}{name}_0__oe;"
+        chip = _put(chip, _once(chip, f"inout {re.escape(size + port)};"), declared)
+        hit = _once(chip, rf"(module \w+\([^)]*?)\b{port}\b")
+        chip = _put(chip, hit, f"{hit[1]}{port}, {name}_0__o, {name}_0__oe")
         for line in range(width):
-            pin = re.escape(f"{port}[{line}]" if width > 1 else port)
-            found = rf'TRELLIS_IO #\(\s*\.DIR\("BIDIR"\)\s*\) \S+ +\(\s*\.B\({pin}\),\s*(.*?)\s*\);'
-            chip = _once(chip, found, lambda hit, n=name, at=line, w=width, p=pin: _buffer(hit[1], n, at, w))
+            pin = re.escape(_bit(port, line, width))
+            hit = _once(chip, rf'TRELLIS_IO #\(\s*\.DIR\("BIDIR"\)\s*\) \S+ +\(\s*\.B\({pin}\),\s*(.*?)\s*\);')
+            chip = _put(chip, hit, _buffer(hit[1], name, line, width))
     return chip
 
 
@@ -85,14 +82,6 @@ def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
     return ports, text
 
 
-def _declared(name: str, size: str, port: str) -> str:
-    return f"input {size}{port}, output {size}{name}_0__o, output {size}{name}_0__oe"
-
-
-def _outputs(name: str, size: str, port: str) -> str:
-    return f"input {size}{port};\n  output {size}{name}_0__o;\n  output {size}{name}_0__oe;"
-
-
 def _size(width: int) -> str:
     return f"[{width - 1}:0] " if width > 1 else ""
 
@@ -101,8 +90,13 @@ def _bit(name: str, line: int, width: int) -> str:
     return f"{name}[{line}]" if width > 1 else name
 
 
-def _once(text: str, pattern: str, replace: Replace) -> str:
-    changed, count = re.subn(pattern, replace, text, flags=re.DOTALL)
-    if count != 1:
-        raise WrongPins(f"the netlist has {count} places like {pattern}; expected is one")
-    return changed
+def _once(text: str, pattern: str) -> re.Match[str]:
+    """The one place of a pattern."""
+    hits = list(re.finditer(pattern, text, re.DOTALL))
+    if len(hits) != 1:
+        raise WrongPins(f"the netlist has {len(hits)} places like {pattern}; expected is one")
+    return hits[0]
+
+
+def _put(text: str, hit: re.Match[str], new: str) -> str:
+    return text[: hit.start()] + new + text[hit.end() :]
