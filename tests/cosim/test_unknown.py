@@ -40,12 +40,13 @@ SKINS = {
     "reversal": SMALL.replace(**REVERSAL),
     "reversal, cells": SMALL.replace(**REVERSAL, report="cells", diodes="row2col", send="on_change"),
 }
+MARKS = dict.fromkeys(("precharge", "reversal, cells"), pytest.mark.campaign)
 
 with_icarus = pytest.mark.skipif(not bench_unknown.available(), reason="no iverilog on PATH")
 
 
 @with_icarus
-@pytest.mark.parametrize("name", SKINS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in SKINS])
 def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
     skin = SKINS[name]
     cycles = {"16x16": 10, "reversal": 40, "reversal, cells": 40}.get(name, 20) * facts(skin).scan_clocks

@@ -6,6 +6,7 @@ The sheet's model needs these apart, and the compiled board knows no third level
 from __future__ import annotations
 
 import re
+
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import column_pins, row_pins
