@@ -1,8 +1,8 @@
 """Writes docs/verification.md from the results of `make test`, or checks that it still holds.
 
 tests/claims.toml lists what is claimed and the tests that show it. A claim whose tests are missing, skipped or failed
-is an error; only those marked `recordings` or `icarus` may be skipped, where these are absent. A test says how many
-cases it ran with `record_property("cases", n)`; one that says nothing counts as one.
+is an error; only those marked `recordings`, `icarus` or `ngspice` may be skipped, where these are absent. A test says
+how many cases it ran with `record_property("cases", n)`; one that says nothing counts as one.
 """
 
 import argparse
@@ -18,8 +18,9 @@ PAGE = ROOT / "docs" / "verification.md"
 HEAD = """# Verification
 
 Written by `make verification` from the results of `make test`; CI fails when a line's tests are missing or skipped, or
-when this page is out of date. Only the recordings and Icarus Verilog may be absent. *Cases* counts frames, patterns or
-inputs where a test runs many of them. Where *command* is not `make test`, it runs more than the share counted here.
+when this page is out of date. Only the recordings, Icarus Verilog and ngspice may be absent. *Cases* counts frames,
+patterns or inputs where a test runs many of them. Where *command* is not `make test`, it runs more than the share
+counted here.
 
 """
 
@@ -79,7 +80,7 @@ def judge(claims: dict, results: dict[str, Outcome]) -> tuple[str, list[str], se
             tests = "<br>".join(f"`{test}`" for test in claim["tests"])
             command = claim.get("command", "make test")
             page += f"| {claim['claim']} | {tests} | `{command}` | {cases:,} | {', '.join(words)} |\n"
-            if claim.get("recordings") or claim.get("icarus"):
+            if any(claim.get(name) for name in ("recordings", "icarus", "ngspice")):
                 loose.add(claim["claim"])
                 words = [word for word in words if "skipped" not in word]
             wrong += [f"{claim['claim']}: {word} ({', '.join(claim['tests'])})" for word in words if word != "passed"]

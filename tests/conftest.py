@@ -43,14 +43,17 @@ def _closed_ports():
 
 
 LONGEST_FIRST = (
-    "test_mutants",
-    "test_failures",
-    "test_formal",
     "test_adaptive",
-    "test_label_volume",
     "test_cosim",
+    "test_formal",
+    "test_label_volume",
+    "test_demo",
+    "test_fit",
+    "test_replay",
     "test_chart",
-    "test_noise",
+    "test_barycenter",
+    "test_bad_inputs",
+    "test_label",
 )
 """Files that take longest: begun first, so that at the end of a run no process works alone."""
 

@@ -21,6 +21,7 @@ from contactfpga.commands import (
     flash,
     latency,
     replay,
+    settle,
     wire,
     zones,
 )
@@ -55,6 +56,7 @@ COMMANDS: dict[str, Command] = {
     "flash": flash,
     "replay": replay,
     "latency": latency,
+    "settle": settle,
     "cover": cover,
     "chart": chart,
     "fit": fit,

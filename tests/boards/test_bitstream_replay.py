@@ -30,15 +30,17 @@ def synthesized(tmp_path_factory):
     return extract.synthesized(ULX3S, SMALL, tmp_path_factory.mktemp("ulx3s"))
 
 
+@pytest.mark.campaign
 def test_the_synthesized_netlist_does_what_the_golden_model_says(synthesized, record_property):
-    frames = stimulus(SMALL, 700, [])
+    frames = stimulus(SMALL, 600, [])
     out = replay(SMALL, model_of(SMALL, synthesized), frames)
-    assert out.frames == 700
+    assert out.frames == 600
     assert out.packets > 100
     assert out.changes > 10 * out.packets
     record_property("cases", out.frames)
 
 
+@pytest.mark.campaign
 def test_one_wrong_table_in_the_netlist_is_seen(synthesized):
     text = synthesized.files["chip.v"]
     table = re.search(r"\.INIT\(16'h([0-9a-f]{4})\)\s*\) \\core\.transmitter", text)
@@ -50,9 +52,9 @@ def test_one_wrong_table_in_the_netlist_is_seen(synthesized):
 
 
 def test_the_gateware_itself_passes_with_no_reset_before_cycle_0():
-    skin = Skin(rows=4, columns=4)
+    skin = Skin()
     assert bitstream_replay.reset_clocks(skin, model_of(skin)) == 0
-    assert replay(skin, model_of(skin), stimulus(skin, 3 * bitstream_replay.BATCH // 2, [])).packets > 300
+    assert replay(skin, model_of(skin), stimulus(skin, 3 * bitstream_replay.BATCH // 2, [])).packets > 200
 
 
 @pytest.mark.parametrize("made", [extract.synthesized, extract.from_bitstream])

@@ -1,5 +1,6 @@
 """Ctrl-C: every command ends at once, without a traceback, and leaves no process behind."""
 
+import itertools
 import re
 import signal
 import subprocess
@@ -8,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from sample import sample
 from terminals import OnTerminal, alive, descendants, environment, listening, wait_for
 
 from contactfpga.console import interrupt
@@ -50,7 +52,7 @@ def interrupted(arguments, ready, keys, cache, **variables):
         terminal.process.kill()
 
 
-def well_ended(status, took, said):
+def assert_well_ended(status, took, said):
     said = said[-2000:]
     assert status == 130, said
     assert took < SOON_S + SLACK_S, said
@@ -58,8 +60,10 @@ def well_ended(status, took, said):
         assert word not in said, said
 
 
-@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
-@pytest.mark.parametrize("name", POOLS)
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    sample(itertools.product(POOLS, (True, False)), quick=[("chart", True), ("fit", False), ("arm", True)]),
+)
 def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
     arguments, workers = POOLS[name]
     output = [] if name == "fit" else ["--output", tmp_path / "out"]
@@ -69,7 +73,7 @@ def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
         return len(descendants(terminal.process.pid)) >= workers and time.monotonic() > started + 2
 
     started = time.monotonic()
-    well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
+    assert_well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
 
 
 def test_what_the_arm_has_done_is_kept(tmp_path):
@@ -77,38 +81,44 @@ def test_what_the_arm_has_done_is_kept(tmp_path):
         return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
 
     status, took, said = interrupted(["arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache")
-    well_ended(status, took, said)
+    assert_well_ended(status, took, said)
     lines = (tmp_path / "arm-charts-so-far.csv").read_text().splitlines()
     assert len(lines) >= 4
     assert " ".join(said.split()).count(f"interrupted; {len(lines) - 1} of 191 runs are in") == 1
     assert not (tmp_path / "arm-charts.csv").exists()
 
 
+@pytest.mark.campaign  # it has a board to compile first
 def test_failures_keep_the_rows_that_are_finished(tmp_path):
     def ready(terminal):
         return any(int(done) >= 1 for done in re.findall(r"(\d+)/36", terminal.said))
 
     status, took, said = interrupted(["failures", "--output", tmp_path], ready, True, tmp_path / "cache")
-    well_ended(status, took, said)
+    assert_well_ended(status, took, said)
     assert "of the table, all that was finished, in" in " ".join(said.split())
     assert (tmp_path / "failures-so-far.md").read_text().startswith("| knob | method |")
     assert not (tmp_path / "failures.md").exists()
 
 
-@pytest.mark.parametrize("keys", [True, False], ids=["by a key", "by a signal"])
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["zones", "sim://"], ": elaborate"),
-        (["zones", "sim://"], ": compile"),
-        (["board"], ": yosys"),
-        (["replay", "FRAMES"], ": elaborate"),
-    ],
+BUILDS = (
+    ("zones sim://", "elaborate"),
+    ("zones sim://", "compile"),
+    ("board", "yosys"),
+    ("replay FRAMES", "elaborate"),
 )
-def test_the_gateware_being_built_is_no_more_than_that(arguments, word, keys, tmp_path):
+
+
+@pytest.mark.parametrize(
+    ("words", "step", "keys"),
+    sample(
+        [(*build, keys) for build in BUILDS for keys in (True, False)],
+        quick=[(*build, number % 2 == 0) for number, build in enumerate(BUILDS)],
+    ),
+)
+def test_the_gateware_being_built_is_no_more_than_that(words, step, keys, tmp_path):
     np.save(tmp_path / "frames.npy", np.zeros((4, 8, 8), bool))
-    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in arguments]
-    well_ended(*interrupted(arguments, lambda terminal: word in terminal.said, keys, tmp_path / "cache"))
+    arguments = [str(tmp_path / "frames.npy") if one == "FRAMES" else one for one in words.split()]
+    assert_well_ended(*interrupted(arguments, lambda terminal: f": {step}" in terminal.said, keys, tmp_path / "cache"))
 
 
 @pytest.mark.campaign  # which has the tools for it
@@ -118,7 +128,7 @@ def test_place_and_route_ends_too(keys, tmp_path):
         return any("yosys" in line or "nextpnr" in line for line in descendants(terminal.process.pid).values())
 
     arguments = ["build", "icebreaker", "--output", tmp_path / "out"]
-    well_ended(*interrupted(arguments, ready, keys, tmp_path / "cache"))
+    assert_well_ended(*interrupted(arguments, ready, keys, tmp_path / "cache"))
 
 
 WAITS = """

@@ -1,6 +1,7 @@
 """What a terminal is shown: nothing wider than it is, nothing that its encoding lacks, nothing it cannot write over."""
 
 import io
+import itertools
 import re
 import subprocess
 import sys
@@ -8,32 +9,35 @@ import time
 
 import numpy as np
 import pytest
+from fake_board import FakeBoard
 from rich.cells import cell_len
 from rich.console import Console
+from sample import sample
 from terminals import OnTerminal, environment, on_terminal, wait_for
 
+from contactfpga import Skin
 from contactfpga.console import terminal
 from contactfpga.console.tables import tables
 
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-BIG = "rows = 64\ncolumns = 64\nsettle_us = 20.0\n"
+BIG = Skin(rows=64, columns=64, settle_us=20.0)
 WIDTHS = (60, 80)
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("files")
-    (folder / "big.toml").write_text(BIG)
-    (folder / "cells.toml").write_text('rows = 64\ncolumns = 64\nsettle_us = 20.0\nreport = "cells"\n')
     np.save(folder / "frames.npy", np.eye(16, dtype=bool)[None])
-    return folder
+    # Boards in Python, as large ones take long to compile.
+    with FakeBoard(BIG, folder / "big"), FakeBoard(BIG.replace(report="cells"), folder / "cells"):
+        yield folder
 
 
 COMMANDS = {
     "zones": ["zones", "--once", "sim://?scene=palm"],
-    "zones of 64x64": ["zones", "--once", "sim://?scene=palm&skin=FILES/big.toml"],
-    "zones of 64x64 cells": ["zones", "--once", "sim://?scene=palm&skin=FILES/cells.toml"],
-    "wire": ["wire", "--once", "sim://?scene=rings&skin=FILES/cells.toml"],
+    "zones of 64x64": ["zones", "--once", "FILES/big"],
+    "zones of 64x64 cells": ["zones", "--once", "FILES/cells"],
+    "wire": ["wire", "--once", "FILES/cells"],
     "doctor": ["doctor", "--seconds", "0.01", "sim://"],
     "replay": ["replay", "FILES/frames.npy"],
     "arm": ["arm", "--output", "FILES/arm"],
@@ -41,6 +45,10 @@ COMMANDS = {
     "an error": ["zones", "sim://?scene=no_such_scene_of_this_name"],
     "help": ["--help"],
 }
+
+
+LONG = ("arm", "push")
+"""Commands that compute for seconds."""
 
 
 def named(name, files):
@@ -52,8 +60,13 @@ def shown(said):
     return [line.rpartition("\r")[2] for line in CONTROL.sub("", said).split("\n")]
 
 
-@pytest.mark.parametrize("columns", WIDTHS)
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    sample(
+        itertools.product(COMMANDS, WIDTHS),
+        quick=[(name, width) for name, width in itertools.product(COMMANDS, WIDTHS) if name not in LONG],
+    ),
+)
 def test_no_line_is_wider_than_the_terminal(name, columns, files):
     _, said = on_terminal(named(name, files), columns)
     assert "Traceback" not in said
@@ -63,7 +76,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
         assert cell_len(line.rstrip()) <= columns or str(files) in line or "sim://" in line, line
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", sample(COMMANDS, quick=[name for name in COMMANDS if name not in LONG]))
 def test_no_character_ends_a_command(name, files):
     command = [sys.executable, "-m", "contactfpga.cli", *named(name, files)]
     result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)
@@ -90,15 +103,14 @@ def test_a_terminal_that_cannot_be_rewritten_is_not():
 
 
 @pytest.mark.parametrize(("columns", "lines"), [(80, 24), (60, 30)])
-def test_the_live_view_of_a_large_sheet_stays_on_the_screen(columns, lines, files):
-    on = OnTerminal(
-        [sys.executable, "-m", "contactfpga.cli", *[one for one in named("zones of 64x64", files) if one != "--once"]],
-        columns,
-        lines,
-    )
-    wait_for(lambda: on.said.count("cells pressed") > 2, 120)
-    on.type("\x03")
-    assert on.wait() == 130
+def test_the_live_view_of_a_large_sheet_stays_on_the_screen(columns, lines):
+    with FakeBoard(BIG) as board:
+        board.moments = [(9, 300, 300), (4, 8, 240), (30, 60, 30)]
+        board.stream = board.frame
+        on = OnTerminal([sys.executable, "-m", "contactfpga.cli", "zones", board.path], columns, lines)
+        wait_for(lambda: on.said.count("cells pressed") > 2, 120)
+        on.type("\x03")
+        assert on.wait() == 130
     frames = re.split(r"\x1b\[2K(?:\x1b\[1A\x1b\[2K)+|\x1b\[\?25l", on.said)
     whole = [frame for frame in frames if "cells pressed" in frame]
     assert whole

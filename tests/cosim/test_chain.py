@@ -11,7 +11,7 @@ from contactfpga import Skin, SkinError
 from contactfpga_sim import golden
 from contactfpga_sim.board.virtual import VirtualBoard
 
-DEFAULT_SKINS, CAMPAIGN_SKINS = 3, 200
+DEFAULT_SKINS, CAMPAIGN_SKINS = 1, 200
 FRAMES = 25
 
 

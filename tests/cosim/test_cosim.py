@@ -6,6 +6,7 @@ import functools
 import numpy as np
 import pytest
 from decoded import decoded
+from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
@@ -40,15 +41,6 @@ COCOTB = {
     "precharge": Skin(rows=6, columns=8, diodes="row2col", settle_us=1.5, precharge_us=0.5),
     "reversal": Skin(rows=6, columns=8, scan="reversal", settle_us=0.5, precharge_us=0.25, send="on_change"),
 }
-MARKS = dict.fromkeys(("serial", "barycenter", "debounced-cells", "precharge", "reversal"), pytest.mark.campaign)
-"""What they add is in the covering set, too."""
-SIMULATORS = [
-    "verilator",
-    pytest.param(
-        "icarus",
-        marks=pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH"),
-    ),
-]
 
 
 def name_of(choice: dict) -> str:
@@ -57,7 +49,7 @@ def name_of(choice: dict) -> str:
 
 
 def cycles_for(skin: Skin) -> int:
-    return max(5_000, min(25 * facts(skin).scan_clocks, 12_000))
+    return max(3_000, min(25 * facts(skin).scan_clocks, 6_000))
 
 
 def flags_in(skin: Skin, trace: Trace) -> set[str]:
@@ -71,14 +63,14 @@ def flags_in(skin: Skin, trace: Trace) -> set[str]:
 
 @functools.cache
 def reference_run() -> tuple[Trace, Trace]:
-    """What is predicted for the reference Skin, and what its gateware does, over 20 frames."""
+    """What is predicted for the reference Skin, and what its gateware does, over 14 frames."""
     skin = Skin()
     rng = np.random.default_rng(1)
     density = np.array([0.02, 0.3, 0.0, 0.1, 0.9])
-    frames = rng.random((20, 16, 16)) < np.tile(density, 4)[:, None, None]
-    stuck = [None, None, rng.random(16) < 0.2, None] * 5
+    frames = rng.random((14, 16, 16)) < np.tile(density, 3)[:14, None, None]
+    stuck = ([None, None, rng.random(16) < 0.2, None] * 4)[:14]
     timeline = Timeline.frames(skin, frames, stuck, requests([700, 3000, 3440, 9000], 4))
-    cycles = 20 * 16 * 72
+    cycles = 14 * 16 * 72
     return predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)
 
 
@@ -93,7 +85,7 @@ def test_covering_set_holds_every_pair_of_choices():
 
 def test_reference_skin_in_amaranths_simulator():
     expected, got = reference_run()
-    assert compare(expected, got) > 3_000
+    assert compare(expected, got) > 1_800
     assert flags_in(Skin(), expected) >= {"hello", "heard", "overwritten", "fault", "cells"}
 
 
@@ -104,7 +96,7 @@ def test_covering_set_in_amaranths_simulator(number):
     timeline = stimulus(skin, cycles, seed=number)
     expected = predict(skin, timeline, cycles)
     assert all(expected.events(boundary) for boundary in boundaries(skin))
-    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 300
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
 
 
 def test_covering_set_touches_every_flag_and_counter():
@@ -116,31 +108,21 @@ def test_covering_set_touches_every_flag_and_counter():
     assert seen == {"hello", "heard", "overflow", "overwritten", "fault", "cells"}
 
 
-@pytest.mark.parametrize("connectivity", [4, 8])
+@pytest.mark.parametrize("connectivity", sample([4, 8], quick=[8]))
 def test_frames_longer_than_a_stuffing_block(connectivity):
     """More than 254 bytes without a zero: dense bitmap rows of an odd sheet."""
     skin = Skin(
         rows=64, columns=39, connectivity=connectivity, report="cells", baud=6_000_000, settle_us=4.0, release_us=0.5
     )
-    frames = np.ones((4, 64, 39), bool)
-    frames[1, 5, 3] = frames[2, 63] = frames[3, 40, 8:16] = False
-    cycles = 4 * facts(skin).scan_clocks
+    frames = np.ones((3, 64, 39), bool)
+    frames[0, 5, 3] = frames[1, 63] = frames[2, 40, 8:16] = False
+    cycles = 3 * facts(skin).scan_clocks
     timeline = Timeline.frames(skin, frames)
     expected = predict(skin, timeline, cycles)
     data = bytes(value for _, value in expected.bytes)
     assert max(map(len, data.split(b"\0"))) > 300
     assert b"\xff" in data
     compare(expected, bench_amaranth.run(skin, timeline, cycles))
-
-
-def test_sequence_counts_past_255_frames():
-    skin = Skin(rows=1, columns=1, baud=6_000_000, settle_us=25.0, release_us=1.0)
-    cycles = 270 * facts(skin).scan_clocks
-    timeline = stimulus(skin, cycles, seed=9)
-    expected = predict(skin, timeline, cycles)
-    data = bytes(value for _, value in expected.bytes)
-    assert data.count(0) > 262
-    compare(expected, bench_native.run(skin, timeline, cycles))
 
 
 @pytest.mark.parametrize("boundary", boundaries(Skin()))
@@ -159,10 +141,19 @@ def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
     assert found.value.got == (None if fault == "delay" else (value ^ bit, *rest))
 
 
-@pytest.mark.parametrize("simulator", SIMULATORS)
-@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in COCOTB])
-def test_top_through_cocotb(name, simulator):
-    skin = COCOTB[name]
+@pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH")
+@pytest.mark.parametrize("name", sample(COCOTB, quick=["reference"]))
+def test_top_through_cocotb_on_icarus(name):
+    check_through_cocotb(COCOTB[name], "icarus")
+
+
+@pytest.mark.campaign  # Verilator compiles for long; `make test` has it in test_demo.py
+@pytest.mark.parametrize("name", COCOTB)
+def test_top_through_cocotb(name):
+    check_through_cocotb(COCOTB[name], "verilator")
+
+
+def check_through_cocotb(skin, simulator):
     cycles = 30_000
     timeline = stimulus(skin, cycles, seed=4)
     expected = predict(skin, timeline, cycles)
@@ -181,15 +172,27 @@ def check_that_faults_are_named(expected: Trace, got: Trace, boundary: str) -> N
         assert (found.value.boundary, found.value.cycle) == (boundary, cycle)
 
 
-def test_hello_comes_again_after_half_a_second():
-    """0.51 s of board time at 1 MHz: too slow for Amaranth's simulator, so in the compiled board."""
-    skin = Skin(rows=1, columns=1, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0)
+@functools.cache
+def half_a_second() -> tuple[Skin, Trace]:
+    """0.51 s of board time at 1 MHz as predicted: too slow for Amaranth's simulator, so the compiled board has it."""
+    skin = Skin(rows=1, columns=1, clock_hz=1_000_000, baud=100_000, settle_us=1_800.0, release_us=100.0)
     cycles = 510_000
-    timeline = stimulus(skin, cycles, seed=2)
-    expected = predict(skin, Timeline(timeline.pieces), cycles)
-    data = bytes(value for _, value in expected.bytes)
-    assert len(decoded(data, skin)[1]) == 2
-    compare(expected, bench_native.run(skin, Timeline(timeline.pieces), cycles))
+    timeline = Timeline(stimulus(skin, cycles, seed=2).pieces)
+    expected = predict(skin, timeline, cycles)
+    compare(expected, bench_native.run(skin, timeline, cycles))
+    return skin, expected
+
+
+def test_hello_comes_again_after_half_a_second():
+    skin, trace = half_a_second()
+    assert len(decoded(bytes(value for _, value in trace.bytes), skin)[1]) == 2
+
+
+def test_sequence_counts_past_255_frames():
+    skin, trace = half_a_second()
+    numbers = [frame.sequence for frame in decoded(bytes(value for _, value in trace.bytes), skin)[0]]
+    assert numbers == [number % 256 for number in range(len(numbers))]
+    assert len(numbers) > 258
 
 
 def test_simulation_past_its_time_limit_is_ended():

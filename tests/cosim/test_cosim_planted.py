@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
+from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl import top
@@ -84,7 +85,13 @@ def one_bit_wrong(m, inside, outside):
 
 
 @pytest.mark.parametrize("fault", [a_clock_late, one_bit_wrong])
-@pytest.mark.parametrize(("boundary", "labeller"), [*((boundary, "run") for boundary in STAGES), ("records", "serial")])
+@pytest.mark.parametrize(
+    ("boundary", "labeller"),
+    sample(
+        [*((boundary, "run") for boundary in STAGES), ("records", "serial")],
+        quick=[(boundary, "run") for boundary in STAGES],
+    ),
+)
 def test_a_fault_in_the_gateware_is_named(monkeypatch, record_property, boundary, labeller, fault):
     skin = SKIN.replace(labeller=labeller, report="barycenter" if boundary == "items" else "moments")
     rng = np.random.default_rng(3)

@@ -21,12 +21,12 @@ from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.chart import methods, numbers, picture
 from contactfpga_sim.studies.chart.study import Task, study
 
-SKIN = Skin(rows=4, columns=6, labeller=TOY, settle_us=3.0)
+SKIN = Skin(rows=4, columns=6, labeller=TOY, settle_us=6.0)
 CYCLES = 6000
 
 
 def test_a_skin_takes_the_object_or_its_name(tmp_path):
-    assert Skin(rows=4, columns=6, labeller="toy_labeller:TOY", settle_us=3.0) == SKIN
+    assert Skin(rows=4, columns=6, labeller="toy_labeller:TOY", settle_us=6.0) == SKIN
     path = tmp_path / "skin.toml"
     path.write_text(SKIN.to_toml())
     assert Skin.load(path) == SKIN
@@ -68,10 +68,12 @@ def test_a_module_that_fails_is_refused_in_one_sentence(tmp_path, monkeypatch, t
         boards.find("failing:TOY")
 
 
-@pytest.mark.parametrize("run", [bench_amaranth.run, bench_native.run])
-@pytest.mark.parametrize("scan", ["raster", "adaptive"])
+@pytest.mark.parametrize(
+    ("run", "scan"),
+    [(bench_native.run, "raster"), (bench_amaranth.run, "adaptive"), (bench_amaranth.run, "reversal")],
+)
 def test_it_runs_in_lockstep_with_its_golden_rule(run, scan):
-    skin = SKIN.replace(scan=scan, settle_us=6.0)
+    skin = SKIN.replace(scan=scan, precharge_us=0.5 if scan == "reversal" else 0.0)
     frames = np.random.default_rng(5).random((8, 4, 6)) < 0.3
     timeline = Timeline.frames(skin, frames)
     assert compare(predict(skin, timeline, CYCLES), run(skin, timeline, CYCLES)) > 100
@@ -92,7 +94,7 @@ def test_what_is_kept_of_it_depends_on_its_file():
 
 def test_the_chart_draws_it(tmp_path):
     skins = {name: skin for name, skin in methods.by(TOY).items() if name == "toy, 20 mm"}
-    tasks = [Task(name, skin, "fingers", 4, 0) for name, skin in skins.items()]
+    tasks = [Task(name, skin, "fingers", 4, 0, checked=0) for name, skin in skins.items()]
     with ThreadPoolExecutor(1) as pool:
         points = study(tasks, pool, with_size=False)
     numbers.write(points, tmp_path / "chart.csv")

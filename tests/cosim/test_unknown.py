@@ -2,6 +2,7 @@
 
 import pytest
 from amaranth.hdl import Fragment
+from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
@@ -40,23 +41,27 @@ SKINS = {
     "reversal": SMALL.replace(**REVERSAL),
     "reversal, cells": SMALL.replace(**REVERSAL, report="cells", diodes="row2col", send="on_change"),
 }
-MARKS = dict.fromkeys(("precharge", "reversal, cells"), pytest.mark.campaign)
 
 with_icarus = pytest.mark.skipif(not bench_unknown.available(), reason="no iverilog on PATH")
 
 
 @with_icarus
-@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in SKINS])
+@pytest.mark.parametrize(
+    "name", sample(SKINS, quick=["moments", "serial, 4-connected", "eager", "barycenter", "reversal"])
+)
 def test_no_output_depends_on_what_was_there_at_power_up(name, record_property):
     skin = SKINS[name]
-    cycles = {"16x16": 10, "reversal": 40, "reversal, cells": 40}.get(name, 20) * facts(skin).scan_clocks
+    cycles = (40 if skin.scan == "reversal" else 10) * facts(skin).scan_clocks
     timeline = stimulus(skin, cycles, seed=3)
-    assert compare(predict(skin, timeline, cycles).at_the_pins(), bench_unknown.run(skin, timeline, cycles)) > 900
+    assert compare(predict(skin, timeline, cycles).at_the_pins(), bench_unknown.run(skin, timeline, cycles)) > 400
     record_property("cases", cycles)
 
 
 @with_icarus
-@pytest.mark.parametrize(("missing", "name"), [("link", "symmetric"), ("debounce", "symmetric"), ("label", "serial")])
+@pytest.mark.parametrize(
+    ("missing", "name"),
+    sample([("link", "symmetric"), ("debounce", "symmetric"), ("label", "serial")], quick=[("debounce", "symmetric")]),
+)
 def test_memory_contents_that_the_bitstream_does_not_bring_are_seen(missing, name):
     skin = SKINS[name]
     cycles = 20 * facts(skin).scan_clocks

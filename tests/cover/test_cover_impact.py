@@ -274,7 +274,7 @@ def random_blows(count):
 
 def test_quadrature_against_30_digit_arithmetic(record_property):
     cases = 0
-    for moved, speed, stiffness in random_blows(24):
+    for moved, speed, stiffness in random_blows(12):
         found = impact.strike(moved, speed, stiffness, method="quadrature")
         if isinstance(found, NoSolution):
             continue
@@ -283,7 +283,7 @@ def test_quadrature_against_30_digit_arithmetic(record_property):
         assert found.time_s == pytest.approx(seconds, rel=1e-12), moved
         cases += 1
     record_property("cases", cases)
-    assert cases > 15
+    assert cases > 7
 
 
 def test_the_first_of_several_roots_is_found():

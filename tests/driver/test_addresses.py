@@ -56,7 +56,7 @@ def test_what_is_no_address_is_told(address, message):
 
 def test_files_of_any_name_make_a_board(tmp_path):
     skin, scene = tmp_path / "50%&+#.toml", tmp_path / "a b%41.npy"
-    skin.write_text("rows = 2\ncolumns = 2\n")
+    skin.write_text(SLOW.to_toml())
     np.save(scene, np.array([[[0, 9], [0, 8]]], np.uint8))
     quoted = [str(path).replace("%", "%25").replace("&", "%26") for path in (skin, scene)]
     with contactfpga.open(f"sim://?skin={quoted[0]}&scene={quoted[1]}&threshold=8") as board:

@@ -220,19 +220,29 @@ def test_close_wakes_a_call_that_waits_in_another_thread(board, call):
         getattr(opened, call)(timeout=LONG)
 
 
+def readers_of(board):
+    """Threads that read its port."""
+    return [thread for thread in threading.enumerate() if board.path in thread.name]
+
+
 def test_a_board_that_nobody_holds_gives_its_port_back(board):
     for _ in range(3):
         opened = contactfpga.open(board.path, timeout=LONG)  # refused while the port is held
         opened.next(LONG)
+        assert len(readers_of(board)) == 1
         del opened
         gc.collect()
-        wait_until(lambda: not [thread for thread in threading.enumerate() if board.path in thread.name])
+        wait_until(lambda: not readers_of(board))
+    assert not readers_of(board)
 
 
 def test_the_reader_ends_with_its_board(board):
     for _ in range(3):
-        contactfpga.open(board.path, timeout=LONG).close()
-    wait_until(lambda: not [thread for thread in threading.enumerate() if board.path in thread.name])
+        opened = contactfpga.open(board.path, timeout=LONG)
+        assert len(readers_of(board)) == 1
+        opened.close()
+        wait_until(lambda: not readers_of(board))
+    assert not readers_of(board)
 
 
 def test_ctrl_c_ends_a_call_that_waits(board):

@@ -47,6 +47,7 @@ def test_a_second_read_is_of_a_later_frame():
     assert second.time_us > first.time_us
 
 
+@pytest.mark.campaign
 def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
     file = tmp_path / "skin.toml"
     file.write_text(SKIN.replace(send="on_change").to_toml())
@@ -60,9 +61,13 @@ def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
 
 
 def test_simulated_board_loses_nothing():
+    """By the frames, and by the gateware's own counters: at each hello the frames sent are those received."""
     with contactfpga.open("sim://?scene=moving") as opened:
         frames = list(itertools.islice(opened, 12_000))
         stats = opened.stats
+        assert opened.hello.sent > 10_000
+        assert frames[-1].time_us == pytest.approx(opened.clock() * 1e6, abs=1000)
+    assert stats.restarts == stats.unexplained == 0
     steps = {after.time_us - before.time_us for before, after in itertools.pairwise(frames)}
     assert stats.lost == 0
     assert not stats.damaged
@@ -71,6 +76,7 @@ def test_simulated_board_loses_nothing():
     assert len({zones[0].x_mm for zones in frames}) > 20
 
 
+@pytest.mark.campaign  # test_addresses.py has one
 def test_simulated_board_of_a_file(tmp_path):
     skin = contactfpga.Skin(rows=5, columns=7, pitch_x_mm=3.0, report="cells", settle_us=20.0)
     file = tmp_path / "skin.toml"
@@ -86,16 +92,6 @@ def test_simulated_board_with_an_unknown_option():
         contactfpga.open("sim://?color=red")
     with pytest.raises(contactfpga.PortNotFound, match="scene 'elbow' is not known"):
         contactfpga.open("sim://?scene=elbow")
-
-
-def test_losses_are_none_by_the_count_of_the_hello_as_well():
-    """The gateware's own counters: at each hello the frames sent are those received."""
-    with contactfpga.open("sim://?scene=moving") as opened:
-        for _ in range(12_000):
-            zones = opened.next()
-        assert opened.hello.sent > 10_000
-        assert opened.stats.lost == opened.stats.restarts == opened.stats.unexplained == 0
-        assert zones.time_us == pytest.approx(opened.clock() * 1e6, abs=1000)
 
 
 # ---- a virtual board of one's own

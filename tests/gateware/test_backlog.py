@@ -43,11 +43,12 @@ SHEETS = {
 
 
 def cases():
-    """Every sheet with every labeller; bitmaps have none."""
-    for name, fields in SHEETS.items():
-        for labeller in LABELLERS if fields.get("report") != "cells" else ("run",):
-            long = name in ("9x9, divided", "16x16, divided")
-            long |= name.startswith("24x40") and labeller in ("projection", "single")
+    """Every sheet with every labeller; bitmaps have none. `make test` takes a labeller for each, in turn."""
+    for number, (name, fields) in enumerate(SHEETS.items()):
+        labellers = list(LABELLERS) if fields.get("report") != "cells" else ["run"]
+        for labeller in labellers:
+            long = name in ("24x40, 8", "24x40, 4", "9x9, divided", "16x16, divided")
+            long |= labeller != labellers[number % len(labellers)]
             yield pytest.param(name, labeller, marks=[pytest.mark.campaign] * long)
 
 

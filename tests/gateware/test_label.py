@@ -6,6 +6,7 @@ import itertools
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sample import sample
 
 from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
@@ -228,9 +229,11 @@ def frames_of(rows, columns):
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(("rows", "columns"), [(6, 9), (4, 16), (9, 5), (1, 12), (12, 1), (5, 2)])
+@pytest.mark.parametrize(
+    ("rows", "columns"), sample([(6, 9), (4, 16), (9, 5), (1, 12), (12, 1), (5, 2)], quick=[(6, 9), (1, 12), (5, 2)])
+)
 def test_random_frames_come_out_in_their_cycles(bench, rows, columns, connectivity, labeller):
-    @settings(max_examples=40, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=15, deadline=None, derandomize=True, database=None)
     @given(frames_of(rows, columns))
     def check(frames):
         assert_exact(bench, frames, columns, connectivity, labeller)
@@ -246,14 +249,14 @@ def maze(rng, rows, columns):
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(("rows", "columns", "count"), [(9, 9, 30), (12, 17, 30), (20, 32, 6)])
+@pytest.mark.parametrize(("rows", "columns", "count"), [(9, 9, 20), (12, 17, 15), (20, 32, 2)])
 def test_mazes_come_out_in_their_cycles(bench, rng, rows, columns, count, connectivity, labeller):
     assert_exact(bench, [maze(rng, rows, columns) for _ in range(count)], columns, connectivity, labeller)
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(("rows", "columns"), [(6, 9), (8, 16), (1, 7), (7, 1)])
-@pytest.mark.parametrize(("gap", "stall"), [(0.5, 0.0), (0.0, 0.5), (0.4, 0.8), (0.8, 0.4)])
+@pytest.mark.parametrize(("rows", "columns"), [(6, 9), (1, 7), (7, 1)])
+@pytest.mark.parametrize(("gap", "stall"), [(0.4, 0.8), (0.8, 0.4)])
 def test_stalls_on_either_port_change_no_zone(bench, rng, rows, columns, connectivity, gap, stall, labeller):
     frames = [tuple(rng.randrange(1 << columns) for _ in range(rows)) for _ in range(6)]
     frames += [maze(rng, rows, columns) for _ in range(6)]
@@ -263,7 +266,7 @@ def test_stalls_on_either_port_change_no_zone(bench, rng, rows, columns, connect
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize("columns", [1, 2, 3, 8, 16, 33, 64])
+@pytest.mark.parametrize("columns", sample([1, 2, 3, 8, 16, 33, 64], quick=[1, 3, 8, 16]))
 def test_the_last_record_comes_within_the_bound(bench, rng, columns, connectivity, labeller):
     dots = sum(1 << x for x in range(0, columns, 2))
     whole = (1 << columns) - 1

@@ -1,22 +1,26 @@
 """The compiled labeller on very many frames: every record with its exact cycle, against the golden model."""
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_sim.board.labeller import LabelBench, Labelled
 from contactfpga_sim.golden import all_departures, row_clocks
 from contactfpga_sim.scenes import shapes
 
-BOTH = pytest.mark.parametrize("labeller", ["run", "serial"])
+LABELLERS = ("run", "serial")
+BOTH = pytest.mark.parametrize("labeller", LABELLERS)
+RULES = (*itertools.product((8, 4), LABELLERS),)  # each costs a compiler's run for every size of sheet
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 SQUARES = (8, 16, 33, 64)
-RANDOM = {  # (rows, columns): frames; more than 100,000 in all, for each connectivity; `serial` takes a tenth
+RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a tenth
     (1, 1): 200,
     (1, 16): 5_000,
     (16, 1): 5_000,
@@ -27,6 +31,7 @@ RANDOM = {  # (rows, columns): frames; more than 100,000 in all, for each connec
     (33, 33): 1_000,
     (64, 64): 300,
 }
+QUICK_RANDOM = [((8, 8), 8, "run"), ((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES)]
 
 
 @pytest.fixture(scope="module")
@@ -101,10 +106,9 @@ def check_stalled(bench: LabelBench, frames: np.ndarray, gap: int, stall: int) -
     assert (np.diff(got.cycle) > 0).all()
 
 
-@pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(
-    ("columns", "labeller"),
-    [(4, "run"), (5, "run"), (4, "serial"), pytest.param(5, "serial", marks=pytest.mark.campaign)],
+    ("columns", "connectivity", "labeller"),
+    sample([(columns, *rule) for columns in (4, 5) for rule in RULES], quick=[(4, *rule) for rule in RULES]),
 )
 def test_every_small_frame(benches, record_property, columns, connectivity, labeller):
     bench = benches(4, columns, connectivity, labeller)
@@ -117,9 +121,13 @@ def test_every_small_frame(benches, record_property, columns, connectivity, labe
     record_property("worst_last_record_clocks", worst)
 
 
-@BOTH
-@pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize("size", SQUARES)
+@pytest.mark.parametrize(
+    ("size", "connectivity", "labeller"),
+    sample(
+        [(size, *rule) for size in SQUARES for rule in RULES],
+        quick=[(8, 8, "run"), (8, 4, "run"), *((16, *rule) for rule in RULES)],
+    ),
+)
 def test_shapes_that_break_labellers(benches, record_property, size, connectivity, labeller):
     frames = np.array([cells for _, cells in shapes.variants(size, size)])
     check_exact(benches(size, size, connectivity, labeller), frames)
@@ -127,9 +135,11 @@ def test_shapes_that_break_labellers(benches, record_property, size, connectivit
     record_property("cases", len(frames))
 
 
-@BOTH
-@pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize("size", RANDOM, ids=str)
+@pytest.mark.parametrize(
+    ("size", "connectivity", "labeller"),
+    sample([(size, *rule) for size in RANDOM for rule in RULES], quick=QUICK_RANDOM),
+    ids=str,
+)
 def test_random_frames(benches, record_property, size, connectivity, labeller):
     count = RANDOM[size] if labeller == "run" else RANDOM[size] // 10
     frames = random_frames(*size, count, seed=size[0] * 100 + size[1])
@@ -138,12 +148,13 @@ def test_random_frames(benches, record_property, size, connectivity, labeller):
 
 
 def test_random_frames_are_enough():
-    assert sum(RANDOM.values()) >= 100_000
+    assert sum(RANDOM.values()) >= 100_000, "for each connectivity, in the campaign"
+    assert sum(RANDOM[size] // (1 if labeller == "run" else 10) for size, _, labeller in QUICK_RANDOM) >= 100_000
 
 
 @BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(("gap", "stall"), [(0, 50), (50, 0), (30, 30), (10, 90)])
+@pytest.mark.parametrize(("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30), (10, 90)]))
 def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity, labeller):
     small = every_frame(4, 4)
     check_stalled(benches(4, 4, connectivity, labeller), small, gap, stall)
@@ -152,9 +163,13 @@ def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivit
     record_property("cases", len(small) + len(large))
 
 
-@BOTH
-@pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize(
+    ("name", "connectivity", "labeller"),
+    sample(
+        [(name, *rule) for name in RECORDINGS for rule in RULES],
+        quick=[("dtmf16x16", *rule) for rule in RULES],
+    ),
+)
 def test_recordings(benches, record_property, name, connectivity, labeller):
     path = DATA / f"{name}.dev.npz"
     if not path.exists():

@@ -248,7 +248,7 @@ def varying_stalls(rng, cycles):
 @pytest.mark.parametrize("name", SKINS)
 def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(bench, rng, name):
     skin = skin_of(name)
-    frames = random_frames(rng, skin, 130, spacing=2)
+    frames = random_frames(rng, skin, 90, spacing=2)
     cycles = frames[-1].not_before[-1] + 400
     ready = varying_stalls(rng, cycles + 1)
     asked = {cycle for cycle in range(cycles) if rng.random() < 0.001}
@@ -270,8 +270,8 @@ def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(be
         assert packet == (expected or hello_sent(skin, sink, begun, sent, number, stuck.__getitem__))
         sent += expected is not None
     assert len(packets) >= len(wanted) - 1
-    assert len(packets) > 40
-    assert overwritten > 5
+    assert len(packets) > 30
+    assert overwritten > 2
     assert len({packet for _, packet in packets if packet[0] == 0}) > 3, "hellos differ in what they tell"
 
 

@@ -120,11 +120,11 @@ def test_flags_without_a_meaning_are_ignored(listen):
 
 
 def test_no_burst_of_up_to_sixteen_bits_makes_another_request(listen, rng):
-    """Of every start and length some; only the bits of the check bytes that carry none of the CRC do not count."""
+    """Of every third start and each length one; bits of the check bytes that carry none of the CRC do not count."""
     whole = sealed(plain(0x12345 | 1, True))
     bits = 8 * (len(whole) - 1)
     word = int.from_bytes(whole, "little")
-    for start in range(bits):
+    for start in range(rng.randrange(3), bits, 3):
         data = b""
         for length in range(1, min(16, bits - start) + 1):
             inner = rng.randrange(1 << max(0, length - 2)) << 1 if length > 2 else 0

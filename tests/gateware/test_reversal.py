@@ -4,7 +4,7 @@ import random
 
 import numpy as np
 import pytest
-from reversal import PROJECTED, any_skin, frames, held, pressed, slots, small, touches, zones
+from reversal import any_skin, frames, held, pressed, projected, slots, small, touches, zones
 from toy_labeller import TOY
 
 from contactfpga.skin import Skin
@@ -92,7 +92,7 @@ def check_truth(skin: Skin, timeline: Timeline, trace: Trace, changes: list[tupl
             assert rows == sorted(set(rows))
             for slot in frame:
                 seen[slot.row] = pressed(skin, timeline, slot.sample)[slot.row]
-            closed = held(skin, timeline, frame[0].begin - PROJECTED, frame[-1].sample)
+            closed = held(skin, timeline, frame[0].begin - projected(skin), frame[-1].sample)
             # A column that read stuck a while ago is not driven, so its switches do not make their rows answer.
             assert not (closed & ~seen).any() or any(piece[2] is not None for piece in timeline.pieces), end
             checked += 1

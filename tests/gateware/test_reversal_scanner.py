@@ -6,7 +6,7 @@ import itertools
 import pytest
 from amaranth.hdl import Cat
 from bench import Bench, Drive
-from reversal import PROJECTED, Slot, frames, slots, small
+from reversal import Slot, frames, projected, slots, small
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import precharge, reversal
@@ -136,7 +136,7 @@ def check_rows(skin: Skin, life: Life, at) -> int:
             continue  # under way
         for row in range(skin.rows):
             closed = present(skin, row)
-            for cycle in range(frame[0].begin - PROJECTED, frame[-1].sample + 1):
+            for cycle in range(frame[0].begin - projected(skin), frame[-1].sample + 1):
                 closed &= at(cycle).cells[row]
             cells = next((read[slot] for slot in frame if slot.row == row), 0)
             assert not closed & ~cells, f"row {row} of the frame from {frame[0].begin} on"

@@ -378,11 +378,12 @@ def test_a_slip_in_the_gatewares_clocks_is_seen(bench, rng, monkeypatch, name):
 # ---- the compiled board
 
 
+@pytest.mark.campaign
 def test_the_compiled_board_with_registers_is_the_golden_models_in_every_clock(record_property):
     skin = Skin(rows=17, columns=19, row_drive="74hc595", row_chains=2, column_read="74hc165", column_chains=3)
-    cycles = 400_000
+    cycles = 200_000
     timeline = stimulus(skin, cycles, seed=5)
-    assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 20_000
+    assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 10_000
     record_property("cases", cycles)
 
 

@@ -12,7 +12,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
 from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
 
-SAMPLE = 150
+SAMPLE = 100
 
 
 @dataclasses.dataclass
@@ -62,6 +62,7 @@ def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
         trial.expected(board, stimulus)
 
 
+@pytest.mark.campaign
 def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     skin = SKINS["4x4, fast"]
     mutants = netlist.draw(netlist.candidates(skin), 60, seed=1)

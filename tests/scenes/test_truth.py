@@ -119,7 +119,7 @@ def test_random_scenes_against_a_raster(record_property):
     x = np.arange(box.left + step / 2, box.right, step)
     y = np.arange(box.top + step / 2, box.bottom, step)[:, None]
     compared = 0
-    for seed in range(60):
+    for seed in range(25):
         parts = random_parts(np.random.default_rng(seed))
         cells = np.any([own_test(part, x, y) for part in parts], axis=0)
         labels, count = ndimage.label(cells, np.ones((3, 3)))
@@ -140,7 +140,7 @@ def test_random_scenes_against_a_raster(record_property):
         for got, want in zip(found, expected, strict=True):
             assert got[:2] == pytest.approx(want[:2], abs=0.05)
             assert got[2] == pytest.approx(want[2], rel=5e-3, abs=0.05)
-    assert compared > 45
+    assert compared > 20
     record_property("cases", compared)
 
 

@@ -80,6 +80,7 @@ def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
     assert waiting.outcome.reacts_s == hunting.outcome.reacts_s
 
 
+@pytest.mark.campaign
 def test_the_boards_debounce_ends_the_hunting_by_uart_but_not_by_the_pin_which_is_not_debounced():
     skin = Skin(debounce="asym_eager_defer_pk", debounce_press_us=2000.0, debounce_release_us=2000.0)
     case = PAPER.but(switch=BOUNCING, control={"clear_s": 0.0})

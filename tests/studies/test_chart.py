@@ -18,7 +18,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.golden import zones
+from contactfpga_sim.golden import predict, zones
 from contactfpga_sim.pages import chart_page, chart_pictures, writer
 from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
 from contactfpga_sim.studies import kept
@@ -38,8 +38,9 @@ def results_of_this_test_only(tmp_path, monkeypatch):
     return compiled
 
 
-def task(method="run, 20 mm", family="pair", count=20, **options):
-    return Task(method, METHODS[method], family, count, seed=3, timed=4, checked=1, **options)
+def task(method="run, 20 mm", family="pair", count=20, checked=0):
+    """One that needs no compiled board unless some scenes are checked on it."""
+    return Task(method, METHODS[method], family, count, seed=3, timed=4, checked=checked)
 
 
 def test_found_and_there_are_paired_at_the_least_total_distance():
@@ -113,9 +114,8 @@ def test_the_time_is_that_of_the_compiled_board():
 
 
 def test_a_board_that_takes_longer_is_noticed(monkeypatch):
-    right = speed.bench_native.run
     later = dataclasses.replace(SMALL, settle_us=6.0)
-    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: right(later, *rest))
+    monkeypatch.setattr(speed.bench_native, "run", lambda _, *rest: predict(later, *rest))
     cells = np.ones((8, 8), bool)
     with pytest.raises(Mismatch):
         speed.touch(SMALL, cells, 0.5, check=True)
@@ -194,7 +194,7 @@ def test_exact_labellers_add_no_error_and_the_others_do():
 
 def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
-    tasks = [task(), task("single, 20 mm", "bumper", 130)]
+    tasks = [task(checked=1), task("single, 20 mm", "bumper", 130)]
     with ThreadPoolExecutor(2) as pool:
         points = study.study(tasks, pool, with_size=False)
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "others")

@@ -21,8 +21,9 @@ def environment(**changes):
 
 
 def listening():
-    """In a child, before it starts: Ctrl-C is heard, as it is not by what a shell starts in its background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """In a child, before it starts: signals end it that a shell has its background ignore, or nohup what it starts."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
 
 
 class OnTerminal:

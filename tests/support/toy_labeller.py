@@ -34,6 +34,7 @@ class RowLabeller(wiring.Component):
         row, record = self.rows.payload, self.records.payload
         y, cells, pending, ends = Signal(range(64)), Signal.like(row.cells), Signal(), Signal()
         taken = self.rows.valid & self.rows.ready
+        number = row_number(m, self.derived, row, taken)
         area = sum(cells[x] for x in range(len(cells)))
         m.d.comb += [
             self.rows.ready.eq(~pending & ~ends),
@@ -45,7 +46,6 @@ class RowLabeller(wiring.Component):
         ]
         with m.If(self.records.valid & self.records.ready):
             m.d.sync += [pending.eq(0), ends.eq(pending & ends)]
-        number = row_number(m, self.derived, row, taken)  # a scan may skip rows
         with m.If(taken):
             m.d.sync += [
                 cells.eq(row.cells),

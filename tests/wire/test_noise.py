@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from frames import receiver
+from sample import sample
 from wire import Wire, check, crc16
 
 from contactfpga import Skin
@@ -17,6 +18,7 @@ SKINS = {
     "barycenters": Skin(report="barycenter"),
     "cells": Skin(rows=12, columns=16, report="cells", settle_us=10.0),
 }
+LINES, GARBAGE = 2, 200
 HIT = 2
 """The frame in which the line goes wrong; some come before it, more after."""
 
@@ -56,9 +58,9 @@ class Line:
         return lost
 
 
-@pytest.fixture(params=SKINS)
+@pytest.fixture(params=sample(SKINS, quick=["zones", "barycenters"]))
 def lines(request, rng):
-    return [Line(SKINS[request.param], rng) for _ in range(8)]
+    return [Line(SKINS[request.param], rng) for _ in range(LINES)]
 
 
 def test_a_lost_byte_costs_its_frame_and_a_lost_delimiter_the_next_one_as_well(lines, record_property):
@@ -104,14 +106,14 @@ def test_a_wrong_byte_costs_its_frame_and_a_wrong_delimiter_the_next_one_as_well
 def test_garbage_costs_the_frame_it_runs_into(lines, rng, record_property):
     """Inserted anywhere, of any length, with and without zero bytes in it: never more than that one frame."""
     for line in lines:
-        for _ in range(400):
+        for _ in range(GARBAGE):
             at = rng.randrange(len(line.hit) + 1)
             garbage = rng.randbytes(rng.choice([1, 2, 3, 8, 60, 600]))
             text = line.hit[:at] + garbage + line.hit[at:]
             whole = b"\0" + line.hit in b"\0" + text  # garbage may hold the bytes that it cuts off
             parted = text.endswith(b"\0")  # from the next frame
             assert line.lost(text) == ([] if whole else [HIT]) + ([] if parted else [HIT + 1])
-    record_property("cases", 400 * len(lines))
+    record_property("cases", GARBAGE * len(lines))
 
 
 # ---- the share of garbage that is accepted

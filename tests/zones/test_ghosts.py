@@ -18,9 +18,9 @@ from contactfpga_hdl.board.build import plan_for
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, requests
-from contactfpga_sim.sheet.circuit import Circuit
+from contactfpga_sim.sheet.wiring import Wiring
 
-BARE = Circuit(bare=np.ones((1, 1), bool), floating=True)
+BARE = Wiring(bare=np.ones((1, 1), bool), floating=True)
 
 
 def skin_of(rows, columns, report="moments"):

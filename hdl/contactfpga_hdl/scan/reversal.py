@@ -131,7 +131,9 @@ class ReversalScanner(wiring.Component):
         """What a state does to the sheet is seen at the pins a clock later."""
         derived = self.derived
         project, settle, charge = derived.project_clocks, derived.settle_clocks, derived.release_clocks - 2
-        clock = Signal(range(max(project + SYNCHRONIZED, settle + 1, charge)))
+        listened = project + SYNCHRONIZED  # clocks for which columns are driven as a frame begins, and one more
+        charged = min(charge - 1, charge - derived.precharge_clocks + listened)
+        clock = Signal(range(max(listened, settle + 1, charge)))
         due = Signal(2)  # a sample on its way through the synchronizer
         touched = sheet.touched.any()
         m.d.comb += [
@@ -151,7 +153,7 @@ class ReversalScanner(wiring.Component):
                 m.d.comb += [
                     sheet.charges.eq(1),
                     sheet.listens.eq(1),
-                    turn.settled.eq(clock == project + SYNCHRONIZED - 1),
+                    turn.settled.eq(clock == listened - 1),
                 ]
                 with m.If(turn.settled):
                     m.d.sync += clock.eq(clock)
@@ -161,7 +163,7 @@ class ReversalScanner(wiring.Component):
                         m.d.comb += turn.begins.eq(1)
                         m.d.sync += turn.rests.eq(~touched)
                         with m.If(touched):
-                            m.d.sync += clock.eq(charge - 1)
+                            m.d.sync += clock.eq(charged)
                             m.next = "CHARGE"
             with m.State("CHARGE"):
                 m.d.comb += sheet.charges.eq(1)
@@ -207,7 +209,8 @@ class ReversalScanner(wiring.Component):
     def _offer_all_rows(self, m: Module, sheet: _Sheet, turn: _Turn, pressed: Value) -> None:
         rows, row = self.rows, self.rows.payload
         place = Signal(range(max(2, self.skin.rows)))  # of the row on offer
-        driven, rest = Signal(), Signal()  # rows up to the one that was driven are known; all others are
+        driven = Signal()  # rows up to the one that was driven are known
+        rest = Signal()  # all others are
         cells = Signal(self.skin.columns)
         m.d.comb += [
             rows.valid.eq(driven | rest),

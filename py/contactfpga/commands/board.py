@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from contactfpga.circuit import load_checked
 from contactfpga.cover import load_cover
 from contactfpga.skin import Skin
 
@@ -24,4 +25,5 @@ def run(args: argparse.Namespace) -> int:
 
     skin = Skin.load(args.skin) if args.skin else Skin()
     cover = load_cover(args.skin) if args.skin else None
-    return PtyBoard(skin, args.scene, link=args.link, cover=cover).serve()
+    circuit = load_checked(args.skin, skin) if args.skin else None
+    return PtyBoard(skin, args.scene, link=args.link, cover=cover, circuit=circuit).serve()

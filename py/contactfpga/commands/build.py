@@ -7,6 +7,7 @@ from pathlib import Path
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec, bitstream_path
+from contactfpga.circuit import load_checked
 from contactfpga.console import numbers, outputs
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
@@ -32,6 +33,8 @@ def run(args: argparse.Namespace) -> int:
 
     board = find(args.board)
     skin = Skin.load(args.skin) if args.skin else board.skin
+    if args.skin:
+        load_checked(args.skin, skin)
     folder = outputs.folder(args.output or default_folder(board))
     try:
         report = build.build(skin, board, folder, args.seed)

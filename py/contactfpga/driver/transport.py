@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
+from contactfpga.circuit import Circuit, load_checked
 from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.conversation import Arrival, Conversation
@@ -127,8 +128,9 @@ class SimTransport:
         asked = sim_address.parse(name)
         skin = Skin.load(asked.skin) if asked.skin is not None else None
         cover = load_cover(asked.skin) if asked.skin is not None else None
+        circuit = load_checked(asked.skin, skin) if asked.skin is not None and skin is not None else None
         try:
-            return cls(name, _virtual_board(asked, skin, cover))
+            return cls(name, _virtual_board(asked, skin, cover, circuit))
         except ModuleNotFoundError as error:
             raise MissingExtra(f"sim:// ({error})", "sim") from None
         except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -261,11 +263,13 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     return SerialTransport(name, baud)
 
 
-def _virtual_board(asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None) -> SimulatedPort:
+def _virtual_board(
+    asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None, circuit: Circuit | None
+) -> SimulatedPort:
     """The one place at which the host loads the simulation, which need not be installed."""
     from contactfpga_sim.board import virtual
 
-    return virtual.board_for(asked.scene, skin, asked.threshold, cover)
+    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit)
 
 
 def _reason(error: Exception) -> str:

@@ -113,14 +113,17 @@ class Skin:
 
     @classmethod
     def load(cls, path: str | Path) -> Skin:
-        """Read a Skin from a TOML file whose keys are the fields of this class. A table ``[cover]`` is not the Skin's:
-        :func:`contactfpga.cover.load_cover` reads it."""
+        """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
+        ``[circuit]`` are not the Skin's: :func:`contactfpga.cover.load_cover` and
+        :func:`contactfpga.circuit.load_circuit` read them."""
         values = tomlfile.load(path, SkinError)
-        values.pop("cover", None)
+        for table in ("cover", "circuit"):
+            values.pop(table, None)
         known = [field.name for field in dataclasses.fields(cls)]
         unknown = sorted(set(values) - set(known))
         if unknown:
-            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, and the table [cover]")
+            tables = "and the tables [cover] and [circuit]"
+            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, {tables}")
         return cls(**values)
 
     def replace(self, **changes: Any) -> Skin:

@@ -14,7 +14,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
-from contactfpga_sim.sheet.circuit import Line
+from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "charged", "received")
@@ -76,9 +76,12 @@ class CompiledBoard:
 
     def settle(self, line: Line) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none."""
-        shares = (line.share(seconds, 1 / self.skin.clock_hz) for seconds in (line.press_s, line.release_s))
-        values = (*shares, line.pulled, line.threshold)
-        self._call("settle", *map(ctypes.c_double, values))
+        clock_s = 1 / self.skin.clock_hz
+        press, pulled = (np.array(each) for each in ([line.share(tau, clock_s) for tau in line.press_s], line.pulled))
+        if len(press) != self.skin.columns + 1:
+            raise ValueError(f"a line for {len(press) - 1} columns; the sheet has {self.skin.columns}")
+        arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
+        self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
 
     def run(self, cycles: int) -> None:
         """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""

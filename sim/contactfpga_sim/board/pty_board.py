@@ -16,6 +16,7 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
+from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin, SkinError
@@ -42,8 +43,8 @@ class PtyBoard:
 
     The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
     ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
-    skin, scene and cover: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a symbolic link
-    to the port. What no client reads is dropped, the oldest first, and counted.
+    skin, scene, cover and circuit: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a
+    symbolic link to the port. What no client reads is dropped, the oldest first, and counted.
     """
 
     def __init__(
@@ -52,8 +53,9 @@ class PtyBoard:
         scene: Source = None,
         link: str | Path | None = None,
         cover: Cover | None = None,
+        circuit: Circuit | None = None,
     ):
-        self._board = VirtualBoard(skin, scene, cover)
+        self._board = VirtualBoard(skin, scene, cover, circuit)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         # The board keeps its own end of the slave open: without it, a client that leaves would end the terminal.

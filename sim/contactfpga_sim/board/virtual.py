@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import Source
 from contactfpga_sim.scenes.scene import scene as make_scene
+from contactfpga_sim.sheet.line import Line
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -18,16 +20,24 @@ class VirtualBoard:
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
-    contacts press, by default none.
+    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
     """
 
-    def __init__(self, skin: Skin | None = None, scene: Source = None, cover: Cover | None = None):
+    def __init__(
+        self,
+        skin: Skin | None = None,
+        scene: Source = None,
+        cover: Cover | None = None,
+        circuit: Circuit | None = None,
+    ):
         self.skin = skin or Skin()
         self._scene = make_scene(self.skin, scene, cover)
         self._board = CompiledBoard(self.skin)
+        if circuit is not None:
+            self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""
@@ -63,10 +73,12 @@ class VirtualBoard:
         self.close()
 
 
-def board_for(scene: str | None, skin: Skin | None, threshold: float | None, cover: Cover | None) -> VirtualBoard:
+def board_for(
+    scene: str | None, skin: Skin | None, threshold: float | None, cover: Cover | None, circuit: Circuit | None = None
+) -> VirtualBoard:
     """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed."""
     if threshold is None:
-        return VirtualBoard(skin, scene, cover)
+        return VirtualBoard(skin, scene, cover, circuit)
     if scene is None or not scene.endswith((".npy", ".npz")):
         raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
-    return VirtualBoard(skin, Recording.load(scene, threshold))
+    return VirtualBoard(skin, Recording.load(scene, threshold), circuit=circuit)

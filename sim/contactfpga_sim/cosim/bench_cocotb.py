@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
 _BUILD_ARGS = {
-    # The runner makes every signal public, which costs speed; ports.vlt does that for the ports alone.
-    "verilator": ["--no-public-flat-rw", "-Wno-fatal", "-CFLAGS", "-O1"],
+    # The runner makes every signal public, which costs speed; ports.vlt does that for the ports alone. What is
+    # simulated takes a second, and what an optimizer saves of it takes it several to find.
+    "verilator": ["--no-public-flat-rw", "-Wno-fatal", "-CFLAGS", "-O0"],
     # In the newer language nothing wakes combinational blocks at time 0, and they stay unknown.
     "icarus": ["-g2005"],
 }

@@ -114,9 +114,13 @@ class Facts:
         asked = upwards(exact(self.skin.release_us) * self.clocks_per_us)
         latch = 0 if self.skin.row_drive == "direct" else self.shift_bit
         chosen = self.choice + self.row_shift if self.choice else 0
-        precharge = upwards(exact(self.skin.precharge_us) * self.clocks_per_us)
-        charged = 1 + precharge + 1 if precharge else 0
+        charged = 1 + self.precharge + 1 if self.precharge else 0
         return max(asked, self.load + self.column_shift, latch, chosen, charged)
+
+    @functools.cached_property
+    def precharge(self) -> int:
+        """Clocks for which columns are driven at least before a row is."""
+        return upwards(exact(self.skin.precharge_us) * self.clocks_per_us)
 
     @functools.cached_property
     def settle(self) -> int:

@@ -150,7 +150,7 @@ class Scanner:
         facts = self._facts
         counted = np.zeros_like(cells)
         handed = _Handed(facts, rows)
-        begin = begun + 4
+        begin = begun + max(4, facts.precharge - facts.project)
         for row in todo:
             slot = Slot(row, begin, begin + facts.settle - 1)
             self.slots.append(slot)

@@ -58,8 +58,8 @@ class Late(ContactFPGAError):
 
 
 def places(skin: Skin, height: int, width: int) -> list[np.ndarray]:
-    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without switches that are masked;
-    left out where all are."""
+    """A contact of height x width cells, (R, C) bool, at every place of the sheet, without the switches that are
+    masked; left out where all are."""
     if not (1 <= height <= skin.rows and 1 <= width <= skin.columns):
         raise ValueError(f"the contact has {height}x{width} cells; the sheet has {skin.rows}x{skin.columns}")
     found = []

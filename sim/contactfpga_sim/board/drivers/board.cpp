@@ -20,9 +20,9 @@ public:
     uint64_t pressed[ROWS] = {};
     uint64_t stuck = 0;
     // A column with capacitance goes a share of its way a clock: to the level that a pressed switch pulls it to, or back
-    // to 0. It reads pressed above the threshold.
+    // to 0. It reads pressed above the threshold. Share and level depend on how many columns are pulled at once.
     bool slow = false;
-    double press_share = 1, release_share = 1, pulled = 1, threshold = 0.5;
+    double press_share[COLUMNS + 1], pulled[COLUMNS + 1], release_share = 1, threshold = 0.5;
 
     static uint64_t driven(uint64_t row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROWS); }
 
@@ -35,7 +35,7 @@ public:
         fights += (reads & columns_driven) != 0;
         reads |= stuck;
         if (slow)
-            reads = settled(reads);
+            reads = settled(reads, columns_driven);
         return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
     }
 
@@ -50,11 +50,14 @@ public:
 private:
     double volts_[COLUMNS] = {};
 
-    uint64_t settled(uint64_t pulls) {
+    uint64_t settled(uint64_t pulls, uint64_t columns_driven) {
         uint64_t reads = 0;
+        const int count = __builtin_popcountll(pulls);
         for (unsigned column = 0; column < COLUMNS; column++) {
             const bool pull = pulls >> column & 1;
-            volts_[column] += ((pull ? pulled : 0) - volts_[column]) * (pull ? press_share : release_share);
+            if (columns_driven >> column & 1 && !pull)
+                volts_[column] = 0;
+            volts_[column] += ((pull ? pulled[count] : 0) - volts_[column]) * (pull ? press_share[count] : release_share);
             reads |= static_cast<uint64_t>(volts_[column] > threshold) << column;
         }
         return reads;
@@ -255,12 +258,15 @@ EXPORT void board_restart(Board *board, unsigned mutant) {
     board->mutant = mutant;
 }
 EXPORT void board_stick(Board *board, uint64_t columns) { board->matrix.stuck = columns; }
-EXPORT void board_settle(Board *board, double press_share, double release_share, double pulled, double threshold) {
+EXPORT void board_settle(
+    Board *board, const double *press_share, const double *pulled, double release_share, double threshold) {
     Matrix &matrix = board->matrix;
     matrix.slow = true;
-    matrix.press_share = press_share;
+    for (unsigned count = 0; count <= COLUMNS; count++) {
+        matrix.press_share[count] = press_share[count];
+        matrix.pulled[count] = pulled[count];
+    }
     matrix.release_share = release_share;
-    matrix.pulled = pulled;
     matrix.threshold = threshold;
 }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }

@@ -21,9 +21,17 @@ struct wire : cxxrtl::wire<Bits> {
     template <class Observer>
     bool commit(Observer &observer) {
         if constexpr (!std::is_same_v<Observer, Blind>)
-            return cxxrtl::wire<Bits>::commit(observer);
+            return told(observer);
         this->curr = this->next;
         return false;
+    }
+
+private:
+    // One for each width: written out for each register it would take a tenth of the time to compile, and hardly any
+    // design needs it.
+    template <class Observer>
+    __attribute__((noinline)) bool told(Observer &observer) {
+        return cxxrtl::wire<Bits>::commit(observer);
     }
 };
 

@@ -1,7 +1,8 @@
 """The README's picture: what time buys, for one family of scenes, and what else there is.
 
 The family is `fingers`: two to five fingertips anywhere on 160 mm by 160 mm, where pitch, scan, labeller and report all
-make a difference. Every method of the chart is drawn, as measured: 12 MHz and 3 Mbaud where its name says nothing else.
+make a difference. Every method of the chart is drawn, as measured: 12 MHz and 3 Mbaud where its name says nothing else,
+and 24 MHz and 12 Mbaud for `reversal`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from contactfpga_sim.studies.chart.picture import LENGTHS_MM, ends, error, marke
 from contactfpga_sim.studies.chart.study import Point, front
 
 FAMILY = "fingers"
-ENDS_US, ENDS_MM = (40.0, 10_000.0), (0.3, 40.0)
+ENDS_US, ENDS_MM = (8.0, 10_000.0), (0.3, 40.0)
 TICKS_US = {
+    10: "10 µs",
+    20: "20 µs",
     50: "50 µs",
     100: "100 µs",
     200: "200 µs",

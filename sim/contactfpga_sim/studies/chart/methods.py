@@ -25,7 +25,14 @@ def by(labeller: Labeller) -> dict[str, Skin]:
 
 
 def _methods() -> dict[str, Skin]:
-    methods = {}
+    fast: dict[str, Any] = {
+        "scan": "reversal", "precharge_us": 0.25, "release_us": 0.05, "send": "on_change",
+        "clock_hz": 24_000_000, "baud": 12_000_000,
+    }  # fmt: skip
+    methods = {
+        "reversal, 10 mm": sheet(10.0, settle_us=0.5, **fast),
+        "reversal, 5 mm": sheet(5.0, settle_us=0.8, project_us=2.5, **fast),
+    }
     for pitch in PITCHES_MM:
         for labeller in LABELLERS.values():
             methods[f"{labeller.title}, {pitch:g} mm"] = sheet(pitch, labeller=labeller)

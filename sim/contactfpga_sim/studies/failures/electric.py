@@ -6,10 +6,13 @@ import functools
 
 import numpy as np
 
+from contactfpga.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.sheet.circuit import Circuit, Line
+from contactfpga_sim.sheet.levels import at_rest
+from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.wiring import Wiring
 from contactfpga_sim.studies.failures.knob import Outcome, Study
 from contactfpga_sim.studies.failures.rig import (
     REFERENCE,
@@ -46,11 +49,12 @@ def _judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: s
 LAZY = REFERENCE.replace(release_us=40.0)
 
 
-def _slow(skin: Skin, pull_ohm: float, path_ohm: float, picofarad: float) -> Outcome:
+def _slow(skin: Skin, circuit: Circuit, picofarad: float) -> Outcome:
     spots = [(3, 4), (9, 10)]
     cells = finger(skin, *spots)
     with Rig(skin) as rig:
-        rig.board.settle(Line(picofarad * 1e-12, pull_ohm, path_ohm))
+        line = Line.of(circuit.replace(line_pf=picofarad), skin.rows, skin.columns, skin.diodes, most=2)
+        rig.board.settle(line)
         rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
         zones = rig.frames()[-1]
     return _judged(zones, cells, [finger(skin, spot) for spot in spots])
@@ -59,15 +63,17 @@ def _slow(skin: Skin, pull_ohm: float, path_ohm: float, picofarad: float) -> Out
 SETTLE = Study(
     name="settle",
     title="Columns slower than `settle_us = 5`",
-    knob="capacitance of a column, pF",
+    knob="capacitance of a line, pF",
     amount="cells that read pressed",
-    values=tuple(np.geomspace(10, 10_000, 61).round().tolist()),
+    values=tuple(np.geomspace(10, 10_000, 19).round().tolist()),
     runs={
-        "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, 4700.0, 50.0),
-        "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, 40_000.0, 50.0),
-        "4.7 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(_slow, LAZY, 4700.0, 2000.0),
+        "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=4700.0)),
+        "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=40_000.0)),
+        "40 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(
+            _slow, LAZY, Circuit(column_pull_ohm=40_000.0, line_ohm=2000.0)
+        ),
     },
-    helps="smaller resistances; a `release_us` and `settle_us` twice what makes `stuck` go",
+    helps="`contactfpga settle` says which times a circuit needs; smaller resistances, precharge",
 )
 
 
@@ -82,14 +88,14 @@ def _bare(skin: Skin, count: float) -> Outcome:
     bare = np.zeros_like(cells)
     for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
         bare[row, column] = True
-    read, undefined = Circuit(bare=bare).read(cells)
+    read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells, bare)
     frames = [still(skin, each) for each in (read, read | undefined)]
     worst = min(frames, key=lambda zones: zones.pressed)
     contacts = [finger(skin, spot) for spot in spots]
     right = all(reported(zones) == sorted(map(moments, contacts)) for zones in frames)
     told = faults(frames[0]) if faults(frames[0]) and faults(frames[1]) else ()
     lost, of = int((undefined & cells).sum()), int(cells.sum())
-    what = f"{lost} of {of} pressed cells undefined, row pins short-circuited"
+    what = f"{lost} of {of} pressed cells undefined, {1e3 * amperes:.0f} mA from row pin to row pin"
     return Outcome(right, told, what, worst.pressed, cells, places(worst))
 
 
@@ -110,7 +116,7 @@ CORNERS = [(1, 2), (1, 8), (8, 2), (8, 8)]
 
 def bare_read(pressed: np.ndarray) -> np.ndarray:
     """What a sheet without diodes reads."""
-    return Circuit(bare=np.ones((1, 1), bool), floating=True).read(pressed)[0]
+    return Wiring(bare=np.ones((1, 1), bool), floating=True).read(pressed)[0]
 
 
 def _corners(count: float) -> Outcome:
@@ -209,7 +215,7 @@ def _broken(line: str, count: float) -> Outcome:
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[4:11, 5:12] = True
     lines = tuple(range(7, 7 + int(count)))
-    circuit = Circuit(broken_rows=lines) if line == "row" else Circuit(broken_columns=lines)
+    circuit = Wiring(broken_rows=lines) if line == "row" else Wiring(broken_columns=lines)
     return _judged(still(skin, circuit.read(cells)[0]), cells, [cells])
 
 
@@ -232,7 +238,7 @@ def _stuck(skin: Skin, count: float) -> Outcome:
     closed = np.zeros_like(touch)
     for row, column in STUCK_SPOTS[: int(count)]:
         closed[row, column] = True
-    zones = still(skin, Circuit(closed=closed).read(touch)[0])
+    zones = still(skin, Wiring(closed=closed).read(touch)[0])
     return _judged(zones, touch | closed, [touch])
 
 

@@ -1,9 +1,12 @@
-"""The sheet as a circuit, where it is not what the Skin says: diodes, wires and switches with faults, slow columns."""
+"""What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
+
+Levels, currents and times are :mod:`contactfpga.circuit`'s; this is what they come to where switches and pins have no
+resistance beside the pulls.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 
@@ -13,7 +16,7 @@ def _none() -> np.ndarray:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Circuit:
+class Wiring:
     """What a board reads that drives one row at a time. Arrays are bool, (rows, columns) or as one value for all.
 
     A row selects its columns through pressed switches, a column other rows through pressed switches without a diode.
@@ -58,40 +61,3 @@ class Circuit:
             if (wider == reached).all():
                 return np.flatnonzero(reached).tolist(), columns
             reached = wider
-
-
-@dataclasses.dataclass(frozen=True)
-class Line:
-    """A column with its capacitance: a resistor pulls it to the released level, a pressed switch to the pressed one.
-
-    Both go exponentially: toward released with R C of the pull resistor, toward the voltage divider of the two
-    resistances with that of both in parallel.
-    """
-
-    farad: float
-    """Capacitance of a column with all that hangs on it."""
-    pull_ohm: float = 4700.0
-    path_ohm: float = 50.0
-    """Everything between the column's pin and the supply that a selected row leads to: driver, diode, switch, lines."""
-    threshold: float = 0.5
-    """Share of the way from the released level to the pressed one at which the pin reads pressed."""
-
-    @property
-    def pulled(self) -> float:
-        """Share of the way at which a column comes to rest that is pulled forever."""
-        return self.pull_ohm / (self.pull_ohm + self.path_ohm)
-
-    @property
-    def press_s(self) -> float:
-        """Time constant toward pressed."""
-        return self.farad * self.path_ohm * self.pulled
-
-    @property
-    def release_s(self) -> float:
-        """Time constant toward released."""
-        return self.farad * self.pull_ohm
-
-    @staticmethod
-    def share(constant_s: float, seconds: float) -> float:
-        """How much of its way a level goes in this time."""
-        return -math.expm1(-seconds / constant_s) if constant_s else 1.0

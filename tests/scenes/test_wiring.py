@@ -1,13 +1,18 @@
-"""The sheet as a circuit against nodal analysis, and slow columns against the closed form."""
+"""The wiring of a faulty sheet against nodal analysis and the circuit model; slow columns against the closed form."""
 
 import itertools
 
 import numpy as np
 import pytest
 
+from contactfpga.circuit import Circuit, phases
+from contactfpga.circuit.network import Network
+from contactfpga.circuit.phases import Levels
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.sheet.circuit import Circuit, Line
+from contactfpga_sim.sheet.levels import at_rest
+from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.wiring import Wiring
 
 SIZE = 3
 PATTERNS = (np.arange(1 << SIZE * SIZE)[:, None] >> np.arange(SIZE * SIZE) & 1).astype(bool).reshape(-1, SIZE, SIZE)
@@ -59,7 +64,7 @@ def bare_patterns():
 def test_every_pattern_of_3x3_reads_as_nodal_analysis_says(floating, record_property):
     ghosts = fights = 0
     for bare in bare_patterns():
-        circuit = Circuit(bare=bare, floating=floating)
+        circuit = Wiring(bare=bare, floating=floating)
         read, undefined = map(np.array, zip(*map(circuit.read, PATTERNS)))
         for row in range(SIZE):
             volts = column_volts(PATTERNS, bare, row, np.full(SIZE, not floating))
@@ -77,7 +82,7 @@ def test_every_pattern_of_3x3_reads_as_nodal_analysis_says(floating, record_prop
 
 def test_with_every_diode_in_place_a_cell_reads_what_is_pressed():
     for floating, pressed in itertools.product((False, True), PATTERNS):
-        read, undefined = Circuit(floating=floating).read(pressed)
+        read, undefined = Wiring(floating=floating).read(pressed)
         assert np.array_equal(read, pressed)
         assert not undefined.any()
 
@@ -86,7 +91,7 @@ def test_broken_lines_stuck_and_dead_switches():
     rng = np.random.default_rng(1)
     pressed = rng.random((200, 4, 5)) < 0.4
     dead, closed = rng.random((2, 4, 5)) < 0.2
-    circuit = Circuit(dead=dead, closed=closed, broken_rows=(1,), broken_columns=(0, 3))
+    circuit = Wiring(dead=dead, closed=closed, broken_rows=(1,), broken_columns=(0, 3))
     for cells in pressed:
         expected = (cells | closed) & ~dead
         expected[1] = expected[:, [0, 3]] = False
@@ -96,32 +101,69 @@ def test_broken_lines_stuck_and_dead_switches():
 def test_a_broken_row_of_a_bare_sheet_still_joins_its_columns():
     corners = np.zeros((3, 3), bool)
     corners[0, 0] = corners[1, 0] = corners[1, 2] = True
-    read, _ = Circuit(bare=np.ones((1, 1), bool), floating=True, broken_rows=(1,)).read(corners)
+    read, _ = Wiring(bare=np.ones((1, 1), bool), floating=True, broken_rows=(1,)).read(corners)
     assert np.argwhere(read).tolist() == [[0, 0], [0, 2]]
 
 
+def test_wiring_is_what_the_circuit_comes_to():
+    """The ideal switches against the model of the circuit, of which they are the limit."""
+    circuit = Circuit(column_pull_ohm=100_000.0, row_pull_ohm=1e8, switch_ohm=1.0, low_v=0.99, high_v=2.31)
+    rng = np.random.default_rng(4)
+    fights = 0
+    for _ in range(40):
+        pressed, bare = rng.random((2, SIZE, SIZE)) < 0.4
+        read, undefined = Wiring(bare=bare).read(pressed)
+        levels_read, levels_undefined, amperes = at_rest(circuit, pressed, bare)
+        assert np.array_equal(read, levels_read & ~undefined)
+        assert not (levels_undefined & ~undefined).any()
+        assert (amperes > 5e-3) == bool(undefined.any())
+        fights += int(undefined.any())
+    assert 0 < fights < 40
+
+
+@pytest.mark.campaign  # test_failures.py has settle times, too
 def test_a_column_rises_and_falls_as_the_closed_form_says():
     """The row that reads a neighbor's switch, and the row that misses its own, change where the exponentials say."""
     skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
     cells = np.array([[True], [False]])
 
-    def read(line):
+    def read(press_s, rest, release_s):
         with CompiledBoard(skin, capture=("rows",)) as board:  # from power-up: all columns are up
-            board.settle(line)
+            board.settle(Line((press_s, press_s), (rest, rest), release_s, 0.5))
             board.hold(cells[None], 3 * 2 * 72)
             events = board.take("rows")
         return [int(data) for data in events["data"][:2]]
 
-    slowest = 6e-6 / (4700 * np.log(line_rest(4700, 50) / 0.5))
-    assert read(Line(slowest * 0.99)) == [1, 0]
-    assert read(Line(slowest * 1.01)) == [1, 1]
-    path = 2000.0
-    rest = line_rest(4700, path)
-    longest = 5e-6 / (path * rest * -np.log(1 - 0.5 / rest))
-    assert read(Line(longest * 0.99, path_ohm=path))[0] == 1
-    assert read(Line(longest * 1.01, path_ohm=path))[0] == 0
-    assert read(Line(1e-15, path_ohm=4800.0)) == [0, 0]  # a divider that stays below the threshold
+    slowest = 6e-6 / np.log(0.99 / 0.5)
+    assert read(1e-9, 0.99, slowest * 0.99) == [1, 0]
+    assert read(1e-9, 0.99, slowest * 1.01) == [1, 1]
+    longest = 5e-6 / -np.log(1 - 0.5 / 0.7)
+    assert read(longest * 0.99, 0.7, 1e-9)[0] == 1
+    assert read(longest * 1.01, 0.7, 1e-9)[0] == 0
+    assert read(1e-9, 0.49, 1e-9) == [0, 0]  # a level that stays below the threshold
 
 
-def line_rest(pull, path):
-    return pull / (pull + path)
+def test_a_compiled_board_settles_when_its_circuit_does():
+    """A row is missed where the model needs more than the settle time, by how many of its switches are pressed."""
+    skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)
+    levels = Levels.of(Circuit())
+
+    def takes(circuit):
+        return phases.passed(phases.settle(Network(circuit, np.ones((2, 1), bool)), levels)).seconds
+
+    def reads(circuit):
+        with CompiledBoard(skin, capture=("rows",)) as board:
+            board.settle(Line.of(circuit, 2, 1))
+            board.hold(np.ones((1, 2, 1), bool), 3 * 2 * 72)
+            return int(board.take("rows")["data"][0])
+
+    slow = Circuit(switch_ohm=10_000.0, column_pull_ohm=1e6, line_pf=290.0)
+    assert takes(slow) < 4.95e-6 < 5.1e-6 < takes(slow.replace(line_pf=310.0))
+    assert [reads(slow), reads(slow.replace(line_pf=310.0))] == [1, 0]
+
+
+def test_more_pressed_switches_make_a_row_slower():
+    line = Line.of(Circuit(column_pull_ohm=20_000.0), 8, 8)
+    assert len(line.press_s) == len(line.pulled) == 9
+    assert line.press_s[8] > 1.5 * line.press_s[1]
+    assert line.pulled[8] < line.pulled[1]

@@ -1,0 +1,27 @@
+"""The sheet as a circuit: which levels, currents and times its lines, switches, diodes and pins come to.
+
+One model for all that asks: `contactfpga settle`, the check of a Skin that states its circuit, the virtual board, the
+study of failures. SI units; capacitances in pF and times in us where a name says so.
+"""
+
+from contactfpga.circuit.static import Problem, check, problems
+from contactfpga.circuit.table import load as load_circuit
+from contactfpga.circuit.table import load_checked
+from contactfpga.circuit.times import Needs, needed
+from contactfpga.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode
+
+__all__ = [
+    "DIODES",
+    "SCHOTTKY",
+    "SILICON",
+    "Circuit",
+    "CircuitError",
+    "Diode",
+    "Needs",
+    "Problem",
+    "check",
+    "load_checked",
+    "load_circuit",
+    "needed",
+    "problems",
+]

@@ -1,0 +1,193 @@
+"""What a scan does to the sheet, step by step, and when the lines that are read have got where they must be."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from contactfpga.circuit import transient
+from contactfpga.circuit.network import OFF, Drive, Network
+from contactfpga.circuit.patterns import middle
+from contactfpga.circuit.values import Circuit
+
+FULL = 0.95
+"""Share of the supply at which a line counts as charged, and a row as released."""
+NEAR_V = 0.05
+"""A line this near to its rest pulls no other one any further."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Levels:
+    """Volts in the frame of :mod:`contactfpga.circuit.network`: what surely reads low, and what surely reads high."""
+
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, circuit: Circuit, diodes: str = "col2row") -> Levels:
+        """A sheet whose selected row is high is computed as its mirror image."""
+        if diodes == "row2col":
+            return cls(circuit.supply_v - circuit.high_v, circuit.supply_v - circuit.low_v)
+        return cls(circuit.low_v, circuit.high_v)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Phase:
+    """The sheet comes to rest under the first drive; each further one but the last acts for its time; the phase is over
+    when all lines are where they must be under the last."""
+
+    name: str
+    network: Network
+    drives: tuple[Drive, ...]
+    seconds: tuple[float, ...]
+    """Of the drives between the first and the last."""
+    most: np.ndarray
+    """(lines,) volts at which a line has arrived from above; infinite for one that may be anywhere."""
+    least: np.ndarray
+    """The same from below."""
+
+    def bad(self, volts: np.ndarray) -> np.ndarray:
+        """Bool of the same shape: lines that are not where they must be."""
+        return np.asarray((volts > self.most) | (volts < self.least))
+
+    def arrived(self, seconds: np.ndarray, volts: np.ndarray) -> np.ndarray:
+        """(lines,) when each line is where it must be for good, 0 if all the time; infinite if it is not in the end."""
+        bad = self.bad(volts)
+        found = np.zeros(volts.shape[1])
+        found[bad[-1]] = math.inf
+        for line in np.flatnonzero(bad.any(axis=0) & ~bad[-1]):
+            last = int(np.flatnonzero(bad[:, line])[-1])
+            before, after = volts[last : last + 2, line]
+            goal = self.most[line] if before > self.most[line] else self.least[line]
+            found[line] = seconds[last] + (goal - before) / (after - before) * (seconds[last + 1] - seconds[last])
+        return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Passed:
+    """What happened in the last drive of a phase."""
+
+    phase: Phase
+    trace: transient.Trace
+
+    @property
+    def seconds(self) -> float:
+        """From the last change of drive until all lines are where they must be; infinite if they never are."""
+        return float(self.phase.arrived(self.trace.seconds, self.trace.volts).max())
+
+
+def rest_volts(phase: Phase) -> np.ndarray:
+    """(lines,) volts to which the last drive leads."""
+    return transient.at_rest(phase.network, phase.drives[-1]).lines
+
+
+def passed(phase: Phase) -> Passed:
+    """Let the phase pass; the time ends when nothing that matters can happen any more."""
+    network = phase.network
+    state = transient.at_rest(network, phase.drives[0])
+    for drive, seconds in zip(phase.drives[1:-1], phase.seconds, strict=True):
+        state = transient.run(network, drive, state, seconds).end
+    rest = rest_volts(phase)
+    never = phase.bad(rest)
+
+    def enough(volts: np.ndarray) -> bool:
+        low = (np.abs(volts - rest) < NEAR_V)[np.isfinite(phase.most)].all()
+        return bool(low) and not (phase.bad(volts) & ~never).any()
+
+    trace = transient.run(network, phase.drives[-1], state, longest_s(network), enough)
+    if never.any():  # a line may be right for a while, on its way
+        trace = dataclasses.replace(
+            trace, seconds=np.append(trace.seconds, 2 * longest_s(network)), volts=np.vstack([trace.volts, rest])
+        )
+    return Passed(phase, trace)
+
+
+def longest_s(network: Network) -> float:
+    """No line moves for longer."""
+    circuit = network.circuit
+    farads = network.farads.diagonal().max() + 1e-12 * circuit.diode.junction_pf * max(network.pressed.shape) * 3
+    ohms = max(circuit.column_pull_ohm, circuit.row_pull_ohm) + circuit.switch_ohm
+    return float(10 * farads * ohms)
+
+
+def _any(network: Network) -> tuple[np.ndarray, np.ndarray]:
+    lines = network.rows + network.columns
+    return np.full(lines, math.inf), np.full(lines, -math.inf)
+
+
+def _rows(network: Network, row: int | None = None) -> np.ndarray:
+    """All rows at the released level, but the selected one."""
+    volts = np.full(network.rows, network.circuit.supply_v)
+    if row is not None:
+        volts[row] = 0.0
+    return volts
+
+
+def settle(network: Network, levels: Levels, row: int | None = None) -> Phase:
+    """All lines released, columns let go, a row selected: pressed columns must be low, others high. Whether columns
+    were precharged or pulled makes no difference."""
+    row = middle(network.rows) if row is None else row
+    supply, columns = network.circuit.supply_v, network.columns
+    most, least = _any(network)
+    most[:columns][network.pressed[row]] = levels.low
+    least[:columns][~network.pressed[row]] = levels.high
+    drives = Drive.of(supply, supply, network), Drive.of(OFF, _rows(network, row), network)
+    return Phase("settle", network, drives, (), most, least)
+
+
+def pulled_release(network: Network, levels: Levels, dip_v: float = 0.0) -> Phase:
+    """A selected row is released, and the resistors pull its columns back: they must be high, and stay so where the
+    next row pulls them down by ``dip_v``."""
+    most, least = _any(network)
+    least[: network.columns] = min(levels.high + dip_v, FULL * network.circuit.supply_v)
+    selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)
+    return Phase("pulled release", network, (selected, Drive.of(OFF, _rows(network), network)), (), most, least)
+
+
+def row_release(network: Network) -> Phase:
+    """A selected row is released; it must be charged before columns drive."""
+    row = middle(network.rows)
+    most, least = _any(network)
+    least[network.columns + row] = FULL * network.circuit.supply_v
+    selected = Drive.of(OFF, _rows(network, row), network)
+    return Phase("row release", network, (selected, Drive.of(OFF, _rows(network), network)), (), most, least)
+
+
+def precharge(network: Network, gap_s: float) -> Phase:
+    """This long after the row is released the columns drive: they must be charged."""
+    supply = network.circuit.supply_v
+    most, least = _any(network)
+    least[: network.columns] = FULL * supply
+    selected = Drive.of(OFF, _rows(network, middle(network.rows)), network)
+    released = Drive.of(OFF, _rows(network), network)
+    driven = Drive.of(supply, _rows(network), network)
+    return Phase("precharge", network, (selected, released, driven), (gap_s,), most, least)
+
+
+def project_rows(network: Network, levels: Levels, lifted: bool = False) -> Phase:
+    """Columns drive, rows are let go: touched ones must be high, others low.
+
+    The rows come from the released level; ``lifted``: all lines come from the other one, and the columns that rise lift
+    the rows.
+    """
+    supply, columns = network.circuit.supply_v, network.columns
+    touched = network.pressed.any(axis=1)
+    most, least = _any(network)
+    least[columns:][touched] = levels.high
+    most[columns:][~touched] = levels.low
+    start = 0.0 if lifted else supply
+    drives = Drive.of(start, start, network), Drive.of(supply, OFF, network)
+    return Phase("lifted rows" if lifted else "project rows", network, drives, (), most, least)
+
+
+def project_columns(network: Network, levels: Levels) -> Phase:
+    """Columns are let go and all rows selected: touched columns must be low, others high."""
+    supply, columns = network.circuit.supply_v, network.columns
+    touched = network.pressed.any(axis=0)
+    most, least = _any(network)
+    most[:columns][touched] = levels.low
+    least[:columns][~touched] = levels.high
+    drives = Drive.of(supply, supply, network), Drive.of(OFF, 0.0, network)
+    return Phase("project columns", network, drives, (), most, least)

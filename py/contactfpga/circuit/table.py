@@ -1,0 +1,68 @@
+"""The table `[circuit]` in a Skin's file."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from contactfpga.circuit import static
+from contactfpga.circuit.values import DIODES, Circuit, CircuitError, Diode
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+from contactfpga.skin import Skin
+
+
+def load(path: str | Path) -> Circuit | None:
+    """The circuit in a Skin's file; None where it has no table ``[circuit]``. Raises CircuitError."""
+    values = tomlfile.load(path, CircuitError)
+    if "circuit" not in values:
+        return None
+    try:
+        return read(values["circuit"])
+    except CircuitError as error:
+        raise CircuitError(f"{path}: {error}") from None
+
+
+def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
+    """The same for what works with a board of this Skin. Raises CircuitError for a sheet whose pins would carry more
+    than they may, or whose levels are too near to VIL or VIH."""
+    circuit = load(path)
+    if circuit is not None:
+        try:
+            static.check(circuit, skin.rows, skin.columns, skin.diodes, projects(skin))
+        except CircuitError as error:
+            raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {path}` shows all") from None
+    return circuit
+
+
+def projects(skin: Skin) -> bool:
+    """The Skin's scan reads rows while all columns drive."""
+    return str(skin.scan) == "reversal"
+
+
+def read(values: Any) -> Circuit:
+    """The circuit that a TOML table describes; its keys are the fields of :class:`Circuit`. ``diode`` is a name or a
+    table with the fields of :class:`Diode`."""
+    given = dict(_known("circuit", values, Circuit))
+    if isinstance(diode := given.get("diode"), str):
+        if diode not in DIODES:
+            raise CircuitError(f"diode is {shown(diode)}; it must be one of {', '.join(DIODES)}, or [circuit.diode]")
+        given["diode"] = DIODES[diode]
+    elif diode is not None:
+        fields = _known("circuit.diode", diode, Diode)
+        missing = [field.name for field in dataclasses.fields(Diode) if field.name not in fields]
+        if missing:
+            raise CircuitError(f"{missing[0]} is missing in [circuit.diode]; it needs all of its fields")
+        given["diode"] = Diode(**fields)
+    return Circuit(**given)
+
+
+def _known(name: str, values: Any, kind: type) -> dict[str, Any]:
+    if not isinstance(values, dict):
+        raise CircuitError(f"{name} is {shown(values)}; it must be a table, [{name}]")
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in values:
+        if key not in known:
+            raise CircuitError(f"unknown key {shown(key)} in [{name}]; known are {', '.join(known)}")
+    return values

@@ -1,0 +1,118 @@
+"""Which times a sheet needs: each phase of the scan with the pattern that takes longest."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping
+
+from contactfpga.circuit import patterns, phases, static
+from contactfpga.circuit.network import Network
+from contactfpga.circuit.phases import Levels, Passed, Phase
+from contactfpga.circuit.values import Circuit
+
+MARGIN = 1.3
+"""What is recommended is this many times what the model takes."""
+STEP_US = 0.01
+"""Recommendations are rounded up to this."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Time:
+    """How long a phase takes with its worst pattern."""
+
+    seconds: float
+    """Infinite if it never ends."""
+    pattern: str
+
+    def us(self, margin: float) -> float | None:
+        """What is recommended; None where no time is enough."""
+        if math.isinf(self.seconds):
+            return None
+        return round(max(1, math.ceil(1e6 * self.seconds * margin / STEP_US - 1e-9)) * STEP_US, 6)
+
+
+@dataclasses.dataclass(frozen=True)
+class Needs:
+    """What a sheet needs; volts are those of the real sheet."""
+
+    precharge: Time
+    """From columns that drive until they are charged."""
+    settle: Time
+    """From a selected row until pressed columns read pressed and all others released."""
+    release: Time
+    """From a row that is not selected any more until columns may drive."""
+    pulled_release: Time
+    """The same until the pulls have lifted the columns, where nothing precharges."""
+    project: Time
+    """From rows that are let go until touched ones read touched and all others untouched."""
+    project_columns: Time
+    """The same for columns while all rows are selected."""
+    pressed: static.Worst
+    """A pressed column, and the pin of its row."""
+    touched: static.Worst
+    """A touched row in a projection, and the pin of the column that feeds it."""
+    unpressed_v: float
+    """To which a column without a pressed switch is pulled by its neighbors after a precharge."""
+    unpressed_margin_v: float
+    row_peak_ma: float
+    """While lines are charged."""
+    column_peak_ma: float
+
+
+def needed(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row") -> Needs:
+    """Times, levels and currents of a sheet. Takes some 3 seconds at 64x64."""
+    sheet = _Sheet(circuit, rows, columns, diodes)
+    levels = sheet.levels
+    settle, settled = sheet.worst(patterns.SETTLE, lambda network: phases.settle(network, levels))
+    lowest = min(map(_lowest, settled), default=circuit.supply_v)
+    dip = circuit.supply_v - lowest
+    release, released = sheet.worst(patterns.RELEASE, phases.row_release)
+
+    def precharged(network: Network) -> Phase:
+        """After the gap; a row that is never released is waited for until it does not move any more."""
+        return phases.precharge(network, min(release.seconds, phases.longest_s(network)))
+
+    precharge, charged = sheet.worst(patterns.RELEASE, precharged)
+    pulled, _ = sheet.worst(patterns.RELEASE, lambda network: phases.pulled_release(network, levels, dip))
+    by_row, _ = sheet.worst(patterns.PROJECT_ROWS, lambda network: phases.project_rows(network, levels))
+    lifted, _ = sheet.worst(patterns.PROJECT_ROWS, lambda network: phases.project_rows(network, levels, True))
+    by_column, _ = sheet.worst(patterns.PROJECT_COLUMNS, lambda network: phases.project_columns(network, levels))
+    unpressed = lowest - (1 - phases.FULL) * circuit.supply_v
+    return Needs(
+        precharge=precharge,
+        settle=settle,
+        release=release,
+        pulled_release=pulled,
+        project=max(by_row, lifted, key=lambda time: time.seconds),
+        project_columns=by_column,
+        pressed=static.scan(circuit, rows, columns, diodes),
+        touched=static.projection(circuit, rows, columns, diodes),
+        unpressed_v=static.shown_v(circuit, diodes, unpressed),
+        unpressed_margin_v=unpressed - levels.high,
+        row_peak_ma=max(map(_peak_ma, [*settled, *released])),
+        column_peak_ma=max(map(_peak_ma, charged)),
+    )
+
+
+class _Sheet:
+    def __init__(self, circuit: Circuit, rows: int, columns: int, diodes: str):
+        self.circuit, self.levels = circuit, Levels.of(circuit, diodes)
+        self.patterns: Mapping[str, object] = patterns.named(rows, columns)
+
+    def worst(self, names: Iterable[str], phase: Callable[[Network], Phase]) -> tuple[Time, list[Passed]]:
+        found = {name: phases.passed(phase(Network(self.circuit, self.patterns[name]))) for name in names}  # type: ignore[arg-type]
+        worst = max(found, key=lambda name: found[name].seconds)
+        return Time(found[worst].seconds, worst), list(found.values())
+
+
+def _lowest(passed: Passed) -> float:
+    """Volts of the column without a pressed switch that is pulled farthest."""
+    network, least = passed.phase.network, passed.phase.least[: passed.phase.network.columns]
+    unpressed = passed.trace.volts[:, : network.columns][:, least > -math.inf]
+    return float(unpressed.min(initial=network.circuit.supply_v))
+
+
+def _peak_ma(passed: Passed) -> float:
+    amperes = passed.phase.network.pin_amperes(passed.trace.volts[1:], passed.phase.drives[-1])
+    return 1e3 * float(abs(amperes).max(initial=0.0))

@@ -1,0 +1,138 @@
+"""The values of a sheet's circuit. They only say what is there; nothing is computed here."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import is_finite, shown
+
+
+class CircuitError(ContactFPGAError, ValueError):
+    """A circuit that cannot be or cannot work; the message names the value and the limit."""
+
+
+def _within(where: str, name: str, value: object, low: float, high: float, unit: str = "") -> None:
+    if not is_finite(value) or not low <= float(value) <= high:  # type: ignore[arg-type]
+        ends = f"{low:.12g} and {high:.12g}"
+        raise CircuitError(f"{name} in [{where}] is {shown(value)}; it must lie between {ends} {unit}".rstrip())
+
+
+@dataclasses.dataclass(frozen=True)
+class Diode:
+    """A junction after Shockley with a resistance in series, and the charge of its depletion layer: what SPICE calls
+    IS, N, RS, CJO, VJ and M. It neither breaks down nor stores charge while it conducts."""
+
+    saturation_a: float
+    emission: float
+    series_ohm: float
+    junction_pf: float
+    """Capacitance at 0 V."""
+    junction_v: float
+    grading: float
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in DIODE_LIMITS.items():
+            _within("diode", name, getattr(self, name), low, high)
+
+
+DIODE_LIMITS = {
+    "saturation_a": (1e-18, 1e-3),
+    "emission": (0.5, 5.0),
+    "series_ohm": (0.0, 1000.0),
+    "junction_pf": (0.0, 1000.0),
+    "junction_v": (0.1, 2.0),
+    "grading": (0.0, 0.9),
+}
+
+SCHOTTKY = Diode(1.5e-7, 1.04, 4.0, 11.0, 0.3, 0.5)
+"""A small-signal Schottky diode of the BAT54's kind: 0.24 V at 1 mA."""
+SILICON = Diode(2.5e-9, 1.75, 0.6, 2.0, 0.75, 0.4)
+"""A small-signal silicon diode of the 1N4148's kind: 0.59 V at 1 mA."""
+DIODES = {"schottky": SCHOTTKY, "silicon": SILICON}
+
+LIMITS = {
+    "line_pf": (0.1, 100_000.0, "pF"),
+    "crossing_pf": (0.0, 1000.0, "pF"),
+    "neighbor_pf": (0.0, 10_000.0, "pF"),
+    "pin_ohm": (1.0, 10_000.0, "ohm"),
+    "series_ohm": (0.0, 100_000.0, "ohm"),
+    "line_ohm": (0.0, 100_000.0, "ohm"),
+    "switch_ohm": (0.1, 1e6, "ohm"),
+    "column_pull_ohm": (100.0, 1e8, "ohm"),
+    "row_pull_ohm": (100.0, 1e8, "ohm"),
+    "supply_v": (1.0, 5.5, "V"),
+    "low_v": (0.1, 5.0, "V"),
+    "high_v": (0.2, 5.5, "V"),
+    "pin_ma": (0.1, 100.0, "mA"),
+}
+"""Lowest and highest value, and the unit."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Circuit:
+    """The sheet with its wires and the board's pins. Raises :class:`CircuitError` for values that cannot be.
+
+    Each line is one capacitance; its resistance lies between it and its pin, as if all switches were at the far end.
+    """
+
+    line_pf: float = 30.0
+    """Of a line to ground, with its pin, in pF."""
+    crossing_pf: float = 2.0
+    """Of a row to a column where they cross, with an open switch, in pF."""
+    neighbor_pf: float = 3.0
+    """Of a line to each of the two beside it, in pF."""
+    pin_ohm: float = 40.0
+    """Of a pin that drives, high or low."""
+    series_ohm: float = 0.0
+    """Of a resistor between pin and line."""
+    line_ohm: float = 0.0
+    """Of a line from end to end."""
+    switch_ohm: float = 100.0
+    """Of a closed switch."""
+    diode: Diode = SCHOTTKY
+    """In series with each switch; in a file also ``"schottky"`` or ``"silicon"``."""
+    column_pull_ohm: float = 100_000.0
+    """Of the resistor that pulls or keeps a column at its released level."""
+    row_pull_ohm: float = 10_000.0
+    """Of the resistor that pulls a row that is read to its untouched level; used by projections alone."""
+    supply_v: float = 3.3
+    low_v: float = 0.8
+    """VIL: a pin surely reads low at this and less."""
+    high_v: float = 2.0
+    """VIH: a pin surely reads high at this and more."""
+    pin_ma: float = 8.0
+    """The most that a pin may carry for good: 8 mA is what an iCE40's pin is specified for at 3.3 V, and an ECP5's
+    with its usual drive strength. Pulses that charge lines may be higher."""
+
+    def __post_init__(self) -> None:
+        for name, (low, high, unit) in LIMITS.items():
+            _within("circuit", name, getattr(self, name), low, high, unit)
+        if not isinstance(self.diode, Diode):
+            raise CircuitError(f"diode is {shown(self.diode)}; it must be a Diode, or one of {', '.join(DIODES)}")
+        if not self.low_v < self.high_v < self.supply_v:
+            raise CircuitError(
+                f"low_v = {self.low_v:g}, high_v = {self.high_v:g} and supply_v = {self.supply_v:g} are not in order; "
+                "VIL must lie below VIH, and VIH below the supply"
+            )
+
+    @property
+    def drive_ohm(self) -> float:
+        """Between a line and the supply or ground that its pin drives it to."""
+        return self.pin_ohm + self.series_ohm + self.line_ohm
+
+    def replace(self, **changes: Any) -> Circuit:
+        """A copy with some values changed, checked again."""
+        return dataclasses.replace(self, **changes)
+
+
+THERMAL_V = 8.617333e-5 * 300.15
+"""k T / q at 27 degrees Celsius, at which SPICE computes by default."""
+
+
+def knee_v(diode: Diode) -> float:
+    """Above this Newton's method is held back: the exponential outruns it."""
+    step = diode.emission * THERMAL_V
+    return step * math.log(step / (math.sqrt(2) * diode.saturation_a))

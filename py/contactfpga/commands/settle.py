@@ -1,0 +1,206 @@
+"""`contactfpga settle`: which times a sheet's circuit needs, and whether it can work."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from typing import Any
+
+from contactfpga import circuit as sheet
+from contactfpga.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
+from contactfpga.circuit.static import NOISE_V
+from contactfpga.circuit.table import projects
+from contactfpga.circuit.times import MARGIN, Time
+from contactfpga.circuit.values import DIODE_LIMITS, LIMITS
+from contactfpga.console import numbers, terminal
+from contactfpga.errors import UNSOLVED
+from contactfpga.skin import Skin, limits
+
+HELP = "Compute the times that the circuit of a sheet needs."
+EXTRA = None
+
+WORDS = {
+    "line_pf": "Capacitance of a line to ground, with its pin",
+    "crossing_pf": "Capacitance of a row to a column",
+    "neighbor_pf": "Capacitance of a line to each of the two beside it",
+    "pin_ohm": "Resistance of a pin that drives",
+    "series_ohm": "Resistor between pin and line",
+    "line_ohm": "Resistance of a line from end to end",
+    "switch_ohm": "Resistance of a closed switch",
+    "column_pull_ohm": "Resistor that pulls or keeps a column at its released level",
+    "row_pull_ohm": "Resistor that pulls a row that is read, in a projection",
+    "supply_v": "Supply",
+    "low_v": "VIL: a pin surely reads low up to this",
+    "high_v": "VIH: a pin surely reads high from this on",
+    "pin_ma": "What a pin may carry for good",
+}
+DIODE_WORDS = {
+    "saturation_a": "IS",
+    "emission": "N",
+    "series_ohm": "RS",
+    "junction_pf": "CJO",
+    "junction_v": "VJ",
+    "grading": "M",
+}
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    skin = "Skin whose rows, columns, diodes and table [circuit] are taken; flags below replace values of that table."
+    parser.add_argument("--skin", metavar="FILE", help=skin)
+    lines = numbers.whole(1, limits.MAX_LINES, "lines")
+    parser.add_argument("--rows", type=lines, metavar="N", help="Number of rows (default: the Skin's, or 16).")
+    parser.add_argument("--columns", type=lines, metavar="N", help="Number of columns (default: the Skin's, or 16).")
+    direction = "Direction of the diodes (default: the Skin's, or col2row)."
+    parser.add_argument("--diodes", choices=("col2row", "row2col"), help=direction)
+    usual = Circuit()
+    values = parser.add_argument_group("circuit")
+    for name, (low, high, unit) in LIMITS.items():
+        flag = "--pf" if name == "line_pf" else _flag(name)
+        words = f"{WORDS[name]} (default: {getattr(usual, name):g})."
+        kind = numbers.number(low, high, unit)
+        values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
+    diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
+    diode.add_argument("--diode", choices=tuple(DIODES), help="A kind from which the values below start.")
+    for name, (low, high) in DIODE_LIMITS.items():
+        kind, words = numbers.number(low, high), f"{DIODE_WORDS[name]} (schottky: {getattr(usual.diode, name):g})."
+        diode.add_argument(_flag(f"diode_{name}"), type=kind, metavar=DIODE_WORDS[name], help=words)
+    factor = f"Recommended times are this many times those computed (default: {MARGIN:g})."
+    parser.add_argument("--margin", type=numbers.number(1, 10), default=MARGIN, metavar="FACTOR", help=factor)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+
+
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; :data:`UNSOLVED` if the sheet cannot work, or a time is never long enough."""
+    skin = Skin.load(args.skin) if args.skin else Skin()
+    if skin.diodes == "none" and args.diodes is None:
+        raise CircuitError("diodes is 'none'; the model is of sheets with a diode per switch")
+    given = (sheet.load_circuit(args.skin) if args.skin else None) or Circuit()
+    rows, columns = args.rows or skin.rows, args.columns or skin.columns
+    diodes = args.diodes or skin.diodes
+    values = _changed(given, args)
+    needs = sheet.needed(values, rows, columns, diodes)
+    problems = sheet.problems(values, rows, columns, diodes, projects=True)
+    answer = _answer(values, needs, problems, args.margin) | {"rows": rows, "columns": columns, "diodes": diodes}
+    if args.skin:
+        answer["skin"] = _given(skin, answer)
+    if args.json:
+        print(json.dumps(answer, allow_nan=False))
+    else:
+        _show(answer, needs, args.margin)
+    return UNSOLVED if problems or None in answer.values() else 0
+
+
+def _changed(given: Circuit, args: argparse.Namespace) -> Circuit:
+    diode = DIODES[args.diode] if args.diode else given.diode
+    fields = {name: getattr(args, f"diode_{name}") for name in DIODE_LIMITS}
+    changes: dict[str, Any] = {name: getattr(args, name) for name in LIMITS}
+    changes["diode"] = Diode(**(dataclasses.asdict(diode) | _said(fields)))
+    return given.replace(**_said(changes))
+
+
+def _said(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _answer(circuit: Circuit, needs: Needs, problems: list[Problem], margin: float) -> dict[str, Any]:
+    times = ("precharge", "settle", "release", "project", "project_columns", "pulled_release")
+    phases: dict[str, Time] = {name: getattr(needs, name) for name in times}
+    return {
+        **{f"{name}_us": time.us(margin) for name, time in phases.items()},
+        "margin": margin,
+        "worst": {
+            name: {"pattern": time.pattern, "us": None if time.us(1) is None else round(1e6 * time.seconds, 5)}
+            for name, time in phases.items()
+        },
+        "levels": {
+            "pressed_v": round(needs.pressed.level_v, 4),
+            "pressed_margin_v": round(needs.pressed.margin_v, 4),
+            "unpressed_v": round(needs.unpressed_v, 4),
+            "unpressed_margin_v": round(needs.unpressed_margin_v, 4),
+            "touched_row_v": round(needs.touched.level_v, 4),
+            "touched_row_margin_v": round(needs.touched.margin_v, 4),
+        },
+        "pins_ma": {
+            "row": round(needs.pressed.pin_ma, 4),
+            "projecting_column": round(needs.touched.pin_ma, 4),
+            "row_peak": round(needs.row_peak_ma, 4),
+            "column_peak": round(needs.column_peak_ma, 4),
+        },
+        "problems": [dataclasses.asdict(problem) for problem in problems],
+        "circuit": dataclasses.asdict(circuit),
+    }
+
+
+def _given(skin: Skin, answer: dict[str, Any]) -> dict[str, Any]:
+    """Whether the Skin's times are enough."""
+    needs = {"settle_us": answer["settle_us"]}
+    if skin.precharge_us:
+        needs["precharge_us"] = answer["precharge_us"]
+    else:
+        needs["release_us"] = answer["pulled_release_us"]
+    if projects(skin):
+        needs["project_us"] = answer["project_us"]
+    return {
+        name: {
+            "given": getattr(skin, name),
+            "needed": needed,
+            "enough": needed is not None and getattr(skin, name) >= needed,
+        }
+        for name, needed in needs.items()
+    }
+
+
+TITLES = {
+    "precharge": "columns drive to their released level",
+    "settle": "a row is selected",
+    "release": "row released, columns not yet driven",
+    "project": "all columns driven, the rows are read",
+    "pulled_release": "without precharge: the pulls lift the columns",
+}
+
+
+def _show(answer: dict[str, Any], needs: Needs, margin: float) -> None:
+    sheet_of = f"{answer['rows']}x{answer['columns']}, {answer['diodes']}"
+    terminal.say(f"{sheet_of}; times with a margin of {margin:g}")
+    lines = []
+    for name, title in TITLES.items():
+        key = "release_us" if name == "pulled_release" else f"{name}_us"
+        time: Time = getattr(needs, name)
+        us = answer[f"{name}_us"]
+        value = "never" if us is None else f"{us:.2f}"
+        computed = "" if us is None else f"{1e6 * time.seconds:.3f} computed, "
+        lines.append((key, value, f"{title} ({computed}worst pattern: {time.pattern})"))
+    for key, value, words in lines:
+        terminal.say(f"{key:13}{value:>8}  {words}", hang=23)
+    _show_levels(needs)
+    for name, one in answer.get("skin", {}).items():
+        what = "enough" if one["enough"] else f"too short, {_or_never(one['needed'])} needed"
+        terminal.say(f"the Skin's {name} = {one['given']:g}: {what}")
+    for problem in answer["problems"]:
+        terminal.say(f"cannot work: {problem['what']}; {problem['helps']}", hang=2)
+
+
+def _or_never(us: float | None) -> str:
+    return "no time is" if us is None else f"{us:.2f}"
+
+
+def _show_levels(needs: Needs) -> None:
+    said = [
+        ("pressed column", needs.pressed.level_v, needs.pressed.margin_v, "its whole row pressed"),
+        ("other column", needs.unpressed_v, needs.unpressed_margin_v, "pulled by its neighbors after a precharge"),
+        ("touched row", needs.touched.level_v, needs.touched.margin_v, "a projection, one column feeds all rows"),
+    ]
+    for title, level, margin_v, words in said:
+        near = "" if margin_v >= NOISE_V else f", less than {NOISE_V}"
+        terminal.say(f"{title:15}{level:6.2f} V  margin {margin_v:.2f} V{near} ({words})", hang=25)
+    terminal.say(
+        f"pins: row {needs.pressed.pin_ma:.2f} mA, projecting column {needs.touched.pin_ma:.2f} mA; pulses to "
+        f"{max(needs.row_peak_ma, needs.column_peak_ma):.0f} mA while lines are charged",
+        hang=2,
+    )

@@ -1,0 +1,111 @@
+"""Pictures of docs/settle.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga import picture_style as style
+from contactfpga.circuit import Circuit, patterns
+from contactfpga.circuit.network import Network
+from contactfpga_sim.studies.settle import breaks, shorted
+from contactfpga_sim.studies.settle.breaks import KNOBS, SIZE, US
+from contactfpga_sim.studies.settle.shorted import NAMES, RowTime
+
+COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
+
+
+def draw(folder: Path) -> list[Path]:
+    """Write all of them into a folder."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(style.SETTINGS):
+        return [_row(folder / "settle-row.svg"), _breaks(folder / "settle-breaks.svg"), _shorted(folder)]
+
+
+def _steps(axes: Any, found: RowTime) -> None:
+    """Marks where each step of a row's time begins."""
+    for start, end, name in zip(found.starts_us, found.starts_us[1:], NAMES):
+        axes.axvline(start, color=style.GRID, lw=1)
+        if end - start > 0.1:
+            place = (start + end) / 2
+            axes.text(place, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color=style.SOFT)
+    axes.set_xlim(0, found.starts_us[-1])
+
+
+def _thresholds(axes: Any) -> None:
+    for volts, name in ((Circuit().low_v, "VIL"), (Circuit().high_v, "VIH")):
+        axes.axhline(volts, color=style.SOFT, lw=0.8, ls=style.DASHES[2])
+        axes.text(0.01, volts + 0.05, name, color=style.SOFT)
+
+
+def _row(path: Path) -> Path:
+    network = Network(Circuit(), patterns.named(SIZE, SIZE)["all but a column"])
+    found = shorted.row_time(network)
+    middle = patterns.middle(SIZE)
+    figure = style.new(3.0)
+    axes = figure.subplots()
+    _steps(axes, found)
+    microseconds = US * found.seconds
+    lines = {
+        "unpressed column": (found.volts[:, middle], style.GREEN, style.DASHES[0]),
+        "pressed column": (found.volts[:, 0], style.BLUE, style.DASHES[0]),
+        "selected row": (found.volts[:, SIZE + middle], style.ORANGE, style.DASHES[1]),
+    }
+    for name, (volts, color, dashes) in lines.items():
+        axes.plot(microseconds, volts, color=color, ls=dashes, lw=1.8, label=name)
+    _thresholds(axes)
+    axes.set_xlabel("time, µs")
+    axes.set_ylabel("V")
+    axes.legend(loc="center left", bbox_to_anchor=(0.05, 0.345))
+    return style.save(figure, path)
+
+
+def _breaks(path: Path) -> Path:
+    figure = style.new(6.2)
+    for axes, (name, knob) in zip(figure.subplots(2, 2).flat, KNOBS.items()):
+        for color, (run, outcomes) in zip(COLORS, breaks.turned(name).items()):
+            shown = np.where(np.isfinite(outcomes), outcomes, np.nan)
+            axes.plot(knob.values, shown, color=color, lw=1.8, label=run)
+            _, at = breaks.edge(knob, outcomes)
+            if at is not None:
+                axes.plot([at], [outcomes[knob.values.index(at)]], "x", color=color, ms=7, mew=2)
+        axes.axhline(knob.limit, color=style.INK, lw=1, ls=style.DASHES[1])
+        if name != "columns":
+            axes.set_xscale("log")
+            axes.set_xlim(knob.values[0] / 1.2, 1.5 * knob.values[-1])
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:,g}")
+        if knob.below:
+            axes.set_ylim(0, 4 * knob.limit)
+        else:
+            axes.set_ylim(0, 3.4)
+        axes.set_title(knob.title, loc="left")
+        axes.set_xlabel(knob.axis)
+        axes.set_ylabel("time to settle, µs" if knob.below else "unpressed column, V")
+        axes.grid(visible=True)
+        axes.legend(loc="upper left" if knob.below else "lower left")
+    return style.save(figure, path)
+
+
+def _shorted(folder: Path) -> Path:
+    figure = style.new(3.6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for color, count in zip(COLORS, (1, 3)):
+        found = shorted.row_time(shorted.sheet(count))
+        label = f"{count} shorted" if count > 1 else "1 shorted diode"
+        upper.plot(US * found.seconds, found.column, color=color, lw=1.8, label=label)
+        lower.plot(US * found.seconds, -found.pin_ma(patterns.middle(SIZE)), color=color, lw=1.8, label="selected row")
+    _steps(upper, found)
+    for start in found.starts_us:
+        lower.axvline(start, color=style.GRID, lw=1)
+    lower.axhline(Circuit().pin_ma, color=style.INK, lw=1, ls=style.DASHES[1])
+    lower.text(0.01, Circuit().pin_ma + 1, "8 mA", color=style.SOFT)
+    _thresholds(upper)
+    upper.set_ylabel("column, V")
+    upper.legend(loc="lower left", bbox_to_anchor=(0.05, 0.0))
+    lower.set_ylabel("into the selected\nrow's pin, mA")
+    lower.set_ylim(-5, 45)
+    lower.set_xlabel("time, µs")
+    return style.save(figure, folder / "settle-shorted.svg")

@@ -1,0 +1,172 @@
+"""The circuit model against closed forms and published figures; ngspice has a file of its own."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from contactfpga.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static, transient
+from contactfpga.circuit.network import OFF, Drive, Network, charge
+from contactfpga.circuit.phases import Levels
+from contactfpga.circuit.values import THERMAL_V
+
+LEVELS = Levels.of(Circuit())
+CELL = np.ones((1, 1), bool)
+PF = 1e-12
+
+
+def settle_ns(circuit, pressed):
+    return 1e9 * phases.passed(phases.settle(Network(circuit, pressed), LEVELS)).seconds
+
+
+def test_a_row_that_is_let_go_decays_as_a_resistor_and_a_capacitance_do():
+    circuit = Circuit(row_pull_ohm=20_000.0)
+    phase = phases.project_rows(Network(circuit, ~CELL), LEVELS)
+    start = 3.3 * 20_000 / 20_040
+    expected = 20_000 * 32 * PF * math.log(start / 0.8)
+    assert phases.passed(phase).seconds == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_pressed_column_rests_where_the_diodes_current_meets_the_pulls():
+    circuit = Circuit(column_pull_ohm=10_000.0, switch_ohm=300.0, series_ohm=60.0)
+    diode = circuit.diode
+
+    def surplus(amperes):
+        junction = diode.emission * THERMAL_V * math.log1p(amperes / diode.saturation_a)
+        return 3.3 - amperes * (10_000 + 300 + diode.series_ohm + 100) - junction
+
+    amperes = brentq(surplus, 0, 1e-3, xtol=1e-15)
+    worst = static.scan(circuit.replace(row_pull_ohm=1e8), 1, 1)
+    assert worst.level_v == pytest.approx(3.3 - amperes * 10_000, abs=1e-4)
+    assert worst.pin_ma == pytest.approx(1e3 * amperes, rel=1e-4)
+
+
+def test_a_floating_column_is_pulled_by_its_neighbors_as_capacitances_divide():
+    circuit = Circuit(column_pull_ohm=1e8, neighbor_pf=12.0)
+    pressed = np.array([[True, False, True]])
+    network = Network(circuit, pressed)
+    done = phases.passed(phases.settle(network, LEVELS))
+    fallen = 3.3 - done.trace.volts[done.trace.volts[:, 1].argmin()]
+    expected = (12 * (fallen[0] + fallen[2]) + 2 * fallen[3]) / (30 + 2 * 12 + 2)
+    assert fallen[1] == pytest.approx(expected, rel=5e-3)
+    assert fallen[1] > 0.5
+
+
+def test_a_line_that_floats_holds_its_charge():
+    network = Network(Circuit(column_pull_ohm=1e8), ~CELL)
+    start = transient.at_rest(network, Drive.of(0.0, 3.3, network))
+    end = transient.run(network, Drive.of(OFF, 3.3, network), start, 1e-6).end
+    assert end.lines[0] - start.lines[0] == pytest.approx(3.3 / 1e8 * 1e-6 / (32 * PF), rel=0.01)  # the pull's
+
+
+def test_a_junctions_charge_is_the_integral_of_its_capacitance():
+    volts = np.linspace(-3, 0.5, 20_001)
+    for diode in (Circuit().diode, SILICON):
+        coulombs, farads = charge(diode, volts)
+        summed = np.concatenate([[0], np.cumsum((farads[1:] + farads[:-1]) / 2 * np.diff(volts))])
+        assert np.allclose(coulombs - coulombs[0], summed, atol=2e-17)
+        reverse = PF * diode.junction_pf * (1 + 2 / diode.junction_v) ** -diode.grading
+        assert np.interp(-2, volts, farads) == pytest.approx(reverse, rel=1e-6)
+
+
+def test_the_other_direction_is_the_mirror_image():
+    circuit = Circuit(low_v=1.0, high_v=2.3)
+    one, other = needed(circuit, 2, 3, "col2row"), needed(circuit, 2, 3, "row2col")
+    assert one.settle == other.settle
+    assert other.pressed.level_v == pytest.approx(3.3 - one.pressed.level_v)
+    assert other.unpressed_v == pytest.approx(3.3 - one.unpressed_v)
+    assert Levels.of(Circuit(), "row2col").low == pytest.approx(1.3)
+
+
+# ---- figures of the design of the fast scan, made in ngspice with diodes of other makes
+
+
+@pytest.mark.parametrize(
+    ("changes", "nanoseconds"),
+    [
+        ({}, 182),
+        ({"diode": SILICON}, 154),
+        ({"switch_ohm": 500.0, "line_pf": 100.0}, 420),
+        ({"switch_ohm": 1000.0, "line_pf": 50.0}, 468),
+        ({"neighbor_pf": 10.0}, 184),
+        ({"crossing_pf": 5.0}, 238),
+        ({"column_pull_ohm": 4700.0}, 252),
+    ],
+)
+def test_published_settle_times(changes, nanoseconds):
+    assert settle_ns(Circuit(**changes), np.ones((16, 16), bool)) == pytest.approx(nanoseconds, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("size", "ohms", "lift_v", "rows_us", "dip_v", "columns_us"),
+    [(16, 4700.0, 1.68, 0.24, 1.62, 0.10), (64, 4700.0, 2.62, 0.92, 0.68, 0.55), (64, 1e4, 2.62, 1.95, 0.68, 1.17)],
+)
+def test_published_projections(size, ohms, lift_v, rows_us, dip_v, columns_us):
+    network = Network(Circuit(column_pull_ohm=ohms, row_pull_ohm=ohms), patterns.named(size, size)["one cell"])
+    rows = phases.passed(phases.project_rows(network, LEVELS, lifted=True))
+    columns = phases.passed(phases.project_columns(network, LEVELS))
+    assert rows.trace.volts[:, size].max() == pytest.approx(lift_v, rel=0.05)
+    assert columns.trace.volts[:, 0].min() == pytest.approx(dip_v, rel=0.05)
+    assert 1e6 * rows.seconds == pytest.approx(rows_us, rel=0.05)
+    assert 1e6 * columns.seconds == pytest.approx(columns_us, rel=0.1)
+
+
+def test_published_levels_of_a_column_that_feeds_64_rows():
+    worst = static.projection(Circuit(row_pull_ohm=4700.0), 64, 64)
+    assert worst.level_v == pytest.approx(1.97, abs=0.02)
+    assert worst.margin_v == pytest.approx(-0.03, abs=0.02)
+    assert worst.pin_ma == pytest.approx(64 * worst.level_v / 4.7, rel=0.02)
+
+
+# ---- the named patterns are the worst ones
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, {"neighbor_pf": 15.0}, {"switch_ohm": 2000.0, "pin_ohm": 20.0}, {"line_ohm": 300.0}]
+)
+def test_no_random_pattern_is_worse(changes):
+    rng = np.random.default_rng(6)
+    circuit, size = Circuit(**changes), 6
+
+    def settled(pressed):
+        done = phases.passed(phases.settle(Network(circuit, pressed), LEVELS))
+        unpressed = done.trace.volts[:, :size][:, ~pressed[size // 2]]
+        return done.seconds, unpressed.min(initial=3.3)
+
+    named = patterns.named(size, size)
+    worst = [settled(named[name]) for name in patterns.SETTLE]
+    for density in np.linspace(0.3, 0.9, 4):
+        seconds, level = settled(rng.random((size, size)) < density)
+        assert seconds <= max(one[0] for one in worst) * 1.001
+        assert level >= min(one[1] for one in worst) - 1e-3
+
+
+def test_a_level_that_is_never_reached_takes_forever():
+    needs = needed(Circuit(column_pull_ohm=1000.0), 4, 4)
+    assert math.isinf(needs.settle.seconds)
+    assert needs.settle.us(1.3) is None
+    assert needs.unpressed_v < 3.3
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 3)])
+def test_small_sheets(rows, columns):
+    needs = needed(Circuit(), rows, columns)
+    assert 0 < needs.settle.seconds < 1e-6
+    assert 0 < needs.project.seconds < 1e-5
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"column_pull_ohm": 100.0, "row_pull_ohm": 100.0},
+        {"series_ohm": 100_000.0, "row_pull_ohm": 1e8},
+        {"switch_ohm": 1e6, "line_pf": 100_000.0, "column_pull_ohm": 1e8},
+        {"line_pf": 0.1, "crossing_pf": 0.0, "pin_ohm": 1.0, "diode": Diode(1e-18, 5.0, 0.0, 0.0, 2.0, 0.0)},
+        {"diode": Diode(1e-3, 0.5, 0.0, 1000.0, 0.1, 0.9)},
+    ],
+)
+def test_extreme_values_have_an_answer(changes):
+    """A row that never gets released once made the steps grow without an end."""
+    needs = needed(Circuit(**changes), 2, 2)
+    assert needs.settle.seconds > 0

@@ -1,0 +1,78 @@
+"""Break points of a precharged scan: the page against a new run of what is quick, and against closed forms."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga.circuit import Circuit
+from contactfpga_sim.pages import settle_page, writer
+from contactfpga_sim.studies.settle import breaks, shorted
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
+
+
+def section(name):
+    text = PAGE.read_text(encoding="utf-8")
+    return re.search(rf"<!-- figures: {name} -->\n(.*?)\n<!-- end -->", text, re.DOTALL)[1]
+
+
+def test_the_page_has_what_a_new_run_says():
+    text = PAGE.read_text(encoding="utf-8")
+    assert writer.update(text, {"shorted": settle_page.shorted_table}) == text
+
+
+def test_the_comparison_on_the_page_is_wide_and_close():
+    rows = section("agreement").splitlines()[2:]
+    errors = [abs(float(re.search(r"([-+][\d.]+) % \|$", row)[1])) for row in rows]
+    assert len(errors) >= 30
+    assert max(errors) < 5
+    assert {"8x8", "64x64"} <= {row.split(" | ")[1] for row in rows}
+
+
+@pytest.mark.parametrize("name", breaks.KNOBS)
+def test_each_break_is_found_again_on_both_of_its_sides(name):
+    """The values before and after the break of each run's first one, as the page has them."""
+    knob = breaks.KNOBS[name]
+    run = next(iter(knob.runs))
+    row = next(line for line in section("breaks").splitlines() if f"| {knob.title}: " in line).split(" | ")
+    holds, fails = (float(row[index].strip("*").replace(",", "")) for index in (2, 3))
+    assert row[1] == run
+    assert knob.values.index(fails) == knob.values.index(holds) + 1
+    assert breaks.holds(knob, knob.runs[run](holds))
+    assert not breaks.holds(knob, knob.runs[run](fails))
+
+
+def test_coupling_breaks_where_capacitances_divide():
+    """Neighbors fall by almost the whole supply; the column keeps what its other capacitances hold."""
+    knob = breaks.KNOBS["coupling"]
+    for picofarad in (5.0, 20.0, 50.0):
+        fallen = 3.3 - knob.runs["16x16, 30 pF a line"](picofarad)
+        divided = (2 * picofarad * 3.15 + 2 * 3.3) / (30 + 2 * picofarad + 16 * 2)
+        assert fallen == pytest.approx(divided, rel=0.06)
+
+
+def test_a_shorted_diode_carries_what_its_resistances_let_through():
+    found = shorted.row_time(shorted.sheet(1))
+    selecting = (found.seconds > 0.4e-6 + 0.04e-6) & (found.seconds < 0.75e-6)
+    row = shorted.patterns.middle(shorted.SIZE)
+    into = -found.pin_ma(row)[selecting]
+    # Pin, switch, switch, series resistance and pin; the diode at 10 mA.
+    junction = 0.02687 * np.log(into[-1] * 1e-3 / Circuit().diode.saturation_a)
+    assert into[-1] == pytest.approx((3.3 - junction) / (40 + 100 + 100 + 4 + 40) * 1e3, rel=0.01)
+    assert into == pytest.approx(into[-1], rel=0.01)
+
+
+def test_no_current_flows_before_the_row_is_selected():
+    found = shorted.row_time(shorted.sheet(3))
+    before = (found.seconds > 0.1e-6) & (found.seconds < 0.28e-6)
+    assert np.abs(found.amperes[before, : shorted.SIZE]).max() < 0.5e-3  # what pulls feed
+    assert shorted.flowing_us(found, shorted.patterns.middle(shorted.SIZE)) == pytest.approx(0.5, abs=0.05)
+
+
+def test_without_a_shorted_diode_the_pins_carry_what_pulls_feed():
+    found = shorted.row_time(shorted.sheet(0))
+    row = shorted.patterns.middle(shorted.SIZE)
+    last = int(np.flatnonzero(found.seconds < 0.79e-6)[-1])
+    assert abs(found.pin_ma(row)[last]) < 0.1

@@ -1,0 +1,19 @@
+"""Which parameters of a long test `make test` runs; the others are for `make campaign`."""
+
+from collections.abc import Collection, Iterable
+
+import pytest
+
+
+def sample(values: Iterable, quick: Collection) -> list:
+    """Parameters for ``pytest.mark.parametrize``: those not in ``quick`` are marked ``campaign``. A tuple holds the
+    values of several arguments. A quick one that is not there, or no quick one at all, is an error."""
+    values = list(values)
+    missing = [value for value in quick if value not in values]
+    if missing or not quick:
+        raise ValueError(f"no parameters of this test: {missing}")
+    return [value if value in quick else _campaign(value) for value in values]
+
+
+def _campaign(value: object):
+    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.campaign)
