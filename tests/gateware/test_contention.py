@@ -48,6 +48,7 @@ def test_in_amaranths_simulator(wrong, skin):
         bench_amaranth.run(skin, touch(skin), 400)
 
 
+@pytest.mark.campaign
 def test_on_the_compiled_board(wrong):
     skin = small(rows=2, columns=2)
     model = dataclasses.replace(model_of(skin), key=f"never lets go: {native.skin_key(skin)}")

@@ -9,7 +9,7 @@ from reversal import FAST, slots, small, zones
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.board.received import Receiver
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, predict, requests
 
 PROJECT, SETTLE, ROW = 24, 12, 20  # clocks: 1 us, 0.5 us, and 0.75 us with a gap of a clock on either side
 EMPTY = np.zeros((FAST.rows, FAST.columns), bool)
@@ -162,3 +162,56 @@ def test_a_touch_of_a_clock_is_told_by_the_pin_and_gone_with_the_next_frame(shee
     assert fall[1] == 0
     assert fall[0] <= touch + PROJECT + 10
     assert not len(sheet.take("driven"))
+
+
+# ---- pauses
+
+
+def frames_in(board: CompiledBoard, clocks: int) -> tuple[list, list[int]]:
+    """Frames in the next clocks, and the cycles in which hellos ended."""
+    receiver, found, hellos, end = Receiver(FAST), [], [], board.cycle + clocks
+    board.take("bytes")
+    while board.cycle < end:
+        board.run(min(100_000, end - board.cycle))
+        for event in board.take("bytes"):
+            before = receiver.hellos
+            found += receiver.take([(int(event["cycle"]), int(event["data"]))])
+            if receiver.hellos > before:
+                hellos.append(int(event["cycle"]))
+    return found, hellos
+
+
+def test_an_untouched_sheet_is_kept_alive_in_time_and_not_much_earlier(sheet):
+    """The longest pause between two frames is at most ``keep_alive_ms`` and at least that less four turns of 1.024 ms;
+    a change in between begins it again."""
+    let_go(sheet)
+    longest = round(FAST.keep_alive_ms * 24_000)
+    found, _ = frames_in(sheet, 2 * longest + 1000)
+    sheet.press(draw(511, 2, 2))
+    changed = sheet.cycle
+    more, _ = frames_in(sheet, longest)
+    ends = [one.last for one in found]
+    assert len(found) == 2
+    assert 0.95 * longest < ends[1] - ends[0] <= longest
+    assert [one.frame.cells for one in more] == [9, 9]
+    assert more[0].last < changed + 600
+    assert 0.95 * longest < more[1].last - more[0].last <= longest
+
+
+def test_a_request_is_answered_at_once_on_an_untouched_sheet(sheet):
+    """By an empty frame that repeats the lowest bits of its number."""
+    let_go(sheet)
+    ((_, data),) = requests([0], 2)
+    sheet.send(data)
+    found, _ = frames_in(sheet, len(data) * 20 + 4000)  # a hello comes first
+    assert [(one.frame.cells, one.frame.heard) for one in found] == [(0, (129 * 128 + 1) % 8)]
+
+
+@pytest.mark.campaign
+def test_a_hello_comes_every_524288_us(sheet):
+    let_go(sheet)
+    found, hellos = frames_in(sheet, 3 * 2**19 * 24)
+    assert len(hellos) == 3
+    assert all(abs(after - before - 2**19 * 24) < 1000 for before, after in itertools.pairwise(hellos))
+    pauses = [after.last - before.last for before, after in itertools.pairwise(found)]
+    assert max(pauses) <= FAST.keep_alive_ms * 24_000

@@ -1,11 +1,12 @@
 """The scanner of line reversal alone: the stages after it stall, lines lie, switches are masked, columns are stuck."""
 
 import dataclasses
+import itertools
 
 import pytest
 from amaranth.hdl import Cat
 from bench import Bench, Drive
-from reversal import PROJECTED, Slot, frames, slots, small
+from reversal import Slot, frames, projected, slots, small
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import precharge, reversal
@@ -121,6 +122,10 @@ def check_rows(skin: Skin, life: Life, at) -> int:
     wanted = [(slot.row, cells) for slot, cells in read.items() if cells]
     assert [row[:2] for row in given] == wanted[: len(given)]
     assert len(wanted) - len(given) <= 1, "one may be on its way"
+    for before, row in itertools.pairwise(life.taken):
+        if skin.report != "cells" and not before[3]:
+            assert row[1] > before[1], "rows ascend"
+            assert row[1] == before[1] + 1 or not before[2], "an empty row parts those that are no neighbors"
     told = [slot for slot, cells in read.items() if cells]
     for slot, row in zip(told, given):
         following = next((other.begin for other in life.slots if other.begin > slot.begin), None)
@@ -131,7 +136,7 @@ def check_rows(skin: Skin, life: Life, at) -> int:
             continue  # under way
         for row in range(skin.rows):
             closed = present(skin, row)
-            for cycle in range(frame[0].begin - PROJECTED, frame[-1].sample + 1):
+            for cycle in range(frame[0].begin - projected(skin), frame[-1].sample + 1):
                 closed &= at(cycle).cells[row]
             cells = next((read[slot] for slot in frame if slot.row == row), 0)
             assert not closed & ~cells, f"row {row} of the frame from {frame[0].begin} on"

@@ -14,8 +14,11 @@ from contactfpga_sim.golden.facts import facts
 FAST = Skin.load(examples() / "fast.toml")
 """The reference sheet; tests share its compiled board."""
 
-PROJECTED = 6
-"""Clocks from the sample of the touched rows to the first clock in which one of them is driven."""
+
+def projected(skin: Skin) -> int:
+    """Clocks from the sample of the touched rows to the first clock in which one of them is driven; more where columns
+    must have been driven for longer by then."""
+    return 6 + max(0, facts(skin).precharge - facts(skin).project - 4)
 
 
 def small(**fields) -> Skin:
@@ -37,7 +40,7 @@ def any_skin(rng) -> Skin:
         "report": rng.choice(["moments", "moments", "barycenter", "cells"]),
         "send": rng.choice(["always", "on_change"]),
         "debounce": rng.choice(["none", "sym_defer_pk", "asym_eager_defer_pk"]),
-        "precharge_us": rng.choice([0.04, 0.25]),
+        "precharge_us": rng.choice([0.04, 0.25, 1.2]),
         "settle_us": rng.choice([0.1, 0.5]),
         "project_us": rng.choice([0.05, 0.2, 1.0]),
         "baud": rng.choice([12_000_000, 6_000_000, 3_000_000]),

@@ -18,7 +18,7 @@ from contactfpga_hdl.board.board_top import platform_for
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_sim.board import native
 from contactfpga_sim.board.native import Netlist
-from contactfpga_sim.netlist import ecp5_cells
+from contactfpga_sim.netlist import both_ways, ecp5_cells
 
 
 class WrongBitstream(ContactFPGAError):
@@ -47,7 +47,7 @@ def from_bitstream(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
     if skin.clock_hz != board.clock_hz:
         chip = _without_pll(chip, board, skin)
     return Netlist(
-        {"chip.v": chip, "top.v": _pins(board, skin)},
+        {"chip.v": both_ways.of_icebox(chip, skin), "top.v": _pins(board, skin)},
         # The defaults of the cell library's ports are not plain Verilog, and icebox_vlog connects every port.
         "read_verilog -defer -DNO_ICE40_DEFAULT_ASSIGNMENTS +/ice40/cells_sim.v; read_verilog chip.v top.v; "
         "hierarchy -check -top top",
@@ -78,8 +78,9 @@ def synthesized(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
     _check(skin)
     build.plan_for(board, skin).extract(str(folder))
     native.yosys(f"read_rtlil {NAME}.il; {synthesis.script(board.fpga, NAME)}; write_verilog -noattr chip.v", folder)
+    chip = both_ways.of_ecp5((folder / "chip.v").read_text(), skin)
     return Netlist(
-        {"chip.v": (folder / "chip.v").read_text(), "top.v": _pins(board, skin), "cells.v": ecp5_cells.cells()},
+        {"chip.v": chip, "top.v": _pins(board, skin), "cells.v": ecp5_cells.cells()},
         "read_verilog -defer -overwrite +/ecp5/cells_sim.v cells.v; read_verilog chip.v top.v; "
         "hierarchy -check -top top",
     )
@@ -89,12 +90,14 @@ def _pins(board: BoardSpec, skin: Skin) -> str:
     """Verilog that gives the pins, which are named after the platform's resources, the names of the gateware's."""
     sheet = row_pins(skin) | column_pins(skin)
     wires = {_crystal(board): "clk", "uart_0__rx__io": "rx", "uart_0__tx__io": "tx"}
-    wires |= {f"{name}_0__io": name for name in (*sheet, "contact")}
+    wires |= {f"{name}_0__io": name for name in ("contact", *board.pins(skin))}
+    parted, text = both_ways.wrapper(skin)
+    wires |= parted
     ports = ["input clk", "input rx", "output tx", "output contact"]
     for name, member in sheet.items():
         ports.append(f"{'output' if member.flow == Out else 'input'} [{member.shape - 1}:0] {name}")
     return (
-        f"module top({', '.join(ports)});\n"
+        f"module top({', '.join(ports)});\n{text}"
         f"{NAME} chip({', '.join(f'.{port}({name})' for port, name in wires.items())});\n"
         "endmodule\n"
     )

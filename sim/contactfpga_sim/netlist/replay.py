@@ -42,15 +42,19 @@ RESET_US = 20
 """The platform holds reset for no longer than this after power-up."""
 
 _STICK = BOARDS["icestick"].skin
+_REVERSAL = Skin(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
 RUNS: tuple[tuple[str, Skin], ...] = (
     ("icebreaker", skin_for(8, 8, 8, 16)),
     ("icebreaker", BOARDS["icebreaker"].skin),
     ("icestick", _STICK),
     ("icestick", _STICK.replace(report="cells", clock_hz=48_000_000)),
     ("ulx3s-12f", BOARDS["ulx3s-12f"].skin.replace(rows=8, columns=8)),
+    ("icebreaker", _REVERSAL.replace(rows=11, columns=12, clock_hz=24_000_000, baud=12_000_000)),
+    ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, clock_hz=30_000_000, baud=3_000_000)),
 )
 """Boards and sheets that are replayed when no board is named. The first one sends every frame, the others overwrite
-some; the second one has its rows on shift registers, the fourth its clock from the PLL."""
+some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last two drive and read
+their pins."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -84,22 +84,28 @@ public:
 
     Clocked() { loops_ = !top.eval(); }
 
+    // May be called again in the same clock, after inputs have changed.
     void settle() {
-        if (loops_) {
-            top.p_clk = cxxrtl::value<1>{0u};
-            top.prev_p_clk = cxxrtl::value<1>{0u};
-            while (top.eval(), top.commit()) {}
-        }
+        if (!loops_)
+            return rise();
+        top.p_clk = cxxrtl::value<1>{0u};
         top.prev_p_clk = cxxrtl::value<1>{0u};
-        top.p_clk = cxxrtl::value<1>{1u};
-        top.eval();
+        while (top.eval(), top.commit()) {}
     }
 
     void finish() {
+        if (loops_)
+            rise();
         cxxrtl_design::Blind blind;
         top.commit(blind);
     }
 
 private:
+    void rise() {
+        top.prev_p_clk = cxxrtl::value<1>{0u};
+        top.p_clk = cxxrtl::value<1>{1u};
+        top.eval();
+    }
+
     bool loops_;  // the generated code asks to be evaluated until nothing changes
 };

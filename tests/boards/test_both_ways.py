@@ -1,0 +1,151 @@
+"""Pins that a netlist drives and reads: what it drives is told apart, and the replay sees a fault in any of it."""
+
+import re
+import shutil
+
+import pytest
+
+from contactfpga.boards import BOARDS
+from contactfpga.skin import Skin
+from contactfpga_sim.board import native
+from contactfpga_sim.board.compiled import model_of
+from contactfpga_sim.cosim.compare import Mismatch
+from contactfpga_sim.netlist import both_ways, extract
+from contactfpga_sim.netlist.both_ways import WrongPins
+from contactfpga_sim.netlist.replay import RUNS, replay, stimulus
+from contactfpga_sim.sheet.matrix import Contention
+
+SKIN = Skin(rows=2, columns=1, scan="reversal", precharge_us=0.25)
+ICEBOX = r"""module contactfpga (inout columns_0__io, inout [1:0] \rows_0__io , output tx);
+tran(\rows_0__io [0], \rows_0__io[0] );
+assign n1 = \rows_0__io[0] ;
+assign \rows_0__io[0]  = n5 ? n6 : 1'bz;
+assign n2 = \rows_0__io[1] ;
+assign \rows_0__io[1]  = n5 ? n7 : 1'bz;
+assign n3 = columns_0__io;
+assign columns_0__io = n8 ? n9 : 1'bz;
+assign tx = n9 ? n10 : 1'bz;
+endmodule
+"""
+ECP5 = r"""module contactfpga(tx, rows_0__io, columns_0__io);
+  inout [1:0] rows_0__io;
+  inout columns_0__io;
+  TRELLIS_IO #(
+    .DIR("BIDIR")
+  ) \rows_0.buf.buf0  (
+    .B(rows_0__io[0]),
+    .I(\level[0] ),
+    .O(\rows_0.i ),
+    .T(n1)
+  );
+  TRELLIS_IO #(
+    .DIR("BIDIR")
+  ) \rows_1.buf.buf0  (
+    .B(rows_0__io[1]),
+    .I(1'h1),
+    .T(n1)
+  );
+  TRELLIS_IO #(
+    .DIR("BIDIR")
+  ) \columns_0.buf.buf0  (
+    .B(columns_0__io),
+    .I(1'h1),
+    .O(c),
+    .T(n2)
+  );
+endmodule
+"""
+
+
+def flat(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_lines_of_an_unpacked_bitstream():
+    text = both_ways.of_icebox(ICEBOX, SKIN)
+    assert "input columns_0__io, output columns_0__o, output columns_0__oe" in text
+    assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o, output [1:0] rows_0__oe" in text
+    for told in (
+        "rows_0__o[0] = n6",
+        "rows_0__oe[0] = n5",
+        "rows_0__o[1] = n7",
+        "columns_0__o = n9",
+        "columns_0__oe = n8",
+    ):
+        assert f"assign {told};" in text
+    assert r"assign n1 = \rows_0__io[0] ;" in text, "what is read stays"
+    assert "assign tx = n9 ? n10 : 1'bz;" in text, "and so do other pins"
+    assert text.count("1'bz") == 1
+
+
+def test_lines_of_a_synthesized_netlist():
+    text = flat(both_ways.of_ecp5(ECP5, SKIN))
+    assert (
+        "module contactfpga(tx, rows_0__io, rows_0__o, rows_0__oe, columns_0__io, columns_0__o, columns_0__oe);" in text
+    )
+    assert "input [1:0] rows_0__io; output [1:0] rows_0__o; output [1:0] rows_0__oe;" in text
+    assert r"assign \rows_0.i = rows_0__io[0]; assign rows_0__o[0] = \level[0] ; assign rows_0__oe[0] = ~n1;" in text
+    assert "assign rows_0__o[1] = 1'h1; assign rows_0__oe[1] = ~n1;" in text
+    assert "assign c = columns_0__io; assign columns_0__o = 1'h1; assign columns_0__oe = ~n2;" in text
+    assert "TRELLIS_IO" not in text
+
+
+@pytest.mark.parametrize(("part", "text"), [(both_ways.of_icebox, ICEBOX), (both_ways.of_ecp5, ECP5)])
+def test_a_line_without_a_buffer_of_its_own_is_refused(part, text):
+    with pytest.raises(WrongPins, match="expected is one"):
+        part(text, SKIN.replace(rows=3))
+    with pytest.raises(WrongPins, match="the netlist has 0 places like"):
+        part(text.replace("BIDIR", "OUTPUT").replace("n5 ?", "n5 &"), SKIN)
+
+
+@pytest.mark.parametrize("text", [ICEBOX, ECP5])
+def test_pins_of_other_scans_stay_as_they_are(text):
+    skin = Skin(rows=2, columns=1, settle_us=20.0)
+    assert both_ways.of_icebox(text, skin) == both_ways.of_ecp5(text, skin) == text
+    assert both_ways.wrapper(skin) == ({}, "")
+
+
+@pytest.mark.parametrize(("diodes", "driven"), [("col2row", "& columns_o"), ("row2col", "& ~columns_o")])
+def test_a_column_that_is_driven_to_the_wrong_level_is_not_driven_right(diodes, driven):
+    assert f"assign columns_drive = columns_oe {driven};" in both_ways.wrapper(SKIN.replace(diodes=diodes))[1]
+
+
+# ---- whole boards
+
+BOARD, SHEET = BOARDS["ulx3s-12f"], RUNS[-1][1].replace(rows=3, columns=4)
+
+
+@pytest.fixture(scope="module")
+def synthesized(tmp_path_factory):
+    return extract.synthesized(BOARD, SHEET, tmp_path_factory.mktemp("ulx3s"))
+
+
+@pytest.mark.campaign
+def test_the_synthesized_netlist_does_what_the_golden_model_says(synthesized, record_property):
+    out = replay(SHEET, model_of(SHEET, synthesized), stimulus(SHEET, 1500, []))
+    assert out.changes > 3000
+    record_property("cases", out.frames)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("name", "planted", "error"),
+    [("columns", "1'b0", Mismatch), ("columns", "1'b1", Contention), ("rows", "1'b1", Mismatch)],
+)
+def test_an_output_enable_that_is_stuck_is_seen(synthesized, name, planted, error):
+    text = synthesized.files["chip.v"]
+    wrong, count = re.subn(rf"(assign {name}_0__oe\[1\] = )[^;]+;", rf"\g<1>{planted};", text)
+    assert count == 1
+    broken = native.Netlist(synthesized.files | {"chip.v": wrong}, synthesized.read)
+    with pytest.raises(error):
+        replay(SHEET, model_of(SHEET, broken), stimulus(SHEET, 200, []))
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(1800)
+@pytest.mark.skipif(shutil.which("icebox_vlog") is None, reason="no icebox_vlog on PATH")
+def test_the_netlist_taken_out_of_a_bitstream_does_what_the_golden_model_says(tmp_path, record_property):
+    name, skin = next((name, skin) for name, skin in RUNS if skin.scan == "reversal" and name == "icebreaker")
+    out = replay(skin, model_of(skin, extract.from_bitstream(BOARDS[name], skin, tmp_path)), stimulus(skin, 2000, []))
+    assert out.changes > 3000
+    record_property("cases", out.frames)
