@@ -74,7 +74,8 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
     tried.add_argument("--pitch-mm", type=numbers.PITCH_MM, action="append", metavar="MM", help=pitch)
     labeller = "Try only this labeller, cells, or module:attribute of your own; can be repeated."
     tried.add_argument("--labeller", action="append", metavar="NAME", help=labeller)
-    tried.add_argument("--scan", action="append", metavar="NAME", help="Try only this scan; can be repeated.")
+    scans = "Try only this scan; can be repeated (default: all that the Skin's columns can have)."
+    tried.add_argument("--scan", action="append", metavar="NAME", help=scans)
     baud = "Try this baud rate; can be repeated (default: the Skin's)."
     tried.add_argument("--baud", type=numbers.BAUD, action="append", help=baud)
     host = "Accept bitmaps too: the host finds their zones in this time."
