@@ -259,7 +259,6 @@ def test_a_column_that_is_stuck_costs_the_switches_in_it_and_no_others(soon):
     assert all(row[2] == (0b11 if row[1] == 1 else 0b01) for row in life.taken if row[0] > 20 and row[2])
 
 
-@pytest.mark.xfail(strict=True, reason="at rest no frame begins, so nothing holds the column back after a retry")
 def test_at_rest_a_stuck_column_is_not_driven_for_longer_than_a_try(soon):
     """With ``send = "on_change"`` an untouched sheet has no frames for as long as ``keep_alive_ms``."""
     skin = small(rows=2, columns=3, release_us=1.0, **SLOW)

@@ -122,7 +122,7 @@ class ReversalScanner(wiring.Component):
             self.pins.columns_drive.eq(precharge.pins),
             precharge.drive.eq(sheet.charges),
             precharge.columns.eq(sheet.pressed),
-            precharge.stuck.eq(turn.begins),
+            precharge.stuck.eq(turn.begins | turn.rests & turn.settled),
             precharge.turn.eq(self.time[RETRY_BIT]),
         ]
         count_columns(m, precharge.held, begun, self.tag.stuck)

@@ -83,10 +83,12 @@ class Scanner:
         if not self._rests:
             return max(self._listens + project + 1, self._packed)
         wanted = max(self._wanted(), self._packed)
+        self._rest(self.begun[-1] + 1, wanted)
         touched = self._first_touched(self.begun[-1] - 1, wanted - 2)
         if touched is None:
             return wanted
         seen = touched + 2
+        self._held = [entry for entry in self._held if entry[0] <= seen]
         if self._touched(touched) & self._clean_rows():
             self._set_contact(seen + 1, 1)
         return max(seen + project, self._packed)
@@ -122,8 +124,18 @@ class Scanner:
     def _first_touched(self, begin: int, end: int) -> int | None:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
         retry = RETRY_US * self._facts.clocks_per_us
-        turns = {begin, *self._changes, self.begun[-1] + 2, *range(begin // retry * retry + 2, end + 1, retry)}
+        driven = (cycle + 2 for cycle, _ in self._held)
+        turns = {begin, *self._changes, *driven, *range(begin // retry * retry + 2, end + 1, retry)}
         return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
+
+    def _rest(self, begin: int, end: int) -> None:
+        """At rest each cycle counts in which a column reads stuck."""
+        retry = RETRY_US * self._facts.clocks_per_us
+        seen = (cycle + 2 for cycle in self._changes)
+        turns = {begin, *seen, *range(begin // retry * retry, end + 1, retry)}
+        for cycle in sorted(turns):
+            if begin <= cycle <= end:
+                self._hold(cycle)
 
     def _undriven(self, cycle: int) -> np.ndarray:
         """(C,) bool: columns that are not driven in this cycle, as they read stuck."""
@@ -133,14 +145,13 @@ class Scanner:
                 return held if (cycle - 2) // retry == begun // retry else np.zeros_like(held)
         return np.zeros(self._facts.columns, bool)
 
-    def _hold(self, begun: int) -> np.ndarray:
-        """Columns that read pressed as a frame begins, or did since the last retry: from then on they are not
-        driven."""
-        _, stuck = self._timeline.at(begun - 2)
+    def _hold(self, cycle: int) -> np.ndarray:
+        """Columns that read pressed in this cycle, or did since the last retry: from then on they are not driven."""
+        _, stuck = self._timeline.at(cycle - 2)
         now = np.zeros(self._facts.columns, bool) if stuck is None else np.asarray(stuck, bool)
         retry = RETRY_US * self._facts.clocks_per_us
-        before = [held for cycle, held in self._held[-1:] if cycle // retry == begun // retry]
-        self._held.append((begun, np.logical_or.reduce([now, *before])))
+        before = [held for last, held in self._held[-1:] if last // retry == cycle // retry]
+        self._held.append((cycle, np.logical_or.reduce([now, *before])))
         return self._held[-1][1]
 
     # ---- rows that are driven

@@ -90,8 +90,9 @@ def let_go(proof: Proof) -> None:
 def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
-    Claimed: from four clocks after column 0 read pressed when it should not, in the last clock of a release or as a
-    frame begins, it is not driven, until the clock's bit 16 turns; this happens within 2^16 us. Column 1 never is.
+    Claimed: from four clocks after column 0 read pressed when it should not, in the last clock of a release, as a frame
+    begins or while the sheet rests, it is not driven, until the clock's bit 16 turns; this happens within 2^16 us.
+    Column 1 never is.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)
@@ -100,7 +101,7 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     if isinstance(dut, ReversalScanner):
         m.d.comb += [dut.pins.rows_read.eq(proof.free(skin.rows, "rows_read")), dut.packed.eq(proof.free(1, "packed"))]
         m.d.comb += dut.due.eq(proof.free(1, "due"))
-        sampled, time, runs = inside["begins"], dut.time, 1
+        sampled, time, runs = inside["begins"] | inside["rests"] & inside["settled"], dut.time, 1
     else:
         sampled, time, runs = inside["of_released"], inside["time"], inside["runs"]
         late = proof.before(proof.before((inside["clock"] == dut.derived.row_clocks - 1) & inside["scans"]))
