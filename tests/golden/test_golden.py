@@ -233,7 +233,7 @@ def test_stuck_columns_read_pressed_and_are_counted_once():
 def test_packets_read_back_by_the_driver_hold_what_was_scanned(choice):
     skin = skin_for(choice)
     known = facts(skin)
-    cycles = max(30 * known.scan_clocks, 20_000)
+    cycles = max(30 * known.scan_clocks, 20_000, 4000 * known.bit_clocks)
     timeline = stimulus(skin, cycles, seed=1)
     trace = predict(skin, timeline, cycles)
     rows = np.array([[word >> column & 1 for column in range(skin.columns)] for _, word, _ in trace.rows], bool)
