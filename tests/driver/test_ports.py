@@ -35,7 +35,8 @@ def test_only_serial_interfaces_of_supported_boards_are_candidates():
 def test_boards_of_one_chip_are_one_candidate_wherever_they_stand_in_the_table():
     mine = dataclasses.replace(BOARDS["icebreaker"], name="mine", title="Mine")
     supported = ports.supported([*BOARDS.values(), mine])
-    assert [usb.boards for usb in supported] == ["iCEBreaker, iCEStick, Mine", "ULX3S 12F, ULX3S 85F", "ULX3S 12F with FT232H"]
+    boards = ["iCEBreaker, iCEStick, Mine", "ULX3S 12F, ULX3S 85F", "ULX3S 12F with FT232H"]
+    assert [usb.boards for usb in supported] == boards
     assert ports.supported(BOARDS.values()) == ports.SUPPORTED
 
 
