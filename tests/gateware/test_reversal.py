@@ -123,7 +123,7 @@ SAMPLE = [
     {"rows": 5, "columns": 3, "report": "cells", "debounce": "sym_defer_pk", "send": "always", **TIMES},
     {"rows": 3, "columns": 6, "labeller": "serial", "diodes": "row2col", "debounce": "asym_eager_defer_pk", **TIMES},
     {"rows": 5, "columns": 4, "labeller": "single", "send": "always"},
-    {"rows": 4, "columns": 5, "labeller": TOY, "send": "always"},
+    {"rows": 4, "columns": 5, "labeller": TOY.name, "send": "always"},
     {"rows": 4, "columns": 64, "labeller": "serial", "connectivity": 4},
     {"rows": 6, "columns": 2, "labeller": "projection", "report": "barycenter", "send": "always", "baud": 3_000_000},
 ]
