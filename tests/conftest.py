@@ -43,19 +43,20 @@ def _closed_ports():
 
 
 LONGEST_FIRST = (
-    "test_adaptive",
     "test_cosim",
+    "test_bad_inputs",
     "test_formal",
+    "test_fit",
+    "test_adaptive",
     "test_label_volume",
     "test_demo",
-    "test_fit",
     "test_replay",
     "test_chart",
     "test_barycenter",
-    "test_bad_inputs",
     "test_label",
 )
-"""Files that take longest: begun first, so that at the end of a run no process works alone."""
+"""Files that take longest: begun first, so that at the end of a run no process works alone. The second and the fourth
+need no Yosys: on a new machine its first use takes a minute, which two processes would spend twice."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
