@@ -1,4 +1,4 @@
-"""The circuit model against closed forms and published figures; ngspice has a file of its own."""
+"""The circuit model against closed forms and published figures. test_spice.py compares it with ngspice."""
 
 import math
 

@@ -49,7 +49,7 @@ def test_a_diode_of_ones_own(skin_file):
         ("50", "nan", "line_pf in [circuit] is nan; it must lie between"),
         ("50", "true", "line_pf in [circuit] is True; it must lie between"),
         ('"silicon"', '"glass"', "diode is 'glass'; it must be one of schottky, silicon, or [circuit.diode]"),
-        ('"silicon"', "4", "circuit.diode is 4; it must be a table, [circuit.diode]"),
+        ('"silicon"', "4", "circuit.diode is 4; it must be a part, [circuit.diode]"),
         ('diode = "silicon"', "[circuit.diode]\nemission = 1", "saturation_a is missing in [circuit.diode]"),
         ('diode = "silicon"', "low_v = 2.5", "low_v = 2.5, high_v = 2 and supply_v = 3.3 are not in order"),
     ],

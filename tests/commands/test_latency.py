@@ -7,6 +7,7 @@ import pytest
 from reversal import FAST, small
 
 from contactfpga import cli, examples
+from contactfpga.skin import Skin
 from contactfpga_sim.studies import latency
 
 FILE = str(examples() / "fast.toml")
@@ -98,3 +99,10 @@ def test_places_are_all_places():
     found = latency.places(FAST, 3, 5)
     assert len(found) == 14 * 12 == len({cells.tobytes() for cells in found})
     assert all(cells.sum() == 15 and np.ptp(np.nonzero(cells)[0]) == 2 for cells in found)
+
+
+@pytest.mark.campaign  # it has a board to compile
+def test_touches_that_always_meet_a_keep_alive_end_with_a_sentence():
+    skin = Skin(rows=4, columns=4, send="on_change", keep_alive_ms=0.06)
+    with pytest.raises(latency.Late, match=r"keep_alive_ms is 0\.06, measure with a longer one"):
+        latency.measure(skin, (1, 1), 2)

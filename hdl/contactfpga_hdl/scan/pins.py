@@ -14,7 +14,7 @@ def row_pins(skin: Skin) -> dict[str, wiring.Member]:
 
     A scan that reads the rows drives ``rows`` while ``rows_drive``, both bit by bit, and reads ``rows_read``.
     """
-    if skin.scan == "reversal":
+    if skin.reads_rows:
         return {"rows": Out(skin.rows), "rows_drive": Out(skin.rows), "rows_read": In(skin.rows)}
     if skin.row_drive == "direct":
         return {"rows": Out(skin.rows)}

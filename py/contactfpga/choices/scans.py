@@ -29,7 +29,9 @@ class Scan(Choice):
 
     even: bool
     """Every row is sampled once per frame and frames take the same time. Otherwise times are counted in row times, and
-    each frame tells how many it took."""
+    each frame tells how many it took, or in us where the scan ``waits``."""
+    reads_rows: bool
+    """It lets the rows go and reads them while the columns are driven; all these pins go both ways."""
     waits: bool
     """It waits until the stage after takes a row, and until a frame is packed before it begins another one, so that no
     stage can be too slow for it. Where zones are found it hands on the rows that it drove, with their numbers."""
@@ -114,6 +116,7 @@ SCANS: dict[str, Scan] = {
             gateware="contactfpga_hdl.scan.raster:Scanner",
             golden="contactfpga_sim.golden.scan:RASTER",
             even=True,
+            reads_rows=False,
             waits=False,
             check=lambda skin: None,
             choice_clocks=lambda derived: 0,
@@ -127,6 +130,7 @@ SCANS: dict[str, Scan] = {
             gateware="contactfpga_hdl.scan.adaptive:AdaptiveScanner",
             golden="contactfpga_sim.golden.adaptive:ADAPTIVE",
             even=False,
+            reads_rows=False,
             waits=False,
             check=_check_adaptive,
             choice_clocks=lambda derived: max(derived.row_levels, 2) + 4,
@@ -140,6 +144,7 @@ SCANS: dict[str, Scan] = {
             gateware="contactfpga_hdl.scan.reversal:ReversalScanner",
             golden="contactfpga_sim.golden.reversal:REVERSAL",
             even=False,
+            reads_rows=True,
             waits=True,
             check=_check_reversal,
             choice_clocks=lambda derived: 0,

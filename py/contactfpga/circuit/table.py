@@ -15,13 +15,7 @@ from contactfpga.skin import Skin
 
 def load(path: str | Path) -> Circuit | None:
     """The circuit in a Skin's file; None where it has no table ``[circuit]``. Raises CircuitError."""
-    values = tomlfile.load(path, CircuitError)
-    if "circuit" not in values:
-        return None
-    try:
-        return read(values["circuit"])
-    except CircuitError as error:
-        raise CircuitError(f"{path}: {error}") from None
+    return tomlfile.load_table(path, "circuit", read, CircuitError)
 
 
 def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
@@ -30,39 +24,24 @@ def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
     circuit = load(path)
     if circuit is not None:
         try:
-            static.check(circuit, skin.rows, skin.columns, skin.diodes, projects(skin))
+            static.check(circuit, skin.rows, skin.columns, skin.diodes, skin.reads_rows)
         except CircuitError as error:
             raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {path}` shows all") from None
     return circuit
 
 
-def projects(skin: Skin) -> bool:
-    """The Skin's scan reads rows while all columns drive."""
-    return str(skin.scan) == "reversal"
-
-
 def read(values: Any) -> Circuit:
     """The circuit that a TOML table describes; its keys are the fields of :class:`Circuit`. ``diode`` is a name or a
     table with the fields of :class:`Diode`."""
-    given = dict(_known("circuit", values, Circuit))
+    given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
     if isinstance(diode := given.get("diode"), str):
         if diode not in DIODES:
             raise CircuitError(f"diode is {shown(diode)}; it must be one of {', '.join(DIODES)}, or [circuit.diode]")
         given["diode"] = DIODES[diode]
     elif diode is not None:
-        fields = _known("circuit.diode", diode, Diode)
+        fields = tomlfile.fields_of(Diode, "circuit.diode", diode, CircuitError)
         missing = [field.name for field in dataclasses.fields(Diode) if field.name not in fields]
         if missing:
             raise CircuitError(f"{missing[0]} is missing in [circuit.diode]; it needs all of its fields")
         given["diode"] = Diode(**fields)
     return Circuit(**given)
-
-
-def _known(name: str, values: Any, kind: type) -> dict[str, Any]:
-    if not isinstance(values, dict):
-        raise CircuitError(f"{name} is {shown(values)}; it must be a table, [{name}]")
-    known = [field.name for field in dataclasses.fields(kind)]
-    for key in values:
-        if key not in known:
-            raise CircuitError(f"unknown key {shown(key)} in [{name}]; known are {', '.join(known)}")
-    return values

@@ -10,7 +10,6 @@ from typing import Any
 from contactfpga import circuit as sheet
 from contactfpga.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
 from contactfpga.circuit.static import NOISE_V
-from contactfpga.circuit.table import projects
 from contactfpga.circuit.times import MARGIN, Time
 from contactfpga.circuit.values import DIODE_LIMITS, LIMITS
 from contactfpga.console import numbers, terminal
@@ -144,7 +143,7 @@ def _given(skin: Skin, answer: dict[str, Any]) -> dict[str, Any]:
         needs["precharge_us"] = answer["precharge_us"]
     else:
         needs["release_us"] = answer["pulled_release_us"]
-    if projects(skin):
+    if skin.reads_rows:
         needs["project_us"] = answer["project_us"]
     return {
         name: {

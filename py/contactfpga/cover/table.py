@@ -18,20 +18,14 @@ MIN_LENGTH_M = 1e-6
 
 def load(path: str | Path) -> Cover | None:
     """The cover in a Skin's file; None where it has no table ``[cover]``. Raises CoverError."""
-    values = tomlfile.load(path, CoverError)
-    if "cover" not in values:
-        return None
-    try:
-        return read(values["cover"])
-    except CoverError as error:
-        raise CoverError(f"{path}: {error}") from None
+    return tomlfile.load_table(path, "cover", read, CoverError)
 
 
 def read(values: Any) -> Cover:
     """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with a table ``switch``."""
-    given = dict(_known("cover", values, Cover))
+    given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
     if "switch" in given:
-        given["switch"] = Switch(**_known("cover.switch", given["switch"], Switch))
+        given["switch"] = Switch(**tomlfile.fields_of(Switch, "cover.switch", given["switch"], CoverError))
     cover = Cover(**given)
     if not MIN_LENGTH_M <= cover.thickness_m <= MAX_LENGTH_M:
         raise CoverError(
@@ -53,13 +47,3 @@ def write(cover: Cover) -> str:
 
 def _lines(values: dict[str, Any]) -> str:
     return "".join(f"{name} = {json.dumps(value)}\n" for name, value in values.items() if value is not None)
-
-
-def _known(name: str, values: Any, kind: type) -> dict[str, Any]:
-    if not isinstance(values, dict):
-        raise CoverError(f"{name} is {values!r}; it must be a part, [{name}]")
-    known = [field.name for field in dataclasses.fields(kind)]
-    for key in values:
-        if key not in known:
-            raise CoverError(f"unknown key {key!r} in [{name}]; known are {', '.join(known)}")
-    return values

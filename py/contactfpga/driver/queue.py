@@ -89,7 +89,7 @@ class FrameQueue:
         self._taken = self._length = 0
 
     def _drop(self, most: int) -> int:
-        """Drop what comes first, of a run at most so many frames; how many frames that were."""
+        """Drop what comes first, and of a run at most ``most`` frames; returns how many frames were dropped."""
         item = self._items[0]
         count = min(most, _count(item) - self._taken)
         self._length -= count

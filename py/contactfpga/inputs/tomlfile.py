@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import shown
+
+Table = TypeVar("Table")
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 16
@@ -27,6 +31,28 @@ def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
     except ValueError as error:  # a number of thousands of digits
         raise refused(f"{path}: not a TOML file: {error}") from None
     _check(path, values, refused)
+    return values
+
+
+def load_table(path: str | Path, name: str, read: Callable[[Any], Table], refused: type[ValueError]) -> Table | None:
+    """What ``read`` makes of the file's table of this name; None where it has none. Raises ``refused``, OSError."""
+    values = load(path, refused)
+    if name not in values:
+        return None
+    try:
+        return read(values[name])
+    except refused as error:
+        raise refused(f"{path}: {error}") from None
+
+
+def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> dict[str, Any]:
+    """A table whose keys are fields of a dataclass; raises ``refused`` for anything else."""
+    if not isinstance(values, dict):
+        raise refused(f"{name} is {shown(values)}; it must be a part, [{name}]")
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in values:
+        if key not in known:
+            raise refused(f"unknown key {shown(key)} in [{name}]; known are {', '.join(known)}")
     return values
 
 

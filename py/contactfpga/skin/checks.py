@@ -167,7 +167,7 @@ def _check_precharge(skin: Skin) -> None:
         raise SkinError(f"column_read is {skin.column_read!r}; precharge_us drives the columns and needs 'direct'")
     if skin.precharge_us and skin.ghosts:
         raise SkinError("diodes is 'none'; precharge_us drives the columns and needs 'col2row' or 'row2col'")
-    if skin.scan != "reversal" and skin.project_us != limits.PROJECT_US:
+    if not skin.reads_rows and skin.project_us != limits.PROJECT_US:
         raise SkinError(f"project_us is {skin.project_us}; leave it out, or set scan = 'reversal'")
 
 

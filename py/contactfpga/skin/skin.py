@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
+from contactfpga.choices import scans
 from contactfpga.choices.debounces import Debounce, DebounceName
 from contactfpga.choices.labellers import Labeller, LabellerName
 from contactfpga.choices.reports import REPORTS, ReportName
@@ -166,6 +167,11 @@ class Skin:
     def selects_low(self) -> bool:
         """A selected row is low, as is a column that reads pressed; else both are high."""
         return self.diodes != "row2col"
+
+    @property
+    def reads_rows(self) -> bool:
+        """The board lets the rows go and reads them while it drives the columns."""
+        return scans.find(self.scan).reads_rows
 
     @property
     def ghosts(self) -> bool:

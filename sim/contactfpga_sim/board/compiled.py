@@ -163,7 +163,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
             "BIT_CLOCKS": Derived(skin).bit_clocks,
             "PRECHARGE": int(skin.precharge_us > 0),
-            "REVERSAL": int(skin.scan == "reversal"),
+            "REVERSAL": int(skin.reads_rows),
             "PROBES": int(netlist is None),
             "DIVIDED": int(skin.report == "barycenter"),
         },

@@ -170,7 +170,7 @@ def _sheet(skin: Skin) -> tuple[str, str]:
     selecting, level, let_go = ("~rows", "~reads", "touched") if skin.selects_low else ("rows", "reads", "~touched")
     pulled = " | ".join(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))
     feeding = ", ".join(f"|(pressed{row} & columns_drive & ~stuck)" for row in reversed(range(skin.rows)))
-    reverses = skin.scan == "reversal"
+    reverses = skin.reads_rows
     text = f"""wire {rows} rows;
 wire {rows} rows_drive{"" if reverses else f" = {{{skin.rows}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};

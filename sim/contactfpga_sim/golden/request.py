@@ -38,7 +38,7 @@ class Heard:
 
 
 def request(number: int, hello: bool = False, bit_clocks: int = 4) -> bytes:
-    """A request as on the wire, with a delimiter at either end, for a board with so many clocks per bit."""
+    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit."""
     packet = Packet()
     packet.push(bytes(128 + number // 128**place % 128 for place in range(3)) + bytes([KIND << 4 | hello]))
     data = b"\0" + packet.wire()

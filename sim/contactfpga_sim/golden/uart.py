@@ -32,7 +32,7 @@ class Byte:
 
 
 def pulsed(bit_clocks: int) -> bool:
-    """Whether a board with so many clocks per bit reads pulses instead of bytes."""
+    """Whether a board with ``bit_clocks`` per bit reads pulses instead of bytes."""
     return bit_clocks in (2, 3)
 
 

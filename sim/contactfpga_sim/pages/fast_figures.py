@@ -58,7 +58,7 @@ def latency_row(name: str, skin: Skin, cells: tuple[int, int]) -> str:
 
 def _bound(skin: Skin, cells: tuple[int, int], found: latency.Latency) -> str:
     """The projection, a row time per touched row, and the frame's bits; and how far the worst touch is above it."""
-    if skin.scan != "reversal":
+    if not skin.reads_rows:
         return ""
     derived = Derived(skin)
     slots = derived.project_clocks + cells[0] * derived.row_clocks

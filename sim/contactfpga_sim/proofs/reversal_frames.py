@@ -28,7 +28,7 @@ class Frames:
         self.place = Signal(range(skin.rows + 1))  # of the row after the one that was taken last
         self.gap = Signal()  # an empty row comes next
         before = proof.before(sheet.selected)
-        self.ended = Signal()  # a row was selected in the clock before, and is no more
+        self.ended = Signal()  # the row that was selected a clock before is released
         m.d.comb += self.ended.eq((before != 0) & (sheet.selected == 0))
         self.sample, self.sampled = Signal(skin.columns), Signal(skin.rows)
         with m.If(self.ended):

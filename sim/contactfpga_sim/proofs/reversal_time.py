@@ -40,7 +40,7 @@ class Prompt:
         self.longest: int = self.frame(sheet.skin.rows)
 
     def frame(self, rows):
-        """The most clocks from the begin of a frame with so many rows, one at least, to that of the next."""
+        """The most clocks from where a frame of ``rows`` rows, at least one, begins to where the next one does."""
         return self.first + (rows - 1) * self.slot + self.end
 
 
@@ -213,7 +213,7 @@ _NEXT_BUGS = (
     Bug("rests though something is touched", ReversalScanner, "rests", lambda rests, inside: rests | inside["begins"]),
     Bug("waits for nothing", ReversalScanner, "waits", lambda waits, inside: waits | inside["touched"].any()),
     Bug("does not wake", ReversalScanner, "rests", lambda rests, inside: rests | inside["rests"]),
-    Bug("listens anew when it wakes", ReversalScanner, "clock", lambda clock, inside: Mux(_wakes(inside), 0, clock)),
+    Bug("listens anew once awake", ReversalScanner, "clock", lambda clock, inside: Mux(_wakes(inside), 0, clock)),
     Bug("driven for a clock more", ReversalScanner, "clock",
         lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
 )  # fmt: skip

@@ -82,7 +82,7 @@ class Sheet:
         self.drives: tuple[str, ...] = (COLUMN_DATA[skin.column_read],)
         if skin.precharge_us:
             self.reads += ("columns_drive",)
-        if skin.scan == "reversal":
+        if skin.reads_rows:
             self.reads += ("rows_drive",)
             self.drives += ("rows_read",)
         self._released = (1 << skin.rows) - 1 if skin.selects_low else 0

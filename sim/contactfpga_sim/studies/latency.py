@@ -20,9 +20,14 @@ GOLDEN = 0.6180339887498949
 SCANS = 40
 """In which a touch must be reported, beside twice the time of its debounce."""
 
+TRIES = 50
+"""Of a touch that meets a hello or a keep-alive."""
+
 CHANGES = 100
+"""Of a contact that moves."""
 
 MOVING_FRAMES = 300
+"""For which the rate is counted, about."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,7 +140,7 @@ class _Bench:
 
     def touch(self, cells: np.ndarray, share: float) -> tuple[int, int, Received]:
         """Clocks to the end of the last byte of the frame that holds all of the contact, and to the contact pin."""
-        while True:
+        for _ in range(TRIES):
             self._let_go()
             start = (self._board.cycle // self._scan + 3) * self._scan + round(share * self._scan)
             self._board.run(start - self._board.cycle)
@@ -146,6 +151,10 @@ class _Bench:
             pin = next(int(event["cycle"]) for event in self._board.take("contact") if event["data"])
             if not kept_alive and self._receiver.hellos == hellos:
                 return one.last + 10 * self._derived.bit_clocks - start, pin - start, one
+        raise Late(
+            f"{TRIES} touches in a row met a hello or a keep-alive; keep_alive_ms is {self._skin.keep_alive_ms:g}, "
+            "measure with a longer one"
+        )
 
     def change(self, contacts: list[np.ndarray], number: int, size: int) -> int:
         """Clocks from a change to the last byte of the frame that shows it: the contact has moved on by some places,
