@@ -151,15 +151,17 @@ def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
     assert loaded(code) == "contactfpga_sim"
 
 
-def test_help_starts_in_well_under_half_a_second():
-    def seconds():
-        """Of the processor, as other processes may have it now and then."""
+def test_help_costs_little_more_than_importing_what_a_host_needs():
+    def seconds(*command):
+        """Of the processor: other processes may have it now and then."""
         before = os.times()
-        subprocess.run([sys.executable, "-m", "contactfpga.cli", "--help"], check=True, capture_output=True)
+        subprocess.run([sys.executable, *command], check=True, capture_output=True)
         after = os.times()
         return sum(after[2:4]) - sum(before[2:4])
 
-    assert min(seconds() for _ in range(5)) < 0.5
+    needed, shown = ("-c", "import asyncio, numpy"), ("-m", "contactfpga.cli", "--help")
+    pairs = [(seconds(*needed), seconds(*shown)) for _ in range(5)]
+    assert min(b for _, b in pairs) < 4 * min(a for a, _ in pairs)
 
 
 # ---- zones
