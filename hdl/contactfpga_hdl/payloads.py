@@ -54,6 +54,15 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
 
 
+def faults_layout(derived: Derived) -> data.StructLayout:
+    """What the scanner of a Skin with ``guard`` or ``self_test`` knows of its lines: rows and columns that are open
+    before their far ends, columns, the guard column last, that read pressed while no row was driven, and whether the
+    self-test found lines or directions that are joined."""
+    skin = derived.skin
+    lines = {"rows": skin.rows, "columns": skin.columns, "stuck": skin.column_lines} if skin.guard else {}
+    return data.StructLayout(lines | ({"joined": 1} if skin.self_test else {}))
+
+
 def summary_layout(derived: Derived) -> data.StructLayout:
     """What a frame's trailer says of it, valid when its end mark is packed."""
     return data.StructLayout(

@@ -22,6 +22,19 @@ REFUSED = [
     ({"name": " a"}, "name is ' a'; it must be printable, with no spaces around it"),
     ({"name": "a\n"}, r"name is 'a\n'; it must be printable, with no spaces around it"),
     ({"name": "ä" * 17}, f"name is '{'ä' * 17}', 34 bytes of UTF-8; at most 32 are possible"),
+    # faults
+    ({"guard": 1}, "guard is 1; it must be true or false"),
+    ({"fail_safe": "yes"}, "fail_safe is 'yes'; it must be true or false"),
+    ({"alive": 0}, "alive is 0; it must be true or false"),
+    ({"dual": None}, "dual is None; it must be true or false"),
+    ({"guard": True, "scan": "adaptive"}, "scan is 'adaptive', which does not look at guard lines; guard = true needs"),
+    ({"guard": True, "diodes": "none", "connectivity": 4}, "diodes is 'none'; guard = true closes switches for good"),
+    ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
+    ({"row_order": 3}, "row_order is 3; it must be a list of whole numbers"),
+    ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
+    ({"rows": 2, "row_order": [0, 0]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 2 times"),
+    ({"rows": 2, "row_order": [1]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 0 times"),
+    ({"columns": 2, "column_order": [1, 0, 2]}, "column_order must hold each line from 0 to 1 once; it has 3"),
     # the sheet
     ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
@@ -514,6 +527,12 @@ OTHER = {
     "zone_capacity": 63,
     "clock_hz": 24_000_000,
     "baud": 1_000_000,
+    "guard": True,
+    "row_order": (1, 0, *range(2, 16)),
+    "column_order": (1, 0, *range(2, 16)),
+    "fail_safe": True,
+    "alive": True,
+    "dual": True,
 }
 
 
@@ -526,10 +545,14 @@ def test_every_field_is_in_the_fingerprint():
     divided = Skin(report="barycenter")
     others += [divided, divided.replace(barycenter_bits=3)]
     reversal = Skin(**REVERSAL)
-    others += [reversal, reversal.replace(project_us=2.0), reversal.replace(precharge_us=0.5)]
-    assert set(OTHER) | {"name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", *only_there} == {
-        field.name for field in dataclasses.fields(Skin)
-    }
+    others += [
+        reversal,
+        reversal.replace(project_us=2.0),
+        reversal.replace(precharge_us=0.5),
+        reversal.replace(self_test=True),
+    ]
+    elsewhere = {"name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", "self_test"}
+    assert {*OTHER, *elsewhere, *only_there} == {field.name for field in dataclasses.fields(Skin)}
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
 
 
@@ -634,4 +657,4 @@ def test_a_cover_that_cannot_be_is_refused(tmp_path, old, new, message):
 def test_fields_are_plain_values():
     """Whatever reads a Skin's fields, as the golden model does, needs no code of the host."""
     fields = dataclasses.asdict(Skin(mask=[[1, 2]]))
-    assert json.loads(json.dumps(fields)) == fields | {"mask": [[1, 2]]}
+    assert json.loads(json.dumps(fields)) == fields | {"mask": [[1, 2]], "row_order": [], "column_order": []}

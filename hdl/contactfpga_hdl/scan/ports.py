@@ -4,7 +4,7 @@ from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import HEARD_BITS, Derived
-from contactfpga_hdl.payloads import row_layout, tag_layout
+from contactfpga_hdl.payloads import faults_layout, row_layout, tag_layout
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 
 
@@ -17,9 +17,11 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
     request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
     heard (in): taken over into that tag.
     epoch (out): high for a clock when another 2^22 us are over.
+    faults (out): with ``guard`` or ``self_test``, what it knows of faulty lines.
     contact (out): high while any switch reads pressed; when it rises and falls is the scan's rule.
     """
     skin = derived.skin
+    faults = faults_layout(derived)
     return {
         "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
         "rows": Out(stream.Signature(row_layout(derived))),
@@ -28,4 +30,5 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
         "heard": In(HEARD_BITS),
         "epoch": Out(1),
         "contact": Out(1),
+        **({"faults": Out(faults)} if faults.size else {}),
     }

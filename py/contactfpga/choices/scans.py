@@ -35,6 +35,8 @@ class Scan(Choice):
     waits: bool
     """It waits until the stage after takes a row, and until a frame is packed before it begins another one, so that no
     stage can be too slow for it. Where zones are found it hands on the rows that it drove, with their numbers."""
+    guards: bool = False
+    """It looks at the guard lines of a Skin with ``guard``, and has the port ``faults``."""
     check: Callable[[Skin], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
     choice_clocks: Count
@@ -118,6 +120,7 @@ SCANS: dict[str, Scan] = {
             even=True,
             reads_rows=False,
             waits=False,
+            guards=True,
             check=lambda skin: None,
             choice_clocks=lambda derived: 0,
             max_frame_slots=lambda derived: derived.skin.rows,
@@ -146,6 +149,7 @@ SCANS: dict[str, Scan] = {
             even=False,
             reads_rows=True,
             waits=True,
+            guards=True,
             check=_check_reversal,
             choice_clocks=lambda derived: 0,
             max_frame_slots=lambda derived: math.ceil(derived.max_frame_clocks / derived.row_clocks),

@@ -35,6 +35,7 @@ _REGISTERED: dict[str, Callable[[object], Choice]] = {
     "scan": scans.find,
     "debounce": debounces.find,
 }
+_SWITCHES = ("guard", "fail_safe", "alive", "self_test", "dual")
 _WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "clock_hz", "baud")
 
 
@@ -47,6 +48,7 @@ def check_types(skin: Skin) -> dict[str, Any]:
     return (
         {name: _choice(name, getattr(skin, name), choices) for name, choices in _CHOICES.items()}
         | {name: find(getattr(skin, name)).name for name, find in _REGISTERED.items()}
+        | {name: _switch(name, getattr(skin, name)) for name in _SWITCHES}
         | {name: _whole(name, getattr(skin, name)) for name in _WHOLE}
         | ({} if skin.zone_capacity is None else {"zone_capacity": _whole("zone_capacity", skin.zone_capacity)})
         | {name: _finite(name, value) for name, value in _floats(skin)}
@@ -58,6 +60,12 @@ def _choice(name: str, value: Any, choices: tuple[Any, ...]) -> Any:
     if not of_type or value not in choices:
         raise SkinError(f"{name} is {shown(value)}; it must be one of {', '.join(map(repr, choices))}")
     return choices[choices.index(value)]
+
+
+def _switch(name: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise SkinError(f"{name} is {shown(value)}; it must be true or false")
+    return value
 
 
 def _whole(name: str, value: Any) -> int:
@@ -90,8 +98,8 @@ def _check_name(name: object) -> None:
         )
 
 
-def check_sheet(skin: Skin) -> Mask:
-    """Sheet, wiring and scan go together; returns the mask in order."""
+def check_sheet(skin: Skin) -> dict[str, Any]:
+    """Sheet, wiring and scan go together; returns the mask in order, and the orders of the lines as tuples."""
     for name in ("rows", "columns"):
         _within(name, getattr(skin, name), 1, limits.MAX_LINES)
     for name in ("pitch_x_mm", "pitch_y_mm"):
@@ -102,7 +110,36 @@ def check_sheet(skin: Skin) -> Mask:
     scans.find(skin.scan).check(skin)
     _check_ghosts(skin, mask)
     _check_surface(skin)
-    return mask
+    _check_guard(skin)
+    orders = {name: _check_order(name, getattr(skin, name), lines) for name, lines in _ordered(skin)}
+    return {"mask": mask, **orders}
+
+
+def _ordered(skin: Skin) -> list[tuple[str, int]]:
+    return [("row_order", skin.rows), ("column_order", skin.columns)]
+
+
+def _check_order(name: str, value: Any, lines: int) -> tuple[int, ...]:
+    numbers = [whole(line) for line in value] if isinstance(value, list | tuple) else None
+    if numbers is None or None in numbers:
+        raise SkinError(f"{name} is {shown(value)}; it must be a list of whole numbers")
+    order = tuple(line for line in numbers if line is not None)
+    if order and sorted(order) != list(range(lines)):
+        wrong = next((line for line in range(lines) if order.count(line) != 1), None)
+        found = f"line {wrong} stands in it {order.count(wrong)} times" if wrong is not None else f"it has {len(order)}"
+        raise SkinError(f"{name} must hold each line from 0 to {lines - 1} once; {found}")
+    return () if order == tuple(range(lines)) else order
+
+
+def _check_guard(skin: Skin) -> None:
+    if skin.guard and skin.ghosts:
+        raise SkinError("diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'")
+    if skin.guard and not scans.find(skin.scan).guards:
+        raise SkinError(
+            f"scan is {skin.scan!r}, which does not look at guard lines; guard = true needs 'raster' or 'reversal'"
+        )
+    if skin.self_test and not skin.reads_rows:
+        raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
 
 
 def _check_surface(skin: Skin) -> None:

@@ -45,6 +45,14 @@ class Skin:
     """Radius of the sheet on a cylinder in mm; None on a plane."""
     mask: tuple[tuple[int, int], ...] = ()
     """(row, column) of switches that are absent or broken: never pressed, never stuck."""
+    guard: bool = False
+    """One more row and one more column at the far ends, whose switches are closed for good: the board tells a broken
+    line by name (docs/faults.md)."""
+    row_order: tuple[int, ...] = ()
+    """The line, counted from 0 in the order of the board's pins or the chain's outputs, that each row is soldered to;
+    (): row i to line i. A guard row is the last line."""
+    column_order: tuple[int, ...] = ()
+    """The same for columns."""
     connectivity: int = 8
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
@@ -99,6 +107,16 @@ class Skin:
     """Zones a frame can carry. None: the most that can occur up to 32x32, at most 256 above, and with
     ``report = "barycenter"`` at most 64; then filled in."""
 
+    fail_safe: bool = False
+    """``contact`` is high while the board knows of a fault."""
+    alive: bool = False
+    """A pin that turns every ms, as long as whole frames without a fault come."""
+    self_test: bool = False
+    """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
+    dual: bool = False
+    """Two copies of the gateware are compared in each clock; where they differ nothing passes for a frame, and both
+    start anew."""
+
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
     baud: int = 3_000_000
@@ -106,7 +124,7 @@ class Skin:
 
     def __post_init__(self) -> None:
         self._keep(**checks.check_types(self))
-        self._keep(mask=checks.check_sheet(self))
+        self._keep(**checks.check_sheet(self))
         checks.check_link(self)
         if self.zone_capacity is None:
             self._keep(zone_capacity=self._default_capacity())
@@ -172,6 +190,16 @@ class Skin:
     def reads_rows(self) -> bool:
         """The board lets the rows go and reads them while it drives the columns."""
         return scans.find(self.scan).reads_rows
+
+    @property
+    def row_lines(self) -> int:
+        """Rows, and the guard row."""
+        return self.rows + self.guard
+
+    @property
+    def column_lines(self) -> int:
+        """Columns, and the guard column."""
+        return self.columns + self.guard
 
     @property
     def ghosts(self) -> bool:
