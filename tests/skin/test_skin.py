@@ -27,8 +27,14 @@ REFUSED = [
     ({"fail_safe": "yes"}, "fail_safe is 'yes'; it must be true or false"),
     ({"alive": 0}, "alive is 0; it must be true or false"),
     ({"dual": None}, "dual is None; it must be true or false"),
-    ({"guard": True, "scan": "adaptive"}, "scan is 'adaptive', which does not look at guard lines; guard = true needs"),
-    ({"guard": True, "diodes": "none", "connectivity": 4}, "diodes is 'none'; guard = true closes switches for good"),
+    (
+        {"guard": True, "scan": "adaptive"},
+        "scan is 'adaptive', which does not look at guard lines; guard = true needs 'raster' or 'reversal'",
+    ),
+    (
+        {"guard": True, "diodes": "none", "connectivity": 4},
+        "diodes is 'none'; guard = true closes switches for good and needs 'col2row' or 'row2col'",
+    ),
     ({"self_test": True}, "scan is 'raster'; self_test = true drives and reads all lines and needs 'reversal'"),
     ({"row_order": 3}, "row_order is 3; it must be a list of whole numbers"),
     ({"row_order": [0, 1.5]}, "row_order is [0, 1.5]; it must be a list of whole numbers"),
