@@ -148,6 +148,10 @@ class Wire:
     def hello(self, **options) -> bytes:
         return b"\0" + seal(self.plain_hello(**options))
 
+    def seal_bare(self, hello_fields) -> bytes:
+        """A packet with some fields of a hello."""
+        return seal(b"".join(hello_fields) + last_byte(HELLO))
+
 
 def old_hello() -> bytes:
     """What a board of protocol 1 said of the reference Skin."""

@@ -1,0 +1,747 @@
+/* contactfpga.h: reads the packets of a contactfpga board (protocol 2, docs/protocol.md) in C99 or C++11.
+ *
+ * Nothing is allocated; the one state is a contactfpga_reader, which the caller owns. Feed it each byte from the UART:
+ *
+ *     static contactfpga_reader reader;
+ *     contactfpga_init(&reader);
+ *     ...
+ *     if (contactfpga_push(&reader, byte) == CONTACTFPGA_FRAME) {
+ *         contactfpga_zone zone;
+ *         for (uint16_t i = 0; i < reader.frame.items; i++) {
+ *             contactfpga_zone_at(&reader, i, &zone);
+ *             ...
+ *         }
+ *     }
+ *
+ * What a frame holds can be read until the next byte is pushed. A frame whose time since power-up is not known, or that
+ * is damaged, is counted and never shown. A board says what it is (a hello) twice a second, so the first frame comes
+ * within half a second.
+ *
+ * CONTACTFPGA_PACKET_BYTES: the longest packet that can be taken. The default takes that of every sheet; define a smaller
+ * one before including this file to save memory: a hello needs up to 120 bytes, a frame 14 bytes and its zones.
+ */
+#ifndef CONTACTFPGA_H
+#define CONTACTFPGA_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#ifndef CONTACTFPGA_PACKET_BYTES
+#define CONTACTFPGA_PACKET_BYTES 12350
+#endif
+
+#define CONTACTFPGA_MAX_LINES 64
+#define CONTACTFPGA_REQUEST_BYTES 10
+#define CONTACTFPGA_PULSED_REQUEST_BYTES 66
+
+/* What a byte completed. */
+typedef enum {
+    CONTACTFPGA_NOTHING = 0,
+    CONTACTFPGA_FRAME,
+    CONTACTFPGA_HELLO
+} contactfpga_event;
+
+typedef enum { CONTACTFPGA_MOMENTS = 0, CONTACTFPGA_CELLS = 1, CONTACTFPGA_BARYCENTER = 2 } contactfpga_report;
+
+/* Bits of a frame's flags. */
+enum { CONTACTFPGA_OVERFLOW = 1, CONTACTFPGA_MISMATCH = 2, CONTACTFPGA_FAULT = 4 };
+
+/* Why packets were refused. */
+enum {
+    CONTACTFPGA_FRAMING,
+    CONTACTFPGA_CRC,
+    CONTACTFPGA_LENGTH,
+    CONTACTFPGA_KIND,
+    CONTACTFPGA_CONTENT,
+    CONTACTFPGA_NOISE,
+    CONTACTFPGA_REASONS
+};
+
+/* What the board says of itself. */
+typedef struct {
+    uint8_t rows, columns;
+    uint8_t connectivity; /* 4 or 8 */
+    uint8_t report;       /* a contactfpga_report */
+    uint8_t fraction_bits; /* of barycenters */
+    bool on_change;       /* frames come when cells change, and as a keep-alive; else all the time */
+    bool ghosts;          /* the sheet has no diodes */
+    bool plane;           /* else a cylinder */
+    uint16_t zone_capacity;
+    double pitch_x_mm, pitch_y_mm, radius_mm;
+    uint8_t fingerprint[8];
+    uint32_t clock_hz, baud;
+    char name[33]; /* UTF-8, ends with a zero byte */
+    uint64_t sent; /* frames since power-up */
+    uint32_t epoch; /* whole times 2^22 us since power-up */
+    uint32_t heard; /* number of the last request */
+    uint8_t stuck;  /* columns; 7: 7 or more */
+} contactfpga_hello;
+
+typedef struct {
+    uint64_t time_us; /* sample of the first row, since power-up */
+    uint8_t sequence, flags;
+    uint8_t heard;        /* lowest three bits of the last request's number before the frame was scanned */
+    uint16_t cells;       /* pressed on the whole sheet */
+    uint16_t zones;       /* on the sheet, also those the frame had no room for */
+    uint16_t items;       /* zones, or with CONTACTFPGA_CELLS rows, that the frame carries */
+    uint32_t overwritten; /* frames that newer ones replaced before they were sent, modulo 2^overwritten_bits */
+} contactfpga_frame;
+
+/* A contact zone. Its barycenter is sum_x / area along the columns, in cells, and sum_y / area along the rows; with
+ * CONTACTFPGA_BARYCENTER the board has divided: x and y are in cells / 2^fraction_bits, and the sums are 0. */
+typedef struct {
+    uint32_t area, sum_x, sum_y, x, y;
+} contactfpga_zone;
+
+/* What was counted since contactfpga_init; the names are those of the Python driver's board.stats. */
+typedef struct {
+    uint32_t frames, lost, unexplained, overwritten, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, before_hello,
+        unknown_kinds, foreign_version, skin_changes, restarts, bytes;
+} contactfpga_stats;
+
+/* Widths of a sheet's fields on the wire. */
+typedef struct {
+    uint8_t area, sum_x, sum_y, zones, overwritten, record[3], record_bytes, item_bytes, trailer_bytes;
+    uint16_t cells, max_zones, max_items;
+} contactfpga_widths;
+
+typedef struct {
+    contactfpga_frame frame; /* the last one shown */
+    contactfpga_hello hello; /* the last one, once greeted */
+    contactfpga_stats stats;
+    bool greeted; /* a hello has come */
+    /* What follows is the reader's own. */
+    contactfpga_widths widths;
+    contactfpga_hello draft; /* the hello that is being collected */
+    uint32_t draft_crc, draft_fields;
+    uint16_t draft_bytes;
+    uint8_t trailer[10];
+    uint16_t length; /* bytes of the packet so far */
+    bool overlong, begun, damage;
+    bool met, known, forgot, timed, before; /* of the time line: see contactfpga__explain */
+    uint32_t waiting;
+    uint64_t next, time_us;
+    int64_t last_us;
+    uint32_t epoch, before_overwritten;
+    uint8_t before_heard;
+    uint8_t packet[CONTACTFPGA_PACKET_BYTES];
+} contactfpga_reader;
+
+/* Begin to listen to a port. */
+static inline void contactfpga_init(contactfpga_reader *reader);
+
+/* Take a byte from the board. */
+static inline contactfpga_event contactfpga_push(contactfpga_reader *reader, uint8_t byte);
+
+/* Bytes were lost, or nobody read for more than 8 s: no frame is shown before the next hello, as its time is not known. */
+static inline void contactfpga_doubt(contactfpga_reader *reader);
+
+/* Zone number ``index`` of the last frame; false, and nothing is written, where it carries no such zone. */
+static inline bool contactfpga_zone_at(const contactfpga_reader *reader, uint16_t index, contactfpga_zone *zone);
+
+/* Whether a cell of the last frame is pressed, with CONTACTFPGA_CELLS; else, and outside the sheet, false. */
+static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t row, uint8_t column);
+
+/* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Its area must not be 0. */
+static inline void contactfpga_barycenter_mm(
+    const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm);
+
+/* A request with this number for a frame, and with ``hello`` for a hello, into ``out``; returns how many bytes to send, 0
+ * where a request may not have this number. ``pulsed``: the board has fewer than 4 clocks per bit (contactfpga_pulsed).
+ * ``out`` has room for CONTACTFPGA_REQUEST_BYTES, or CONTACTFPGA_PULSED_REQUEST_BYTES. The frame that answers it is the
+ * first whose ``heard`` is number % 8; docs/protocol.md says what that takes. */
+static inline size_t contactfpga_request(uint32_t number, bool hello, bool pulsed, uint8_t *out);
+
+/* Whether a request may have this number. */
+static inline bool contactfpga_may_number(uint32_t number);
+
+/* Whether the board, whose hello has come, takes requests as pulses. */
+static inline bool contactfpga_pulsed(const contactfpga_hello *hello);
+
+/* ---- from here on how it is done ---- */
+
+enum {
+    CONTACTFPGA__CHECK_BYTES = 3,
+    CONTACTFPGA__KIND_HELLO = 4,
+    CONTACTFPGA__KIND_REQUEST = 5,
+    CONTACTFPGA__KIND_ZONES = 5,
+    CONTACTFPGA__SHEET = 1,
+    CONTACTFPGA__STATE = 2,
+    CONTACTFPGA__PITCH = 3,
+    CONTACTFPGA__RADIUS = 4,
+    CONTACTFPGA__FINGERPRINT = 5,
+    CONTACTFPGA__RATES = 6,
+    CONTACTFPGA__NAME = 7,
+    CONTACTFPGA__CHECK = 255,
+    CONTACTFPGA__STATE_DIGITS = 16,
+    CONTACTFPGA__LONGEST_HELLO = 8192
+};
+#define CONTACTFPGA__WRAP_US (UINT64_C(1) << 24)
+#define CONTACTFPGA__EPOCH_US (UINT64_C(1) << 22)
+#define CONTACTFPGA__BEGUN_US (INT64_C(1) << 21)
+#define CONTACTFPGA__FINE CONTACTFPGA_REASONS
+
+/* CRC-16/MCRF4XX: x^16 + x^12 + x^5 + 1, lowest bit first. */
+static inline uint16_t contactfpga__crc16(uint16_t crc, const uint8_t *data, size_t length) {
+    for (size_t i = 0; i < length; i++) {
+        crc ^= data[i];
+        for (int bit = 0; bit < 8; bit++) crc = (uint16_t)(crc & 1 ? crc >> 1 ^ 0x8408 : crc >> 1);
+    }
+    return crc;
+}
+
+static inline uint32_t contactfpga__crc32(uint32_t crc, const uint8_t *data, size_t length) {
+    crc = ~crc;
+    for (size_t i = 0; i < length; i++) {
+        crc ^= data[i];
+        for (int bit = 0; bit < 8; bit++) crc = crc & 1 ? crc >> 1 ^ UINT32_C(0xEDB88320) : crc >> 1;
+    }
+    return ~crc;
+}
+
+static inline void contactfpga__check_bytes(uint16_t crc, uint8_t *out) {
+    out[0] = (uint8_t)(0x80 | (crc & 0x7F));
+    out[1] = (uint8_t)(0x80 | (crc >> 7 & 0x7F));
+    out[2] = (uint8_t)(0x80 | crc >> 14);
+}
+
+/* ``width`` bits, at most 32, from bit ``offset`` on, lowest first. */
+static inline uint32_t contactfpga__bits(const uint8_t *data, size_t offset, unsigned width) {
+    uint32_t value = 0;
+    for (unsigned bit = 0; bit < width; bit++)
+        value |= (uint32_t)(data[(offset + bit) / 8] >> (offset + bit) % 8 & 1) << bit;
+    return value;
+}
+
+/* A number in digits of seven bits. */
+static inline uint64_t contactfpga__number(const uint8_t *digits, unsigned count) {
+    uint64_t value = 0;
+    for (unsigned place = 0; place < count; place++) value |= (uint64_t)(digits[place] & 0x7F) << 7 * place;
+    return value;
+}
+
+static inline uint32_t contactfpga__word(const uint8_t *data) {
+    return contactfpga__bits(data, 0, 32);
+}
+
+static inline double contactfpga__double(const uint8_t *data) {
+    uint64_t word = contactfpga__word(data) | (uint64_t)contactfpga__word(data + 4) << 32;
+    double value;
+    memcpy(&value, &word, sizeof value);
+    return value;
+}
+
+/* The least bits that hold 0 to ``largest``, one at least. */
+static inline uint8_t contactfpga__width(uint32_t largest) {
+    uint8_t width = 1;
+    while (largest >>= 1) width++;
+    return width;
+}
+
+static inline uint8_t contactfpga__bytes(unsigned bits) {
+    return (uint8_t)((bits + 7) / 8);
+}
+
+static inline uint16_t contactfpga__max_zones(const contactfpga_hello *hello) {
+    if (hello->connectivity == 8) return (uint16_t)((hello->rows + 1) / 2 * ((hello->columns + 1) / 2));
+    return (uint16_t)((hello->rows * hello->columns + 1) / 2);
+}
+
+static inline contactfpga_widths contactfpga__widths(const contactfpga_hello *hello) {
+    contactfpga_widths w;
+    uint32_t rows = hello->rows, columns = hello->columns;
+    w.cells = (uint16_t)(rows * columns);
+    w.max_zones = contactfpga__max_zones(hello);
+    w.area = contactfpga__width(w.cells);
+    w.sum_x = contactfpga__width(rows * (columns * (columns - 1) / 2));
+    w.sum_y = contactfpga__width(columns * (rows * (rows - 1) / 2));
+    w.zones = contactfpga__width(w.max_zones);
+    w.record[0] = w.area, w.record[1] = w.sum_x, w.record[2] = w.sum_y;
+    if (hello->report == CONTACTFPGA_BARYCENTER) {
+        w.record[0] = contactfpga__width(w.cells - 1u);
+        w.record[1] = contactfpga__width((columns - 1) << hello->fraction_bits);
+        w.record[2] = contactfpga__width((rows - 1) << hello->fraction_bits);
+    }
+    w.record_bytes = contactfpga__bytes((unsigned)w.record[0] + w.record[1] + w.record[2]);
+    w.item_bytes = hello->report == CONTACTFPGA_CELLS ? contactfpga__bytes(columns) : w.record_bytes;
+    w.max_items = hello->report == CONTACTFPGA_CELLS ? hello->rows : hello->zone_capacity;
+    unsigned counted = 24u + 8 + 3 + w.area + w.zones;
+    w.trailer_bytes = (uint8_t)(contactfpga__bytes(counted + 4) + 1);
+    w.overwritten = (uint8_t)(8u * (w.trailer_bytes - 1u) - counted);
+    return w;
+}
+
+/* ---- hellos ---- */
+
+static inline bool contactfpga__is_utf8(const uint8_t *text, size_t length) {
+    for (size_t i = 0; i < length;) {
+        uint8_t lead = text[i++];
+        if (lead < 0x80) continue;
+        int more = lead >= 0xC2 && lead < 0xE0 ? 1 : lead >= 0xE0 && lead < 0xF0 ? 2 : lead >= 0xF0 && lead < 0xF5 ? 3 : 0;
+        if (!more || i + (size_t)more > length) return false;
+        uint8_t low = lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80, high = lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
+        if (text[i] < low || text[i] > high) return false;
+        for (i++; --more; i++)
+            if (text[i] < 0x80 || text[i] > 0xBF) return false;
+    }
+    return true;
+}
+
+static inline bool contactfpga__is_length(double mm) {
+    return mm > 0 && mm <= 1.7976931348623157e308;
+}
+
+/* Whether frames of such a sheet can be read. */
+static inline bool contactfpga__may_be(const contactfpga_hello *hello) {
+    uint8_t most_bits = hello->report == CONTACTFPGA_BARYCENTER ? 8 : 0;
+    return contactfpga__is_length(hello->pitch_x_mm) && contactfpga__is_length(hello->pitch_y_mm)
+        && (hello->plane || contactfpga__is_length(hello->radius_mm)) && hello->rows >= 1 && hello->columns >= 1
+        && hello->rows <= CONTACTFPGA_MAX_LINES && hello->columns <= CONTACTFPGA_MAX_LINES
+        && hello->fraction_bits <= most_bits && (hello->connectivity == 4 || hello->connectivity == 8)
+        && hello->zone_capacity >= 1 && hello->zone_capacity <= contactfpga__max_zones(hello) && hello->clock_hz
+        && hello->baud;
+}
+
+/* The least bytes of a field. */
+static inline uint8_t contactfpga__least(uint8_t kind) {
+    switch (kind) {
+    case CONTACTFPGA__SHEET: return 10;
+    case CONTACTFPGA__STATE: return CONTACTFPGA__STATE_DIGITS;
+    case CONTACTFPGA__PITCH: return 16;
+    case CONTACTFPGA__RADIUS:
+    case CONTACTFPGA__FINGERPRINT:
+    case CONTACTFPGA__RATES: return 8;
+    case CONTACTFPGA__CHECK: return 4;
+    default: return 0;
+    }
+}
+
+enum { CONTACTFPGA__ODD_SHEET = 16, CONTACTFPGA__ODD_STATE = 17, CONTACTFPGA__ODD_NAME = 18 };
+
+/* Keep a field's content; what is wrong with it counts only once the hello is whole. */
+static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t kind, const uint8_t *value, uint8_t length) {
+    contactfpga_hello *hello = &reader->draft;
+    uint32_t odd = 0;
+    switch (kind) {
+    case CONTACTFPGA__SHEET:
+        hello->rows = value[0], hello->columns = value[1], hello->connectivity = value[2], hello->report = value[3];
+        hello->fraction_bits = value[4], hello->on_change = value[5] == 1;
+        hello->zone_capacity = (uint16_t)(value[6] | value[7] << 8), hello->ghosts = value[8] == 1;
+        odd = (uint32_t)(value[3] > 2 || value[5] > 1 || value[8] > 1) << CONTACTFPGA__ODD_SHEET;
+        break;
+    case CONTACTFPGA__STATE:
+        reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_STATE);
+        for (int i = 0; i < CONTACTFPGA__STATE_DIGITS; i++)
+            if (!(value[i] & 0x80)) odd = UINT32_C(1) << CONTACTFPGA__ODD_STATE;
+        hello->sent = contactfpga__number(value, 7);
+        hello->epoch = (uint32_t)contactfpga__number(value + 7, 4);
+        hello->heard = (uint32_t)contactfpga__number(value + 11, 3);
+        hello->stuck = value[14] & 0x7F;
+        break;
+    case CONTACTFPGA__PITCH:
+        hello->pitch_x_mm = contactfpga__double(value), hello->pitch_y_mm = contactfpga__double(value + 8);
+        break;
+    case CONTACTFPGA__RADIUS: hello->radius_mm = contactfpga__double(value), hello->plane = false; break;
+    case CONTACTFPGA__FINGERPRINT: memcpy(hello->fingerprint, value, 8); break;
+    case CONTACTFPGA__RATES:
+        hello->clock_hz = contactfpga__word(value), hello->baud = contactfpga__word(value + 4);
+        break;
+    case CONTACTFPGA__NAME: {
+        size_t kept = length < sizeof hello->name - 1 ? length : sizeof hello->name - 1;
+        reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_NAME);
+        if (!contactfpga__is_utf8(value, length)) odd = UINT32_C(1) << CONTACTFPGA__ODD_NAME;
+        memset(hello->name, 0, sizeof hello->name);
+        memcpy(hello->name, value, kept);
+        break;
+    }
+    default: return;
+    }
+    reader->draft_fields |= UINT32_C(1) << kind | odd;
+}
+
+/* The hello is whole: is it one? */
+static inline int contactfpga__finish_hello(contactfpga_reader *reader, const uint8_t *check) {
+    uint32_t mandatory = 1u << CONTACTFPGA__SHEET | 1u << CONTACTFPGA__STATE | 1u << CONTACTFPGA__PITCH
+        | 1u << CONTACTFPGA__FINGERPRINT | 1u << CONTACTFPGA__RATES;
+    uint32_t fields = reader->draft_fields;
+    if (contactfpga__word(check) != reader->draft_crc) return CONTACTFPGA_CRC;
+    if ((fields & mandatory) != mandatory || fields >> CONTACTFPGA__ODD_SHEET || !contactfpga__may_be(&reader->draft))
+        return CONTACTFPGA_CONTENT;
+    return CONTACTFPGA__FINE;
+}
+
+/* An unsealed packet of kind hello, without its last byte; ``whole``: it completes one. */
+static inline int contactfpga__read_hello(contactfpga_reader *reader, const uint8_t *data, size_t length, bool *whole) {
+    *whole = false;
+    while (length) {
+        uint8_t kind = data[0];
+        if (length < 2 || length < 2u + data[1]) return CONTACTFPGA_LENGTH;
+        uint8_t size = data[1];
+        if (kind == CONTACTFPGA__SHEET) {
+            memset(&reader->draft, 0, sizeof reader->draft);
+            reader->draft.plane = true;
+            reader->draft_crc = reader->draft_bytes = 0;
+            reader->draft_fields = 1; /* a hello has begun */
+        } else if (!reader->draft_fields) {
+            return CONTACTFPGA_CONTENT;
+        }
+        if (size < contactfpga__least(kind)) return CONTACTFPGA_CONTENT;
+        if (kind == CONTACTFPGA__CHECK) {
+            *whole = true;
+            return length > 2u + size ? CONTACTFPGA_LENGTH : contactfpga__finish_hello(reader, data + 2);
+        }
+        if (kind != CONTACTFPGA__STATE) {
+            reader->draft_crc = contactfpga__crc32(reader->draft_crc, data, 2u + size);
+            reader->draft_bytes = (uint16_t)(reader->draft_bytes + 2 + size);
+        }
+        if (reader->draft_bytes > CONTACTFPGA__LONGEST_HELLO) return CONTACTFPGA_CONTENT;
+        contactfpga__take_field(reader, kind, data + 2, size);
+        data += 2 + size, length -= 2u + size;
+    }
+    return CONTACTFPGA__FINE;
+}
+
+static inline bool contactfpga__same_sheet(const contactfpga_hello *one, const contactfpga_hello *other) {
+    return one->rows == other->rows && one->columns == other->columns && one->connectivity == other->connectivity
+        && one->report == other->report && one->fraction_bits == other->fraction_bits
+        && one->zone_capacity == other->zone_capacity && one->pitch_x_mm == other->pitch_x_mm
+        && one->pitch_y_mm == other->pitch_y_mm && one->plane == other->plane
+        && (one->plane || one->radius_mm == other->radius_mm) && one->ghosts == other->ghosts
+        && !memcmp(one->fingerprint, other->fingerprint, sizeof one->fingerprint);
+}
+
+/* ---- how many frames there were, and when ---- */
+
+static inline void contactfpga__restart_time(contactfpga_reader *reader) {
+    reader->met = reader->known = reader->forgot = reader->timed = reader->before = false;
+    reader->waiting = 0;
+    reader->next = 0;
+    reader->last_us = -1;
+    reader->epoch = 0;
+}
+
+/* A hello tells how many frames were sent and which multiple of 2^22 us it is. */
+static inline void contactfpga__take_hello(contactfpga_reader *reader) {
+    const contactfpga_hello *hello = &reader->draft;
+    reader->stats.hellos++;
+    if (reader->greeted && !contactfpga__same_sheet(&reader->hello, hello)) {
+        reader->stats.skin_changes++;
+        contactfpga__restart_time(reader);
+    }
+    if (reader->met) {
+        uint64_t first = reader->next;
+        bool forgot = reader->forgot && !contactfpga_may_number(hello->heard);
+        int64_t end_us = (int64_t)((hello->epoch + UINT64_C(1)) * CONTACTFPGA__EPOCH_US);
+        if (forgot || hello->sent < reader->next || end_us <= reader->last_us - CONTACTFPGA__BEGUN_US) {
+            reader->stats.restarts++;
+            reader->before = false;
+            reader->last_us = -1;
+            first = 0;
+        }
+        if (hello->sent > first + reader->waiting)
+            reader->stats.lost += (uint32_t)(hello->sent - first - reader->waiting);
+    }
+    reader->met = reader->known = reader->greeted = true;
+    reader->next = hello->sent, reader->epoch = hello->epoch;
+    reader->timed = reader->forgot = false;
+    reader->waiting = 0;
+    reader->hello = *hello;
+    reader->widths = contactfpga__widths(hello);
+}
+
+static inline uint8_t contactfpga__gap(const contactfpga_reader *reader, uint8_t sequence) {
+    return (uint8_t)(sequence - (uint8_t)reader->next);
+}
+
+/* The time since power-up of a frame that carries these; false where it is not known. */
+static inline bool contactfpga__explain(
+    contactfpga_reader *reader, uint32_t time_us, uint8_t sequence, uint8_t heard, uint64_t *full_us) {
+    if (!reader->known) return false;
+    if (reader->before) {
+        if (reader->before_heard && !heard) {
+            reader->forgot = true; /* only a restart forgets a request */
+            return false;
+        }
+        if (contactfpga__gap(reader, sequence) && time_us < CONTACTFPGA__BEGUN_US && heard != reader->before_heard)
+            return false;
+    }
+    if (!reader->timed) { /* from one epoch before the hello's to three after it */
+        int64_t first_us = ((int64_t)reader->epoch - 1) * (int64_t)CONTACTFPGA__EPOCH_US;
+        uint64_t into = ((uint64_t)time_us - (uint64_t)first_us) & (CONTACTFPGA__WRAP_US - 1);
+        int64_t full = first_us + (int64_t)into;
+        *full_us = (uint64_t)full;
+        return full > reader->last_us;
+    }
+    uint64_t step = ((uint64_t)time_us - reader->time_us) & (CONTACTFPGA__WRAP_US - 1);
+    *full_us = reader->time_us + step;
+    return step > 0 && step <= CONTACTFPGA__EPOCH_US;
+}
+
+static inline bool contactfpga__take_time(contactfpga_reader *reader, contactfpga_frame *frame, uint32_t time_us) {
+    if (!contactfpga__explain(reader, time_us, frame->sequence, frame->heard, &frame->time_us)) {
+        reader->known = false;
+        reader->waiting++;
+        reader->stats.unexplained++;
+        return false;
+    }
+    uint8_t gap = contactfpga__gap(reader, frame->sequence);
+    reader->stats.frames++;
+    reader->stats.lost += gap;
+    if (reader->before)
+        reader->stats.overwritten +=
+            (frame->overwritten - reader->before_overwritten) & ((UINT32_C(1) << reader->widths.overwritten) - 1);
+    reader->next += gap + 1u;
+    reader->time_us = frame->time_us;
+    reader->last_us = (int64_t)frame->time_us;
+    reader->timed = reader->before = true;
+    reader->before_heard = frame->heard;
+    reader->before_overwritten = frame->overwritten;
+    return true;
+}
+
+/* ---- frames ---- */
+
+static inline bool contactfpga__read_zone(const contactfpga_reader *reader, uint16_t index, contactfpga_zone *zone) {
+    const contactfpga_widths *w = &reader->widths;
+    const uint8_t *record = reader->packet + (size_t)index * w->record_bytes;
+    unsigned used = (unsigned)w->record[0] + w->record[1] + w->record[2];
+    uint32_t first = contactfpga__bits(record, w->record[0], w->record[1]);
+    uint32_t second = contactfpga__bits(record, (size_t)w->record[0] + w->record[1], w->record[2]);
+    bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
+    zone->area = contactfpga__bits(record, 0, w->record[0]);
+    if (divided && !zone->area && w->cells == 1u << w->record[0]) zone->area = w->cells;
+    zone->sum_x = divided ? 0 : first, zone->sum_y = divided ? 0 : second;
+    zone->x = divided ? first : 0, zone->y = divided ? second : 0;
+    return !contactfpga__bits(record, used, 8u * w->record_bytes - used);
+}
+
+/* Zones that cannot be, or that do not add up; only asked where the board flags no mismatch. */
+static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const contactfpga_frame *frame) {
+    const contactfpga_hello *hello = &reader->hello;
+    uint32_t most_x = hello->columns - 1u, most_y = hello->rows - 1u, carried = 0;
+    for (uint16_t i = 0; i < frame->items; i++) {
+        if (hello->report == CONTACTFPGA_CELLS) {
+            for (uint8_t column = 0; column < hello->columns; column++)
+                carried += contactfpga__bits(reader->packet + (size_t)i * reader->widths.item_bytes, column, 1);
+            continue;
+        }
+        contactfpga_zone zone;
+        contactfpga__read_zone(reader, i, &zone);
+        bool inside = zone.sum_x <= zone.area * most_x && zone.sum_y <= zone.area * most_y
+            && zone.x <= most_x << hello->fraction_bits && zone.y <= most_y << hello->fraction_bits;
+        if (!zone.area || !inside) return false;
+        carried += zone.area;
+    }
+    return carried == frame->cells
+        || (hello->report != CONTACTFPGA_CELLS && frame->flags & CONTACTFPGA_OVERFLOW && carried < frame->cells);
+}
+
+/* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros. */
+static inline bool contactfpga__filled_up(const contactfpga_reader *reader, uint16_t items) {
+    for (uint16_t i = 0; i < items; i++) {
+        contactfpga_zone zone;
+        unsigned columns = reader->hello.columns, bytes = reader->widths.item_bytes;
+        const uint8_t *row = reader->packet + (size_t)i * bytes;
+        if (reader->hello.report == CONTACTFPGA_CELLS ? contactfpga__bits(row, columns, 8 * bytes - columns)
+                                                      : !contactfpga__read_zone(reader, i, &zone))
+            return false;
+    }
+    return true;
+}
+
+/* An unsealed packet, ``length`` plain bytes in reader->packet, of a kind that frames have. */
+static inline int contactfpga__read_frame(
+    contactfpga_reader *reader, size_t length, contactfpga_frame *frame, uint32_t *time_us) {
+    const contactfpga_widths *w = &reader->widths;
+    uint8_t last = reader->packet[length - 1];
+    if (last >> 4 != CONTACTFPGA__KIND_ZONES + reader->hello.report) return CONTACTFPGA_KIND;
+    if (length < w->trailer_bytes || (length - w->trailer_bytes) % w->item_bytes) return CONTACTFPGA_LENGTH;
+    size_t body = length - w->trailer_bytes;
+    const uint8_t *trailer = reader->packet + body;
+    bool cells = reader->hello.report == CONTACTFPGA_CELLS;
+    *time_us = contactfpga__bits(trailer, 0, 24);
+    frame->sequence = trailer[3];
+    frame->heard = trailer[4] & 7;
+    frame->cells = (uint16_t)contactfpga__bits(trailer, 35, w->area);
+    frame->zones = (uint16_t)contactfpga__bits(trailer, 35u + w->area, w->zones);
+    frame->overwritten = contactfpga__bits(trailer, 35u + w->area + w->zones, w->overwritten);
+    frame->flags = last & 7;
+    uint16_t expected = cells ? reader->hello.rows : frame->zones;
+    uint16_t carried = expected < w->max_items ? expected : w->max_items;
+    bool overflow = frame->flags & CONTACTFPGA_OVERFLOW;
+    if (body / w->item_bytes != carried || overflow != (carried < expected)) return CONTACTFPGA_LENGTH;
+    frame->items = carried;
+    if (frame->zones > (cells ? 0 : w->max_zones) || !contactfpga__filled_up(reader, carried)) return CONTACTFPGA_CONTENT;
+    if (!(frame->flags & CONTACTFPGA_MISMATCH) && (frame->cells > w->cells || !contactfpga__adds_up(reader, frame)))
+        return CONTACTFPGA_CONTENT;
+    return CONTACTFPGA__FINE;
+}
+
+/* ---- packets ---- */
+
+/* Undo the stuffing in place; returns the plain bytes, or 0 where the blocks do not fit the length. */
+static inline size_t contactfpga__unstuff(uint8_t *data, size_t length) {
+    size_t from = 0, to = 0;
+    while (from < length) {
+        uint8_t code = data[from];
+        size_t end = from + code;
+        if (!code || end > length) return 0;
+        for (from++; from < end;) data[to++] = data[from++];
+        if (code < 255 && from < length) data[to++] = 0;
+    }
+    return to;
+}
+
+/* Whether the check of a packet with this last byte covers nothing but its stuffed bytes. */
+static inline bool contactfpga__is_bare(uint8_t last) {
+    return last >> 4 == CONTACTFPGA__KIND_HELLO || last >> 4 == 2 || last >> 4 == 3;
+}
+
+static inline int contactfpga__take_packet(contactfpga_reader *reader, size_t length, contactfpga_event *event) {
+    uint8_t *data = reader->packet, check[CONTACTFPGA__CHECK_BYTES];
+    if (length < CONTACTFPGA__CHECK_BYTES + 2) return CONTACTFPGA_FRAMING;
+    const uint8_t *sent = data + length - CONTACTFPGA__CHECK_BYTES;
+    if (!reader->greeted && sent[0] & sent[1] & sent[2] & 0x80 && sent[2] < 0x84
+        && !contactfpga__is_bare(sent[-1])) {
+        reader->stats.before_hello++;
+        return CONTACTFPGA__FINE;
+    }
+    uint8_t last = sent[-1];
+    uint16_t crc = 0xFFFF;
+    if (reader->greeted && !contactfpga__is_bare(last)) crc = contactfpga__crc16(crc, reader->hello.fingerprint, 2);
+    contactfpga__check_bytes(contactfpga__crc16(crc, data, length - CONTACTFPGA__CHECK_BYTES), check);
+    if (memcmp(check, sent, sizeof check)) return CONTACTFPGA_CRC;
+    length = contactfpga__unstuff(data, length - CONTACTFPGA__CHECK_BYTES);
+    if (!length || data[length - 1] != last) return CONTACTFPGA_FRAMING;
+    uint8_t kind = last >> 4;
+    if (kind == 2 || kind == 3) { /* protocol 1 */
+        reader->stats.foreign_version++;
+        if ((last & 0xF8) == 0x20 && length == 26) {
+            reader->greeted = false;
+            contactfpga__restart_time(reader);
+        }
+        return CONTACTFPGA_REASONS + 1;
+    }
+    if (kind == CONTACTFPGA__KIND_HELLO) {
+        bool whole;
+        int found = contactfpga__read_hello(reader, data, length - 1, &whole);
+        if (whole || found != CONTACTFPGA__FINE) reader->draft_fields = 0;
+        if (found != CONTACTFPGA__FINE || !whole) return found;
+        contactfpga__take_hello(reader);
+        *event = CONTACTFPGA_HELLO;
+        return found;
+    }
+    if (kind < CONTACTFPGA__KIND_ZONES || kind > CONTACTFPGA__KIND_ZONES + 2) {
+        reader->stats.unknown_kinds++;
+        return CONTACTFPGA__FINE;
+    }
+    contactfpga_frame frame;
+    uint32_t time_us;
+    int found = contactfpga__read_frame(reader, length, &frame, &time_us);
+    if (found == CONTACTFPGA__FINE && contactfpga__take_time(reader, &frame, time_us)) {
+        reader->frame = frame;
+        *event = CONTACTFPGA_FRAME;
+    }
+    return found;
+}
+
+static inline void contactfpga__refuse(contactfpga_reader *reader, int reason) {
+    if (reader->begun) { /* the first piece is cut off by when we began to listen; it is no damage */
+        reader->stats.damaged[reason]++;
+        reader->damage = true;
+    }
+    reader->begun = true;
+}
+
+static inline contactfpga_event contactfpga_push(contactfpga_reader *reader, uint8_t byte) {
+    contactfpga_event event = CONTACTFPGA_NOTHING;
+    reader->stats.bytes++;
+    reader->frame.items = 0; /* its bytes are about to be overwritten */
+    if (byte) {
+        if (reader->length == CONTACTFPGA_PACKET_BYTES) {
+            contactfpga__refuse(reader, CONTACTFPGA_NOISE);
+            reader->length = 0;
+            return event;
+        }
+        reader->packet[reader->length++] = byte;
+        return event;
+    }
+    size_t length = reader->length;
+    reader->length = 0;
+    if (!length) return event;
+    int found = contactfpga__take_packet(reader, length, &event);
+    if (found < CONTACTFPGA__FINE) {
+        contactfpga__refuse(reader, found);
+    } else if (found == CONTACTFPGA__FINE) {
+        reader->begun = true;
+        reader->stats.resynchronized += reader->damage;
+        reader->damage = false;
+    }
+    return event;
+}
+
+static inline void contactfpga_init(contactfpga_reader *reader) {
+    memset(reader, 0, sizeof *reader);
+    reader->last_us = -1;
+}
+
+static inline void contactfpga_doubt(contactfpga_reader *reader) {
+    reader->known = false;
+}
+
+static inline bool contactfpga_zone_at(const contactfpga_reader *reader, uint16_t index, contactfpga_zone *zone) {
+    if (index >= reader->frame.items || reader->hello.report == CONTACTFPGA_CELLS) return false;
+    contactfpga__read_zone(reader, index, zone);
+    return true;
+}
+
+static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t row, uint8_t column) {
+    if (reader->hello.report != CONTACTFPGA_CELLS || row >= reader->frame.items || column >= reader->hello.columns)
+        return false;
+    return contactfpga__bits(reader->packet + (size_t)row * reader->widths.item_bytes, column, 1);
+}
+
+static inline void contactfpga_barycenter_mm(
+    const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm) {
+    bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
+    double steps = divided ? (double)(1u << reader->hello.fraction_bits) : (double)zone->area;
+    *x_mm = (divided ? zone->x : zone->sum_x) / steps * reader->hello.pitch_x_mm;
+    *y_mm = (divided ? zone->y : zone->sum_y) / steps * reader->hello.pitch_y_mm;
+}
+
+static inline bool contactfpga_may_number(uint32_t number) {
+    return number < UINT32_C(1) << 21 && number & 0x7F && number >> 7 & 0x7F && number >> 14 & 0x7F && number % 8;
+}
+
+static inline bool contactfpga_pulsed(const contactfpga_hello *hello) {
+    return (uint64_t)hello->clock_hz + hello->baud / 2 < UINT64_C(4) * hello->baud;
+}
+
+static inline size_t contactfpga_request(uint32_t number, bool hello, bool pulsed, uint8_t *out) {
+    uint8_t plain[CONTACTFPGA_REQUEST_BYTES] = {0, 5};
+    size_t length = 0;
+    if (!contactfpga_may_number(number)) return 0;
+    for (int place = 0; place < 3; place++) plain[2 + place] = (uint8_t)(0x80 | (number >> 7 * place & 0x7F));
+    plain[5] = (uint8_t)(CONTACTFPGA__KIND_REQUEST << 4 | hello);
+    contactfpga__check_bytes(contactfpga__crc16(0xFFFF, plain + 1, 5), plain + 6);
+    if (!pulsed) {
+        memcpy(out, plain, sizeof plain);
+        return sizeof plain;
+    }
+    for (size_t i = 0; i < sizeof plain; i++) {
+        if (!plain[i]) out[length++] = 0xF0;
+        for (int bit = 0; plain[i] && bit < 8; bit++) out[length++] = plain[i] >> bit & 1 ? 0xFF : 0x00;
+    }
+    return length;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,54 @@
+/* Reads what a board sent from standard input and writes what it says, an event per line, and the counters at the end.
+ *
+ *     cc -o decode decode.c && ./decode < recording.bin
+ */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "contactfpga.h"
+
+static contactfpga_reader reader;
+
+static void show_hello(const contactfpga_hello *hello) {
+    printf("hello %ux%u %u %u %u %u %u %u ", hello->rows, hello->columns, hello->connectivity,
+        hello->report, hello->fraction_bits, hello->on_change, hello->zone_capacity, hello->ghosts);
+    printf("%.17g %.17g %.17g ", hello->pitch_x_mm, hello->pitch_y_mm, hello->plane ? 0.0 : hello->radius_mm);
+    for (int i = 0; i < 8; i++) printf("%02x", hello->fingerprint[i]);
+    printf(" %" PRIu32 " %" PRIu32 " %" PRIu64 " %" PRIu32 " %" PRIu32 " %u %s\n", hello->clock_hz, hello->baud,
+        hello->sent, hello->epoch, hello->heard, hello->stuck, hello->name);
+}
+
+static void show_frame(const contactfpga_frame *frame) {
+    contactfpga_zone zone;
+    printf("frame %" PRIu64 " %u %u %u %u %u %" PRIu32, frame->time_us, frame->sequence, frame->flags, frame->heard,
+        frame->cells, frame->zones, frame->overwritten);
+    for (uint16_t i = 0; contactfpga_zone_at(&reader, i, &zone); i++)
+        printf(" %" PRIu32 ",%" PRIu32 ",%" PRIu32, zone.area, zone.sum_x + zone.x, zone.sum_y + zone.y);
+    for (uint8_t row = 0; row < reader.hello.rows; row++)
+        for (uint8_t column = 0; column < reader.hello.columns; column++)
+            if (contactfpga_pressed(&reader, row, column)) printf(" %u:%u", row, column);
+    printf("\n");
+}
+
+int main(void) {
+    const contactfpga_stats *stats = &reader.stats;
+    int byte;
+    contactfpga_init(&reader);
+    while ((byte = getchar()) != EOF) {
+        contactfpga_event event = contactfpga_push(&reader, (uint8_t)byte);
+        if (event == CONTACTFPGA_HELLO) show_hello(&reader.hello);
+        if (event == CONTACTFPGA_FRAME) show_frame(&reader.frame);
+    }
+    printf("stats");
+    printf(" frames=%" PRIu32 " lost=%" PRIu32 " unexplained=%" PRIu32 " overwritten=%" PRIu32, stats->frames,
+        stats->lost, stats->unexplained, stats->overwritten);
+    printf(" framing=%" PRIu32 " crc=%" PRIu32 " length=%" PRIu32 " kind=%" PRIu32 " content=%" PRIu32 " noise=%" PRIu32,
+        stats->damaged[CONTACTFPGA_FRAMING], stats->damaged[CONTACTFPGA_CRC], stats->damaged[CONTACTFPGA_LENGTH],
+        stats->damaged[CONTACTFPGA_KIND], stats->damaged[CONTACTFPGA_CONTENT], stats->damaged[CONTACTFPGA_NOISE]);
+    printf(" resynchronized=%" PRIu32 " hellos=%" PRIu32 " before_hello=%" PRIu32 " unknown_kinds=%" PRIu32,
+        stats->resynchronized, stats->hellos, stats->before_hello, stats->unknown_kinds);
+    printf(" foreign_version=%" PRIu32 " skin_changes=%" PRIu32 " restarts=%" PRIu32
+           " bytes=%" PRIu32 "\n",
+        stats->foreign_version, stats->skin_changes, stats->restarts, stats->bytes);
+    return 0;
+}

@@ -1,0 +1,347 @@
+"""The C header reads the same packets as the Python driver, to the last counter, from whole and from corrupted streams."""
+
+import functools
+import itertools
+import random
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from frames import moments
+from model_board import ModelBoard
+from sample import sample
+from wire import digits, last_byte, old_frame, old_hello, request
+
+from contactfpga import Skin
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.skin.widths import LONGEST_PACKET
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.protocol import FLAGS, encode_request, may_number
+from contactfpga_sim.golden.uart import pulsed
+
+FOLDER = Path(__file__).parents[2] / "c"
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-O1"]
+SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+COMPILERS = {
+    "gcc": ["gcc", "-std=c99", *WARNINGS, *SANITIZED],
+    "clang": ["clang", "-std=c99", *WARNINGS],
+    "g++": ["g++", "-x", "c++", "-std=c++11", *WARNINGS],
+    "clang++": ["clang++", "-x", "c++", "-std=c++11", *WARNINGS],
+}
+SKINS = [
+    Skin(),
+    Skin(rows=1, columns=1, connectivity=4),
+    Skin(rows=3, columns=5, report="cells", name="Zürich 7"),
+    Skin(rows=7, columns=13, report="barycenter", barycenter_bits=3, send="on_change"),
+    Skin(rows=64, columns=64, zone_capacity=5, settle_us=12.0, surface="cylinder", radius_mm=400.0),
+    Skin(rows=16, columns=16, report="barycenter", connectivity=4, zone_capacity=3),
+    Skin(rows=4, columns=9, report="cells", diodes="none"),
+]
+
+
+@pytest.fixture(scope="session", params=COMPILERS)
+def decoder(request, tmp_path_factory):
+    """The example program, compiled."""
+    command = COMPILERS[request.param]
+    if not shutil.which(command[0]):
+        pytest.skip(f"{command[0]} is not installed")
+    program = tmp_path_factory.mktemp("c") / "decode"
+    subprocess.run([*command, "-o", program, FOLDER / "decode.c"], check=True, timeout=120)
+    return program
+
+
+def by_c(decoder, data: bytes) -> list[str]:
+    done = subprocess.run([decoder], input=data, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    return done.stdout.decode().splitlines()
+
+
+def by_python(data: bytes) -> list[str]:
+    talk = Conversation("recording", live=False)
+    lines = []
+    for piece in pieces(data):
+        for event in talk.receive(piece, 0.0):
+            if isinstance(event, Arrival):
+                lines.append(frame_line(event))
+            elif isinstance(event, Hello) or talk.hello is not None:  # that of another Skin comes as an error
+                lines.append(hello_line(talk.hello))
+    stats = talk.stats.to_dict()
+    stats |= {reason: stats["damaged"].get(reason, 0) for reason in REASONS}
+    return [*lines, "stats " + " ".join(f"{name}={stats[name]}" for name in COUNTED)]
+
+
+REASONS = ("framing", "crc", "length", "kind", "content", "noise")
+COUNTED = (
+    *("frames", "lost", "unexplained", "overwritten", *REASONS, "resynchronized", "hellos", "before_hello"),
+    *("unknown_kinds", "foreign_version", "skin_changes", "restarts", "bytes"),
+)
+
+
+def pieces(data: bytes):
+    """Packet by packet, and noise byte by byte where it is too long for one: only then it matters how bytes come."""
+    for piece in data.split(b"\0")[:-1]:
+        if len(piece) > LONGEST_PACKET:
+            yield from (bytes([byte]) for byte in piece + b"\0")
+        else:
+            yield piece + b"\0"
+    yield data.split(b"\0")[-1]
+
+
+def hello_line(hello: Hello) -> str:
+    sheet = hello.sheet
+    report = ["moments", "cells", "barycenter"].index(sheet.report)
+    return (
+        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity} {report} {sheet.barycenter_bits} "
+        f"{int(hello.send == 'on_change')} {sheet.zone_capacity} {int(sheet.ghosts)} "
+        f"{sheet.pitch_x_mm:.17g} {sheet.pitch_y_mm:.17g} {sheet.radius_mm or 0:.17g} {hello.fingerprint.hex()} "
+        f"{hello.clock_hz} {hello.baud} {hello.sent} {hello.epoch} {hello.heard} {hello.stuck} {hello.name}"
+    )
+
+
+def frame_line(arrival: Arrival) -> str:
+    frame = arrival.zones.frame
+    flags = sum(1 << bit for bit, name in enumerate(FLAGS) if name in frame.flags)
+    items = frame.moments if frame.barycenters is None else frame.barycenters
+    words = [",".join(map(str, row)) for row in items.tolist()]
+    if frame.bitmap is not None:
+        words = [f"{row}:{column}" for row, column in zip(*frame.bitmap.nonzero(), strict=True)]
+    told = (frame.sequence, flags, frame.heard, frame.cells, frame.zones, frame.overwritten)
+    return " ".join(map(str, ("frame", arrival.zones.time_us, *told, *words)))
+
+
+def zones(rng, skin) -> list:
+    """Of zones that could be on the sheet."""
+    count = rng.choice([0, 1, 1, 2, min(skin.zone_capacity, 7)])
+    if skin.report == "barycenter":
+        most = skin.barycenter_bits
+        x, y = (lines - 1 << most for lines in (skin.columns, skin.rows))
+        return [(rng.randint(1, 9), rng.randint(0, x), rng.randint(0, y)) for _ in range(min(count, skin.zone_capacity))]
+    cells = skin.rows * skin.columns
+    return [row for row in moments(rng, skin, min(count, skin.zone_capacity)) if row[0] <= cells]
+
+
+class History:
+    """What a board may send in its life, and what becomes of it on the line."""
+
+    def __init__(self, seed: int):
+        self.rng = random.Random(seed)
+        self.skin = self.rng.choice(SKINS)
+        self.board = ModelBoard(self.skin)
+        self.numbers = itertools.cycle(number for number in range(129 * 128 + 1, 129 * 128 + 900) if may_number(number))
+
+    def packet(self) -> bytes:
+        rng, board = self.rng, self.board
+        kind = rng.random()
+        if kind < 0.08:
+            return board.hello()
+        if kind < 0.10:
+            board.power_up()
+            board.time_us = rng.randrange(1 << 23)
+            return board.hello() if rng.random() < 0.8 else b""
+        if kind < 0.11:
+            self.skin = rng.choice(SKINS)
+            self.board = ModelBoard(self.skin)
+            return self.board.hello()
+        if kind < 0.13:
+            return old_hello() if rng.random() < 0.3 else old_frame()
+        if kind < 0.15:
+            return board.wire.seal(digits(rng.getrandbits(20), 4) + last_byte(rng.choice([8, 9, 10, 12, 15])))
+        if kind < 0.17:
+            board.time_us += rng.choice([1 << 20, 1 << 22, 1 << 23, 1 << 24, 1 << 25])
+        if kind < 0.19:
+            board.heard = next(self.numbers)
+        if kind < 0.20:
+            board.overwritten += rng.randrange(3)
+        if kind < 0.21:
+            return self.odd_hello()
+        if kind < 0.215:
+            return board.wire.seal(board.wire.trailer() + last_byte(rng.choice([5, 6, 7])))
+        if kind < 0.22:
+            return bytes(rng.randrange(1, 256) for _ in range(LONGEST_PACKET + rng.randrange(40))) + b"\0"
+        board.moments = zones(rng, self.skin)
+        options = {"flags": [flag for flag in ("fault", "mismatch") if rng.random() < 0.05]}
+        if rng.random() < 0.03:
+            options["cells"] = rng.randrange(self.skin.rows * self.skin.columns + 1)
+        if rng.random() < 0.03 and self.skin.report != "cells":
+            options["zones"] = rng.randrange(self.skin.max_zones() + 1)
+            options["flags"] = ["overflow"] if rng.random() < 0.5 else []
+        return board.frame(**options)
+
+    def odd_hello(self) -> bytes:
+        """In two packets, with a field that nobody knows, one too short, one missing or one of odd content."""
+        board, rng = self.board, self.rng
+        fields = board.wire.hello_fields(sent=board.sent, epoch=board.time_us // 2**22)
+        place = rng.randrange(len(fields))
+        change = rng.randrange(4)
+        if change == 0:
+            return board.wire.seal_bare(fields[:place]) + board.wire.seal_bare(fields[place:])
+        if change == 1:
+            return board.wire.seal_bare(fields[:place] + fields[place + 1 :])
+        if change == 2:
+            return board.wire.seal_bare([*fields[:place], fields[place][:-1], *fields[place + 1 :]])
+        facts = board.wire.facts()
+        kind = rng.choice(list(facts))
+        facts[kind] = bytes(rng.randrange(256) if rng.random() < 0.2 else byte for byte in facts[kind])
+        if rng.random() < 0.5:
+            facts |= {rng.choice([7, 9, 200]): bytes(rng.randrange(256) for _ in range(rng.randrange(5)))}
+        return board.wire.hello(sent=board.sent, epoch=board.time_us // 2**22, facts=facts)
+
+    def line(self, data: bytes) -> bytes:
+        """What arrives of it."""
+        rng = self.rng
+        luck = rng.random()
+        if luck > 0.12 or not data:
+            return data
+        if luck > 0.08:
+            return b""
+        if luck > 0.06:
+            return data[: rng.randrange(len(data))]
+        if luck > 0.04:
+            return data + data
+        if luck > 0.02:
+            return bytes(rng.randrange(256) for _ in range(rng.randrange(30))) + data
+        place = rng.randrange(len(data))
+        return data[:place] + bytes([data[place] ^ 1 << rng.randrange(8)]) + data[place + 1 :]
+
+    def stream(self, packets: int) -> bytes:
+        first = self.board.hello() if self.rng.random() < 0.8 else b"\x07\x00"
+        return first + b"".join(self.line(self.packet()) for _ in range(packets))
+
+
+@pytest.mark.parametrize("seed", sample(range(400), quick=range(12)))
+def test_c_and_python_agree_on_random_histories(decoder, seed):
+    data = History(seed).stream(300)
+    assert by_c(decoder, data) == by_python(data)
+
+
+@pytest.mark.parametrize("skin", SKINS, ids=lambda skin: f"{skin.rows}x{skin.columns}-{skin.report}")
+def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
+    """Of a hello and a frame; whole packets are before and after them."""
+    board = ModelBoard(skin)
+    board.moments = zones(random.Random(1), skin)
+    head, hello, frame, tail = board.hello(), board.hello(), board.frame(), board.frame() + board.hello()
+    data = b""
+    for packet in (hello, frame):
+        flips = list(range(8 * len(packet)))
+        for bit in flips if len(packet) < 120 else random.Random(2).sample(flips, 400):
+            flipped = bytearray(packet)
+            flipped[bit // 8] ^= 1 << bit % 8
+            data += head + bytes(flipped) + tail
+    assert by_c(decoder, data) == by_python(data)
+
+
+def test_the_histories_hold_all_that_is_counted():
+    """Otherwise the comparison would say nothing of it."""
+    seen = set()
+    for seed in range(12):
+        *_, stats = by_python(History(seed).stream(300))
+        seen |= {name for name, count in (word.split("=") for word in stats.split()[1:]) if int(count)}
+    assert seen == set(COUNTED)
+
+
+REQUESTS = r"""
+#include <stdio.h>
+#include "contactfpga.h"
+int main(void) {
+    uint8_t out[CONTACTFPGA_PULSED_REQUEST_BYTES];
+    unsigned long number;
+    int hello, pulsed;
+    while (scanf("%lu %d %d", &number, &hello, &pulsed) == 3) {
+        size_t length = contactfpga_request((uint32_t)number, hello, pulsed, out);
+        for (size_t i = 0; i < length; i++) printf("%02x", out[i]);
+        printf("\n");
+    }
+    return 0;
+}
+"""
+
+
+@functools.cache
+def asked() -> list[tuple[int, bool, bool]]:
+    rng = random.Random(3)
+    numbers = [0, 1, 129 * 128 + 1, 2**21 - 1, 2**21, 2**32 - 1, *(rng.randrange(2**21) for _ in range(300))]
+    return [(number, rng.random() < 0.5, rng.random() < 0.5) for number in numbers]
+
+
+def test_requests_are_those_of_the_golden_model(tmp_path):
+    (tmp_path / "ask.c").write_text(REQUESTS)
+    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "ask", tmp_path / "ask.c"], check=True, timeout=60)
+    lines = "".join(f"{number} {hello:d} {pulsed:d}\n" for number, hello, pulsed in asked())
+    done = subprocess.run([tmp_path / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=60)
+    for (number, hello, as_pulses), line in zip(asked(), done.stdout.splitlines(), strict=True):
+        if not may_number(number):
+            assert line == ""
+            continue
+        assert bytes.fromhex(line) == request(number, hello, 2 if as_pulses else 8)
+        assert bytes.fromhex(line) == encode_request(number, hello, as_pulses)
+
+
+def test_a_smaller_reader_refuses_what_is_too_long_and_reads_the_rest(tmp_path):
+    program = tmp_path / "small"
+    source = FOLDER / "decode.c"
+    subprocess.run([*COMPILERS["gcc"], "-DCONTACTFPGA_PACKET_BYTES=120", "-o", program, source], check=True, timeout=60)
+    board = ModelBoard(Skin())
+    hello = board.hello()
+    board.moments = [(1, column, row) for row in range(0, 16, 2) for column in range(0, 16, 2)]
+    long = board.frame()
+    assert len(long) > 120
+    board.moments = board.moments[:3]
+    lines = by_c(program, hello + long + board.frame() + board.frame())
+    assert [line.split()[0] for line in lines] == ["hello", "frame", "frame", "stats"]
+    assert "noise=2" in lines[-1]
+    assert "lost=1" in lines[-1]
+
+
+def test_barycenters_in_mm(tmp_path):
+    code = r"""
+#include <stdio.h>
+#include "contactfpga.h"
+static contactfpga_reader reader;
+int main(void) {
+    int byte;
+    contactfpga_init(&reader);
+    while ((byte = getchar()) != EOF)
+        if (contactfpga_push(&reader, (uint8_t)byte) == CONTACTFPGA_FRAME) {
+            contactfpga_zone zone;
+            double x_mm, y_mm;
+            for (uint16_t i = 0; contactfpga_zone_at(&reader, i, &zone); i++) {
+                contactfpga_barycenter_mm(&reader, &zone, &x_mm, &y_mm);
+                printf("%.17g %.17g\n", x_mm, y_mm);
+            }
+        }
+    return 0;
+}
+"""
+    (tmp_path / "mm.c").write_text(code)
+    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "mm", tmp_path / "mm.c"], check=True, timeout=60)
+    for skin in (Skin(pitch_x_mm=9.5), Skin(report="barycenter", pitch_y_mm=3.25)):
+        board = ModelBoard(skin)
+        board.moments = [(3, 40, 7), (4, 10, 6)]
+        data = board.hello() + board.frame()
+        (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
+        found = {tuple(map(float, line.split())) for line in by_c(tmp_path / "mm", data)}
+        assert found == {(zone.x_mm, zone.y_mm) for zone in arrival.zones}
+
+
+def test_a_board_of_few_clocks_per_bit_takes_pulses(tmp_path):
+    code = """
+#include <stdio.h>
+#include "contactfpga.h"
+int main(void) {
+    contactfpga_hello hello = {0};
+    unsigned long clock_hz, baud;
+    while (scanf("%lu %lu", &clock_hz, &baud) == 2) {
+        hello.clock_hz = (uint32_t)clock_hz, hello.baud = (uint32_t)baud;
+        printf("%d", contactfpga_pulsed(&hello));
+    }
+    return 0;
+}
+"""
+    (tmp_path / "p.c").write_text(code)
+    command = [part for part in COMPILERS["gcc"] if part not in ("-Wextra",)]
+    subprocess.run([*command, f"-I{FOLDER}", "-o", tmp_path / "p", tmp_path / "p.c"], check=True, timeout=60)
+    rates = [(24_000_000, 12_000_000), (60_000_000, 12_000_000), (12_000_000, 3_000_000), (42_000_000, 12_000_000)]
+    lines = "".join(f"{clock_hz} {baud}\n" for clock_hz, baud in rates)
+    done = subprocess.run([tmp_path / "p"], input=lines, capture_output=True, text=True, check=True, timeout=60)
+    assert [bool(int(word)) for word in done.stdout] == [pulsed(round(clock_hz / baud)) for clock_hz, baud in rates]
