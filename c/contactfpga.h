@@ -538,8 +538,8 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
         if (!zone.area || !inside) return false;
         carried += zone.area;
     }
-    return carried == frame->cells
-        || (hello->report != CONTACTFPGA_CELLS && frame->flags & CONTACTFPGA_OVERFLOW && carried < frame->cells);
+    bool overflow = hello->report != CONTACTFPGA_CELLS && frame->flags & CONTACTFPGA_OVERFLOW;
+    return overflow ? carried < frame->cells : carried == frame->cells;
 }
 
 /* Bits behind the last column of bitmap rows, or behind the last field of records, are zeros. */

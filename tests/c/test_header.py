@@ -1,4 +1,4 @@
-"""The C header reads the same packets as the Python driver, to the last counter, from whole and from corrupted streams."""
+"""The C header reads packets as the Python driver does, to the last counter, from whole and from corrupted streams."""
 
 import functools
 import itertools
@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import c_vectors
 import pytest
 from frames import moments
 from model_board import ModelBoard
@@ -116,7 +117,9 @@ def zones(rng, skin) -> list:
     if skin.report == "barycenter":
         most = skin.barycenter_bits
         x, y = (lines - 1 << most for lines in (skin.columns, skin.rows))
-        return [(rng.randint(1, 9), rng.randint(0, x), rng.randint(0, y)) for _ in range(min(count, skin.zone_capacity))]
+        return [
+            (rng.randint(1, 9), rng.randint(0, x), rng.randint(0, y)) for _ in range(min(count, skin.zone_capacity))
+        ]
     cells = skin.rows * skin.columns
     return [row for row in moments(rng, skin, min(count, skin.zone_capacity)) if row[0] <= cells]
 
@@ -240,6 +243,14 @@ def test_the_histories_hold_all_that_is_counted():
     assert seen == set(COUNTED)
 
 
+def test_the_pages_example_compiles(tmp_path):
+    page = (FOLDER.parent / "docs" / "c.md").read_text(encoding="utf-8")
+    example = page.split("```c\n")[1].split("```")[0]
+    (tmp_path / "example.c").write_text(example)
+    command = [*COMPILERS["gcc"], "-Wno-unused-but-set-variable", f"-I{FOLDER}", "-c", "-o", tmp_path / "example.o"]
+    subprocess.run([*command, tmp_path / "example.c"], check=True, timeout=60)
+
+
 REQUESTS = r"""
 #include <stdio.h>
 #include "contactfpga.h"
@@ -266,7 +277,9 @@ def asked() -> list[tuple[int, bool, bool]]:
 
 def test_requests_are_those_of_the_golden_model(tmp_path):
     (tmp_path / "ask.c").write_text(REQUESTS)
-    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "ask", tmp_path / "ask.c"], check=True, timeout=60)
+    subprocess.run(
+        [*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "ask", tmp_path / "ask.c"], check=True, timeout=60
+    )
     lines = "".join(f"{number} {hello:d} {pulsed:d}\n" for number, hello, pulsed in asked())
     done = subprocess.run([tmp_path / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=60)
     for (number, hello, as_pulses), line in zip(asked(), done.stdout.splitlines(), strict=True):
@@ -345,3 +358,55 @@ int main(void) {
     lines = "".join(f"{clock_hz} {baud}\n" for clock_hz, baud in rates)
     done = subprocess.run([tmp_path / "p"], input=lines, capture_output=True, text=True, check=True, timeout=60)
     assert [bool(int(word)) for word in done.stdout] == [pulsed(round(clock_hz / baud)) for clock_hz, baud in rates]
+
+
+def test_vectors_are_those_of_the_golden_encoder():
+    assert c_vectors.PATH.read_text(encoding="utf-8") == c_vectors.text()
+
+
+def test_vectors_by_c_and_by_python(decoder):
+    streams = c_vectors.text().split("\n# ")[2:]
+    assert len(streams) == len(c_vectors.SKINS)
+    for stream in streams:
+        lines = stream.splitlines()[1:]
+        data = b"".join(bytes.fromhex(line[2:]) for line in lines if line.startswith("> "))
+        said = [line for line in lines if line and not line.startswith("> ")]
+        assert by_c(decoder, data)[:-1] == said
+        assert by_python(data)[:-1] == said
+
+
+FUZZ = r"""
+#include "contactfpga.h"
+static contactfpga_reader reader;
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    contactfpga_init(&reader);
+    for (size_t i = 0; i < size; i++) {
+        if (contactfpga_push(&reader, data[i]) != CONTACTFPGA_FRAME) continue;
+        contactfpga_zone zone;
+        for (uint16_t n = 0; contactfpga_zone_at(&reader, n, &zone); n++)
+            if (!zone.area && !(reader.frame.flags & CONTACTFPGA_MISMATCH)) __builtin_trap();
+        for (unsigned row = 0; row < 256; row++) contactfpga_pressed(&reader, (uint8_t)row, (uint8_t)(row * 7));
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.campaign
+def test_a_minute_of_coverage_guided_bytes(tmp_path):
+    """Sanitizers stop at the first access outside the reader, and a trap at a zone without cells."""
+    if not shutil.which("clang"):
+        pytest.skip("clang is not installed")
+    (tmp_path / "fuzz.c").write_text(FUZZ)
+    command = ["clang", "-g", "-O1", "-fsanitize=fuzzer,address,undefined", f"-I{FOLDER}", "-o", tmp_path / "fuzz"]
+    built = subprocess.run([*command, tmp_path / "fuzz.c"], capture_output=True, text=True, timeout=120, check=False)
+    if "libclang_rt.fuzzer" in built.stderr:
+        pytest.skip("clang has no libFuzzer")
+    assert built.returncode == 0, built.stderr
+    seeds = tmp_path / "seeds"
+    seeds.mkdir()
+    for seed in range(20):
+        (seeds / str(seed)).write_bytes(History(seed).stream(30))
+    run = [tmp_path / "fuzz", "-max_total_time=60", "-max_len=20000", seeds]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=180, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]

@@ -1,0 +1,82 @@
+"""The test vectors in c/vectors.txt, by the golden encoder from what they are to say. Run it to write them anew."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+from wire import Wire
+
+from contactfpga import Skin
+
+PATH = Path(__file__).parents[2] / "c" / "vectors.txt"
+HEAD = """\
+# What a board sends (>, in hex) and what c/decode.c says of it, line for line. Made by the golden model's encoder,
+# which shares no code with the readers: python tests/support/c_vectors.py
+"""
+SKINS = {
+    "the reference Skin": Skin(),
+    "64x64": Skin(rows=64, columns=64, settle_us=12.0),
+    "barycenters": Skin(rows=5, columns=32, report="barycenter", barycenter_bits=8, name="elbow", settle_us=12.0),
+    "cells on a cylinder": Skin(rows=4, columns=11, report="cells", surface="cylinder", radius_mm=40.0),
+    "one cell": Skin(rows=1, columns=1, send="on_change"),
+    "overflow": Skin(rows=8, columns=8, zone_capacity=2, connectivity=4),
+}
+
+
+def text() -> str:
+    return HEAD + "".join(f"\n# {title}\n{_stream(skin, seed)}" for seed, (title, skin) in enumerate(SKINS.items()))
+
+
+def _stream(skin: Skin, seed: int) -> str:
+    rng = np.random.default_rng(seed)
+    wire, known = Wire(skin), Wire(skin).known
+    sent, epoch, heard, stuck = random.Random(seed).getrandbits(40) & ~0xFF, 1, 129 * 128 + 1, seed % 3
+    lines = [_packet(wire.hello(sent=sent, epoch=epoch, heard=heard, stuck=stuck))]
+    report = ["moments", "cells", "barycenter"].index(skin.report)
+    bits = skin.barycenter_bits if known.divided else 0
+    lines.append(
+        f"hello {skin.rows}x{skin.columns} {skin.connectivity} {report} {bits} {int(skin.send == 'on_change')} "
+        f"{skin.zone_capacity} {int(skin.diodes == 'none')} {skin.pitch_x_mm:.17g} {skin.pitch_y_mm:.17g} "
+        f"{skin.radius_mm or 0:.17g} {known.fingerprint.hex()} {skin.clock_hz} {skin.baud} {sent} {epoch} {heard} "
+        f"{stuck} {skin.name}"
+    )
+    for index in range(5 if skin.zone_capacity == 2 else 4):
+        data, words, cells, zones, flags = _frame(wire, rng, index, sent + index, heard)
+        lines.append(_packet(data))
+        told = (2**22 + 100 * index, (sent + index) % 256, flags, heard % 8, cells, zones, 0)
+        lines.append(" ".join(map(str, ("frame", *told, *words))))
+    return "\n".join(lines) + "\n"
+
+
+def _frame(wire: Wire, rng, index: int, sent: int, heard: int):
+    skin, known = wire.skin, wire.known
+    trailer = {"time": 2**22 + 100 * index, "sequence": sent, "heard": heard}
+    if skin.report == "cells":
+        bitmap = rng.random((skin.rows, skin.columns)) < index / 3
+        words = [f"{row}:{column}" for row, column in zip(*bitmap.nonzero(), strict=True)]
+        return wire.cells(bitmap.tolist(), **trailer), words, int(bitmap.sum()), 0, 0
+    whole = index == 3  # all cells are one zone
+    count = 1 if whole else min(index, skin.max_zones())
+    rows = [_zone(skin, rng, whole, known.divided) for _ in range(count)]
+    carried, area = rows[: skin.zone_capacity], sum(row[0] for row in rows)
+    flags = ["overflow"] if len(carried) < len(rows) else []
+    data = wire.zones(carried, cells=area, zones=len(rows), flags=flags, **trailer)
+    return data, [",".join(map(str, row)) for row in carried], area, len(rows), len(flags)
+
+
+def _zone(skin: Skin, rng, whole: bool, divided: bool) -> tuple[int, int, int]:
+    columns, rows = skin.columns, skin.rows
+    area = rows * columns if whole else int(rng.integers(1, max(2, min(9, rows * columns // 4))))
+    x, y = (rng.integers(0, columns, area), rng.integers(0, rows, area)) if not whole else np.indices((columns, rows))
+    sums = int(x.sum()), int(y.sum())
+    if not divided:
+        return area, *sums
+    return area, *((2 * total * 2**skin.barycenter_bits + area) // (2 * area) for total in sums)
+
+
+def _packet(data: bytes) -> str:
+    return f"> {data.hex()}"
+
+
+if __name__ == "__main__":
+    PATH.write_text(text(), encoding="utf-8")
