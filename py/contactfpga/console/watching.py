@@ -6,10 +6,12 @@ import argparse
 import json
 from typing import Any
 
+import numpy as np
+
 from contactfpga.console import flags, terminal
 from contactfpga.console.following import follow, known_skin
 from contactfpga.driver.health import Finding
-from contactfpga.zones.suspicion import Suspicion, named
+from contactfpga.zones.suspicion import Cell, Suspicion, named
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
@@ -76,9 +78,17 @@ def _coverage(watch: Watch) -> list[Finding]:
     if not seen.any():
         return [Finding("fault", "no switch read pressed; was the sheet touched?")]
     if never:
-        what = f"{named(never)} never read pressed: not touched, or dead"
-        return [Finding("fault", f"{what} (switch, diode or a wire)")]
+        return [Finding("fault", f"{_dark(seen, never)} never read pressed: not touched, or dead")]
     return [Finding("ok", "every switch read pressed at least once")]
+
+
+def _dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
+    """Whole lines first: these are broken wires rather than dead switches."""
+    rows = sorted({row for row, _ in never if not seen[row].any()})
+    columns = sorted({column for _, column in never if not seen[:, column].any()})
+    left = [(row, column) for row, column in never if row not in rows and column not in columns]
+    lines = [f"{word} {line}" for word, found in (("row", rows), ("column", columns)) for line in found]
+    return ", ".join([*lines, *([named(left)] if left else [])])
 
 
 def _answer(watch: Watch, findings: list[Finding], seconds: float, faults: int) -> dict[str, Any]:
