@@ -59,7 +59,7 @@ def test_a_watch_says_what_is_stuck_and_what_is_dead(run, simulated):
     assert (status, errors) == (1, "")
     found = [line for line in out.splitlines() if line.startswith("fault")]
     assert len(found) == 2
-    assert found[0].startswith("fault cell (3, 1) pressed for 0 s, since the first frame, while ")
+    assert found[0].startswith("fault cell (3, 1) pressed for 0.1 s, since the first frame, while ")
     assert found[1] == "fault cells (0, 2), (2, 0) never read pressed: not touched, or dead"
     assert tomllib.loads(out.splitlines()[-1]) == {"mask": [[3, 1]]}
 

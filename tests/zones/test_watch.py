@@ -1,5 +1,6 @@
 """A watch over random histories: what is planted is found in time, and nothing else is."""
 
+import time
 import tomllib
 
 import numpy as np
@@ -86,6 +87,28 @@ def test_a_stuck_switch_is_found_in_the_time_stated(report, seed):
         assert watch.mask_line == f"mask = [[{spot[0]}, {spot[1]}]]"
 
 
+@pytest.mark.campaign
+@REPORTS
+@pytest.mark.parametrize("seed", range(1000, 1060))
+def test_what_the_page_says_of_random_histories(report, seed):
+    rng, skin = np.random.default_rng(seed), SKINS[report]
+    touches = moving_touches(rng, skin, 40.0, hands=1 if report != "cells" else 3)
+    assert watched(skin, touches)[0] == []
+    spot = tuple(rng.integers(0, 16, 2).tolist())
+    assert {one.cells for one in watched(skin, stuck_at(touches, spot))[0]} == {(spot,)}
+
+
+def test_a_watch_keeps_up_with_10000_frames_per_s():
+    """Of cells that change in each frame, by the processor's time."""
+    cells = moving_touches(np.random.default_rng(9), CELLS, 20.0, rate_hz=100.0)
+    sent = list(frames(CELLS, cells, 10_000.0))
+    watch = Watch(CELLS)
+    started = time.process_time()
+    for zones in sent:
+        watch.update(zones)
+    assert len(sent) / (time.process_time() - started) > 10_000
+
+
 def resting(count, row=5, column=5, size=4):
     cells = np.zeros((count, 16, 16), bool)
     cells[:, row : row + size, column : column + size] = True
@@ -157,7 +180,7 @@ def sweep(skin, spots=()):
 def test_the_sentence_names_the_cell_the_time_and_the_others():
     (one,), watch = watched(CELLS, sweep(CELLS, [(15, 4)]))
     assert one.sentence == (
-        "cell (15, 4) pressed for 5 s, since the first frame, while 99 others changed: stuck, or something small "
+        "cell (15, 4) pressed for 5.0 s, since the first frame, while 99 others changed: stuck, or something small "
         "lies there"
     )
     assert watch.never == ()

@@ -57,7 +57,8 @@ def unchanged(what: str, many: bool, seconds: float, others: str, from_the_start
     """The sentence about cells that do not change."""
     start = ", since the first frame," if from_the_start else ""
     cause = "something lies there, or they are stuck" if many else "stuck, or something small lies there"
-    return f"{what} for {seconds:.0f} s{start} while {others}: {cause}"
+    lasted = f"{seconds:.0f}" if seconds >= 10 else f"{seconds:.1f}"
+    return f"{what} for {lasted} s{start} while {others}: {cause}"
 
 
 def named(cells: Iterable[Cell], most: int = 12) -> str:
