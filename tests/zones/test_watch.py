@@ -34,7 +34,7 @@ def stuck_at(cells, *spots):
 
 
 @REPORTS
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_moving_hands_alone_are_no_suspicion(report, seed):
     cells = moving_touches(np.random.default_rng(seed), SKINS[report], SECONDS)
     found, watch = watched(SKINS[report], cells)
@@ -67,7 +67,7 @@ def due_us(spot, report, touches):
 
 
 @REPORTS
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_stuck_switch_is_found_in_the_time_stated(report, seed):
     rng = np.random.default_rng(100 + seed)
     skin = SKINS[report]
@@ -116,16 +116,16 @@ def resting(count, row=5, column=5, size=4):
 
 
 @REPORTS
-def test_an_arm_that_rests_for_a_minute_is_no_suspicion(report):
+def test_an_arm_that_rests_for_long_is_no_suspicion(report):
     """It comes after the first frame, and nothing else changes."""
-    cells = resting(round(60 * RATE_HZ))
+    cells = resting(round(40 * RATE_HZ))
     cells[: int(RATE_HZ)] = False
     assert watched(SKINS[report], cells)[0] == []
 
 
 def test_an_arm_that_rests_with_a_trembling_rim_is_no_suspicion():
     rng = np.random.default_rng(5)
-    cells = resting(round(60 * RATE_HZ))
+    cells = resting(round(40 * RATE_HZ))
     rim = np.zeros((16, 16), bool)
     rim[4:10, 4:10] = True
     rim[5:9, 5:9] = False
@@ -137,8 +137,8 @@ def test_an_arm_that_rests_with_a_trembling_rim_is_no_suspicion():
 @REPORTS
 def test_an_arm_that_rests_while_hands_move_is_one_clear_line_and_no_mask(report):
     skin = SKINS[report]
-    cells = resting(round(60 * RATE_HZ), row=0, column=0)
-    elsewhere = moving_touches(np.random.default_rng(6), skin, 60.0)
+    cells = resting(round(40 * RATE_HZ), row=0, column=0)
+    elsewhere = moving_touches(np.random.default_rng(6), skin, 40.0)
     elsewhere[:, :6, :6] = False
     found, watch = watched(skin, cells | elsewhere)
     assert [one.kind for one in found] == ["held"]
@@ -233,8 +233,8 @@ def test_a_switch_that_flutters_is_told_and_one_that_is_tapped_is_not(period, to
 
 
 def test_bounces_of_a_fast_tap_are_no_flutter():
-    cells = np.zeros((40_000, 1, 1), bool)
-    phase = np.arange(40_000) % 1000  # 10 taps per s at 10,000 frames per s
+    cells = np.zeros((12_000, 1, 1), bool)
+    phase = np.arange(12_000) % 1000  # 10 taps per s at 10,000 frames per s
     cells[:, 0, 0] = ((phase < 500) & ((phase > 60) | (phase % 2 == 0))) | ((phase > 500) & (phase < 560) & phase % 2)
     skin = Skin(rows=1, columns=1, report="cells", settle_us=100.0)
     watch = Watch(skin)

@@ -11,6 +11,7 @@ import numpy as np
 from contactfpga.console import flags, terminal
 from contactfpga.console.following import follow, known_skin
 from contactfpga.driver.health import Finding
+from contactfpga.skin import Skin
 from contactfpga.zones.suspicion import Cell, Suspicion, named
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             return views.watch_view(board, watch, [_line(_judged(one)) for one in found], zones, room)
 
         seconds, end = follow(board, args, take, None if args.json else render)
-        findings = [*map(_judged, found), *_coverage(watch), *end]
+        findings = [*map(_judged, found), *_coverage(watch), *_unknown(skin), *end]
     mask_line = watch.mask_line
     faults = sum(finding.verdict == "fault" for finding in findings)
     if args.json:
@@ -80,6 +81,12 @@ def _coverage(watch: Watch) -> list[Finding]:
     if never:
         return [Finding("fault", f"{_dark(seen, never)} never read pressed: not touched, or dead")]
     return [Finding("ok", "every switch read pressed at least once")]
+
+
+def _unknown(skin: Skin | None) -> list[Finding]:
+    if skin is not None:
+        return []
+    return [Finding("note", "the mask of this board is not known, so absent switches look dead; give --skin FILE")]
 
 
 def _dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
