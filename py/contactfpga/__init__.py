@@ -23,6 +23,8 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.suspicion import Suspicion
+from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zone, Zones
 
 # The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
@@ -49,7 +51,9 @@ __all__ = [
     "SkinMismatch",
     "Stats",
     "Subscription",
+    "Suspicion",
     "VersionMismatch",
+    "Watch",
     "Zone",
     "Zones",
     "__version__",

@@ -131,3 +131,34 @@ def test_the_largest_drawing_that_fits_comes_first():
     assert drawn_sheet.scales(big, 130, 40) == [2, 1]
     assert drawn_sheet.scales(big, 60, 20) == [1]
     assert drawn_sheet.scales(big, 10, 2) == [1]
+
+
+def marks(**cells):
+    """What is known of each (row, column) of a sheet of 16x16."""
+    made = {name: np.zeros((16, 16), bool) for name in ("seen", "flutters", "stuck")}
+    for name, places in cells.items():
+        for place in places:
+            made[name][place] = True
+    return drawn_sheet.Marks(**made)
+
+
+def test_marks_show_what_a_watch_knows():
+    skin, pressed = Skin(report="cells"), np.zeros((16, 16), bool)
+    pressed[0, 3] = pressed[0, 4] = True
+    known = marks(seen=[(0, 0), (0, 3), (0, 4), (0, 5)], flutters=[(0, 5)], stuck=[(0, 4)])
+    drawing = draw(zones(skin, cells=pressed), SCALES[0], True, [(0, 2)], known)
+    assert drawing.text.split("\n")[0] == "○ ·   ██!!~~" + "· " * 9 + "·"
+    assert drawing.legend == ("█ pressed; ○ pressed before; · never pressed; ! stuck; ~ flutters; blank: no switch")
+    assert "stuck" not in draw(zones(skin, cells=pressed), marks=marks()).legend
+
+
+@pytest.mark.parametrize("unicode", [True, False])
+def test_a_character_of_several_cells_is_seen_where_all_of_them_are(unicode):
+    """Somebody looks for what was not touched yet."""
+    sheet = zones(Skin(report="cells"), cells=np.zeros((16, 16), bool))
+    block = [(row, column) for row in range(4) for column in range(2)]
+    sign, free = ("○", "·") if unicode else ("o", ".")
+    assert draw(sheet, 1, unicode, marks=marks(seen=block)).text[0] == sign
+    assert draw(sheet, 1, unicode, marks=marks(seen=block[1:])).text[0] == free
+    assert draw(sheet, 1, unicode, block[:1], marks(seen=block[1:])).text[0] == sign
+    assert draw(sheet, 1, unicode, marks=marks(seen=block, stuck=block[:1])).text[0] == "!"

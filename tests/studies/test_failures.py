@@ -66,6 +66,8 @@ BREAKS = {
 
 TOLD = {
     ("capacity", "any labeller"): {"overflow"},
+    ("moving", "`raster`"): {"motion"},
+    ("moving", "`adaptive`"): {"motion"},
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
     ("settle", "40 kΩ pull-up, the same"): {"stuck"},
     ("ghost", "zones"): {"ghost"},

@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Iterable
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, numbers, terminal, watching
 from contactfpga.driver import driver, health, ports
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
@@ -15,17 +15,27 @@ from contactfpga.errors import ContactFPGAError
 HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None
 
+COUNTED_S = 1.0
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
-    long = "Seconds of device time over which frames are counted (default: 1)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, default=1.0, help=long)
+    long = "Seconds of device time over which frames are counted (default: 1) or watched (default: until Ctrl-C)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, help=long)
+    watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
+    parser.add_argument("--watch", action="store_true", help=watch)
+    stuck = "Seconds without a change after which a watch tells a pressed switch (default: 10)."
+    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="T", help=stuck)
     parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
+    if args.watch:
+        return watching.run(args)
+    if args.stuck_s is not None:
+        raise ContactFPGAError("--stuck-s is of a watch; add --watch")
     report = _Report(silent=args.json)
     _look(args, report)
     if args.json:
@@ -73,6 +83,6 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             report.stats = board.stats
             report.add(health.hello(board))
-            report.add(health.count(board, args.seconds, args.timeout))
+            report.add(health.count(board, args.seconds or COUNTED_S, args.timeout))
     except (ContactFPGAError, ValueError) as error:
         report.add([Finding("fault", str(error))])

@@ -1,13 +1,14 @@
-"""`contactfpga wire`: the pressed cells, live, to see that every switch sits where it should."""
+"""`contactfpga wire`: the pressed cells, live, to see that every switch sits where it should, and how it behaves."""
 
 from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import flags
+from contactfpga.console import bouncing, flags, numbers
+from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 
-HELP = "Show the pressed cells live, to check the wiring."
+HELP = "Show the pressed cells live, to check wiring and bounce."
 EXTRA = None
 
 
@@ -15,16 +16,42 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
     flags.once(parser)
+    bounce = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
+    parser.add_argument("--bounce", action="store_true", help=bounce)
+    seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, help=seconds)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object with what was measured.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    if args.bounce:
+        return _bounce(args)
+    for name in ("seconds", "json"):
+        if getattr(args, name):
+            raise ContactFPGAError(f"--{name} is of a measurement; add --bounce")
+    return _show(args)
+
+
+def _bounce(args: argparse.Namespace) -> int:
+    if args.once:
+        raise ContactFPGAError("--once shows one frame, which tells of no bounce; leave it out")
+    with flags.opened(args) as board:
+        _check_cells(board)
+        return bouncing.measure(board, args)
+
+
+def _show(args: argparse.Namespace) -> int:
     from contactfpga.console import live, views
 
     with flags.opened(args) as board:
-        if board.sheet.report != "cells":
-            raise ContactFPGAError(
-                f"{board.port} sends zones, not cells; build a bitstream from the same Skin with "
-                'report = "cells" for wiring, or see the zones with `contactfpga zones`'
-            )
+        _check_cells(board)
         return live.show(board, args, lambda zones, room: views.cells_view(board, zones, room))
+
+
+def _check_cells(board: Board) -> None:
+    if board.sheet.report != "cells":
+        raise ContactFPGAError(
+            f"{board.port} sends zones, not cells; build a bitstream from the same Skin with "
+            'report = "cells" for wiring, or see the zones with `contactfpga zones`'
+        )

@@ -21,17 +21,35 @@ SCALES = (4, 2, 1)
 
 ACROSS, DOWN = 2, 4
 
-FREE, CELL, CIRCLE, CENTER, MASKED = range(5)
+FREE, CELL, CIRCLE, CENTER, MASKED, SEEN, FLUTTERS, STUCK = range(8)
 """What a character shows."""
 
-STYLES = {FREE: "dim", CELL: "", CIRCLE: "cyan", CENTER: "bold", MASKED: ""}
+STYLES = {
+    FREE: "dim",
+    CELL: "",
+    CIRCLE: "cyan",
+    CENTER: "bold",
+    MASKED: "",
+    SEEN: "green",
+    FLUTTERS: "bold yellow",
+    STUCK: "bold red",
+}
 
 _BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _HALVES = np.array([["·", "▄"], ["▀", "█"]])
 _SIGNS = {
-    True: {FREE: "·", CELL: "█", CIRCLE: "⠒", CENTER: "◎", MASKED: " "},
-    False: {FREE: ".", CELL: "#", CIRCLE: "o", CENTER: "X", MASKED: " "},
+    True: {FREE: "·", CELL: "█", CIRCLE: "⠒", CENTER: "◎", MASKED: " ", SEEN: "○", FLUTTERS: "~", STUCK: "!"},
+    False: {FREE: ".", CELL: "#", CIRCLE: "o", CENTER: "X", MASKED: " ", SEEN: "o", FLUTTERS: "~", STUCK: "!"},
 }
+
+
+@dataclasses.dataclass(frozen=True)
+class Marks:
+    """What is known of cells from earlier frames: (rows, columns) bool each."""
+
+    seen: np.ndarray
+    flutters: np.ndarray
+    stuck: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,15 +79,21 @@ def size(zones: Zones, scale: int) -> tuple[int, int]:
     return -(-zones.sheet.columns * scale // ACROSS), -(-zones.sheet.rows * scale // DOWN)
 
 
-def draw(zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = ()) -> Drawing:
+def draw(
+    zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask = (), marks: Marks | None = None
+) -> Drawing:
     """The sheet of one frame: its pressed cells if the board sends them, else its zones' barycenters and sizes.
-    ``mask``: the (row, column) of switches that are known to be absent."""
+    ``mask``: the (row, column) of switches that are known to be absent; ``marks``: of a board that sends cells."""
     wide, high = size(zones, scale)
     signs = _SIGNS[unicode]
     characters = np.full((high, wide), signs[FREE])
     kinds = np.full((high, wide), FREE)
     if scale == SCALES[0]:
         characters[:, 1::2] = " "  # one dot per cell
+    masked = _masked(zones, mask)
+    if marks is not None:
+        seen = _blocks(_spread(marks.seen | masked, scale), filled=True).all(axis=(2, 3)) & (characters != " ")
+        characters[seen], kinds[seen] = signs[SEEN], SEEN
     if zones.cells is not None:
         dots = _spread(zones.cells, scale)
         shown, kind = _cells(dots, scale, signs[CELL], unicode), CELL
@@ -78,14 +102,16 @@ def draw(zones: Zones, scale: int = SCALES[0], unicode: bool = True, mask: Mask 
         shown, kind = _braille(dots) if unicode else np.full((high, wide), signs[CIRCLE]), CIRCLE
     some = _blocks(dots).any(axis=(2, 3))
     characters[some], kinds[some] = shown[some], kind
-    masked = _masked(zones, mask)
     if masked.any():
         nothing = _blocks(_spread(masked, scale), filled=True).all(axis=(2, 3))
         characters[nothing], kinds[nothing] = signs[MASKED], MASKED
+    for kind, cells in () if marks is None else ((FLUTTERS, marks.flutters), (STUCK, marks.stuck)):
+        some = _blocks(_spread(cells, scale)).any(axis=(2, 3))
+        characters[some], kinds[some] = signs[kind], kind
     if zones.cells is None:
         for x, y in _centers(zones, scale):
             characters[y, x], kinds[y, x] = signs[CENTER], CENTER
-    return Drawing(characters, kinds, _legend(zones.cells is None, bool(masked.any()), scale, unicode))
+    return Drawing(characters, kinds, _legend(zones.cells is None, bool(masked.any()), scale, unicode, marks))
 
 
 def _masked(zones: Zones, mask: Mask) -> np.ndarray:
@@ -95,7 +121,7 @@ def _masked(zones: Zones, mask: Mask) -> np.ndarray:
     return masked
 
 
-def _legend(circles: bool, masked: bool, scale: int, unicode: bool) -> str:
+def _legend(circles: bool, masked: bool, scale: int, unicode: bool, marks: Marks | None) -> str:
     signs = _SIGNS[unicode]
     rows, columns = DOWN // scale, ACROSS // scale
     if circles:
@@ -105,6 +131,11 @@ def _legend(circles: bool, masked: bool, scale: int, unicode: bool) -> str:
     else:
         some = "" if unicode or scale == SCALES[0] else ", one of them at least"
         parts = [f"{signs[CELL]} pressed{some}", f"{signs[FREE]} not pressed"]
+    if marks is not None:
+        all_of = "" if scale == SCALES[0] else ", all of them"
+        parts[-1:] = [f"{signs[SEEN]} pressed before{all_of}", f"{signs[FREE]} never pressed"]
+        parts += [f"{signs[STUCK]} stuck"] * bool(marks.stuck.any())
+        parts += [f"{signs[FLUTTERS]} flutters"] * bool(marks.flutters.any())
     if masked:
         parts.append("blank: no switch")
     if scale < SCALES[0]:

@@ -41,7 +41,7 @@ def show(board: Board, args: argparse.Namespace, render: Render) -> int:
     """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends."""
     console = terminal.console()
     if args.once:
-        console.print(render(board.next(args.timeout), _room(console, endless=True)))
+        console.print(render(board.next(args.timeout), room(console, endless=True)))
         return 0
     if not terminal.of().live:
         if sys.stdout.isatty():
@@ -50,11 +50,12 @@ def show(board: Board, args: argparse.Namespace, render: Render) -> int:
         return _last(board, args, console, render)
     with Live(console=console, auto_refresh=False) as live:
         for zones in _paced(board, args.timeout):
-            live.update(render(zones, _room(console)), refresh=True)
+            live.update(render(zones, room(console)), refresh=True)
     return 0
 
 
-def _room(console: Console, endless: bool = False) -> Room:
+def room(console: Console, endless: bool = False) -> Room:
+    """What there is for a frame now; ``endless``: as many lines as it takes."""
     shown = terminal.of()
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
@@ -67,30 +68,43 @@ def _last(board: Board, args: argparse.Namespace, console: Console, render: Rend
             pass
     finally:
         if zones is not None:
-            console.print(render(zones, _room(console, endless=True)))
+            console.print(render(zones, room(console, endless=True)))
     return 0
 
 
 def _paced(board: Board, timeout: float) -> Iterator[Zones]:
-    """One frame every REFRESH_US of device time, not faster than that in real time.
-
-    A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.
-    """
-    shown_us = -REFRESH_US
-    due = time.monotonic()
+    """One frame every REFRESH_US of device time, and the last one of a recording in any case."""
+    pace = Pace()
     skipped = None
     while True:
         try:
             zones = board.next(timeout)
         except ReplayEnded:
             if skipped is not None:
-                yield skipped  # the last frame is shown in any case
+                yield skipped
             return
-        if 0 <= zones.time_us - shown_us < REFRESH_US:
+        if pace.due(zones):
+            skipped = None
+            yield zones
+        else:
             skipped = zones
-            continue
-        skipped = None
-        shown_us = zones.time_us
-        due = max(due + REFRESH_US / 1e6, time.monotonic() - REFRESH_US / 1e6)
-        time.sleep(max(0.0, due - time.monotonic()))
-        yield zones
+
+
+class Pace:
+    """Of frames that are shown: one every REFRESH_US of device time, not faster than that in real time.
+
+    A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.
+    """
+
+    def __init__(self) -> None:
+        self._shown_us = -REFRESH_US
+        self._due = time.monotonic()
+
+    def due(self, zones: Zones) -> bool:
+        """Whether to show this frame; if so, waits until it is time to."""
+        if 0 <= zones.time_us - self._shown_us < REFRESH_US:
+            return False
+        self._shown_us = zones.time_us
+        self._due = max(self._due + REFRESH_US / 1e6, time.monotonic() - REFRESH_US / 1e6)
+        time.sleep(max(0.0, self._due - time.monotonic()))
+        return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -10,6 +11,7 @@ from contactfpga.console import drawn_sheet, terminal
 from contactfpga.console.live import Room
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
 BESIDE = 3
@@ -19,6 +21,9 @@ LEGEND_LINES = 2
 
 TABLE_LINES = 6
 """Of a table: title, head, rules and caption."""
+
+SUSPECTED = 4
+"""Lines of what a watch suspects, while it goes on."""
 
 NAMED = 12
 """Pressed cells whose places are written out."""
@@ -41,6 +46,29 @@ def zones_view(board: Board, zones: Zones, room: Room) -> RenderableType:
         high = drawn_sheet.size(zones, scale)[1]
         shown = [_styled(drawing), table(zones, left.without(high).height)]
     return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+
+
+def watch_view(board: Board, watch: Watch, suspected: list[str], zones: Zones, room: Room) -> RenderableType:
+    """The sheet with what a watch knows of its switches, and below it what is suspected; the newest if that is much."""
+    count = f"{len(watch.never)} switches never pressed so far" if watch.seen is not None else "zones only"
+    below = "\n".join([*suspected[-SUSPECTED:], count, status(board, zones, room.width)])
+    below = "\n".join(terminal.wrapped(line, room.width, 2) for line in below.split("\n"))
+    left = room.without(below.count("\n") + 1 + LEGEND_LINES)
+    scale = drawn_sheet.scales(zones, left.width, left.height)[0]
+    drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board), _marks(watch))
+    return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+
+
+def _marks(watch: Watch) -> drawn_sheet.Marks | None:
+    if watch.seen is None:
+        return None
+    marked = []
+    for cells in (watch.fluttering, watch.stuck):
+        marks = np.zeros_like(watch.seen)
+        for row, column in cells:
+            marks[row, column] = True
+        marked.append(marks)
+    return drawn_sheet.Marks(watch.seen, *marked)
 
 
 def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:

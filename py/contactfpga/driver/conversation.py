@@ -152,10 +152,11 @@ class Conversation:
         widths = self._widths
         packets, starts = table.packets[start:end], table.starts[start : end + 1]
         last = frame_of(packets[-1].item(), table.records[starts[-2] : starts[-1]], widths.sheet)
+        before = self._timeline.before
         times_us = self._timeline.take_run(packets, widths, last, now)
         self._requests.take_frame(last.heard, now)  # all of them carry the same
         self._passed()
-        return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None)
+        return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None, before)
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:

@@ -145,5 +145,7 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     for flag in sorted(zones.flags - {"fault"}):
         if flag == "ghost":
             yield Finding("note", "the last frame has zones that may be ghosts: the sheet has no diodes")
+        elif flag == "motion":
+            yield Finding("note", "in the last frame something moved faster than the scan follows")
         else:
             yield Finding("fault", f"the last frame is flagged {flag!r}")

@@ -78,7 +78,7 @@ def _row(one: Zones) -> tuple[float, ...]:
         one.overwritten,
         one.pressed,
         one.total_zones,
-        *(flag in one.flags for flag in ("overflow", "mismatch", "fault")),
+        *(flag in one.frame.flags for flag in ("overflow", "mismatch", "fault")),
     )
 
 

@@ -28,6 +28,8 @@ class Run:
     times_us: np.ndarray
     """(n,) int64, since power-up."""
     host_time_s: float | None
+    before: Frame | None = None
+    """The frame before the first one."""
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -35,7 +37,11 @@ class Run:
     def after(self, index: int) -> Run:
         """Without the first frames."""
         return dataclasses.replace(
-            self, packets=self.packets[index:], starts=self.starts[index:], times_us=self.times_us[index:]
+            self,
+            packets=self.packets[index:],
+            starts=self.starts[index:],
+            times_us=self.times_us[index:],
+            before=self._frame(index - 1) if index else self.before,
         )
 
     @property
@@ -44,13 +50,23 @@ class Run:
         return self.records[self.starts[0] : self.starts[-1]]
 
     def __getitem__(self, index: int) -> Zones:
-        fields, starts, times_us = self._plain
-        start, stop = starts[index], starts[index + 1]
-        frame = frame_of(fields[index], self.records[start:stop], self.sheet)
-        return Zones(frame, self.sheet, times_us[index], None, self.host_time_s)
+        before = self._frame(index - 1) if index else self.before
+        return Zones(self._frame(index), self.sheet, self._plain[2][index], before, self.host_time_s)
+
+    def _frame(self, index: int) -> Frame:
+        if (made := self._made.get(index)) is None:
+            fields, starts, _ = self._plain
+            made = frame_of(fields[index], self.records[starts[index] : starts[index + 1]], self.sheet)
+            self._made.clear()  # but the last one, which comes before the next
+            self._made[index] = made
+        return made
 
     def __iter__(self) -> Iterator[Zones]:
         return map(self.__getitem__, range(len(self)))
+
+    @functools.cached_property
+    def _made(self) -> dict[int, Frame]:
+        return {}
 
     @functools.cached_property
     def _plain(self) -> tuple[list[tuple[int, ...]], list[int], list[int]]:

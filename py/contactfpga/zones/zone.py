@@ -12,7 +12,7 @@ import numpy as np
 
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.protocol import Frame
-from contactfpga.zones import ghosts, labels
+from contactfpga.zones import ghosts, labels, motion
 
 Vector = tuple[float, float, float]
 
@@ -83,12 +83,27 @@ class Zones(Sequence[Zone]):
         self.host_time_s = host_time_s
         """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
         None in a recording."""
-        self.flags: frozenset[str] = frame.flags
-        """Names from :data:`contactfpga.wire.protocol.FLAGS`; and `ghost` where a sheet without diodes may show pressed
-        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to."""
         self._before = before
-        if sheet.ghosts and (self._ghost_cells.any() if frame.bitmap is not None else ghosts.spread(frame, before)):
-            self.flags |= {"ghost"}
+
+    @functools.cached_property
+    def flags(self) -> frozenset[str]:
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`; `ghost` where a sheet without diodes may show pressed
+        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to; and `motion`
+        where a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
+        found = set()
+        if self.sheet.ghosts and self._has_ghosts():
+            found.add("ghost")
+        before = self._before
+        if before is not None and motion.adjacent(self.frame, before):
+            earlier = records_of(before, self.sheet)
+            if motion.moved(self.records, earlier, self.sheet):
+                found.add("motion")
+        return self.frame.flags | found
+
+    def _has_ghosts(self) -> bool:
+        if self.frame.bitmap is None:
+            return ghosts.spread(self.frame, self._before)
+        return bool(self._ghost_cells.any())
 
     @property
     def sequence(self) -> int:
@@ -104,7 +119,7 @@ class Zones(Sequence[Zone]):
     def faults(self) -> frozenset[str]:
         """Faults of the sheet that the board noticed: ``stuck``, a column read pressed while no row was driven. How
         many columns did is in ``board.hello.stuck``."""
-        return frozenset({"stuck"} if "fault" in self.flags else ())
+        return frozenset({"stuck"} if "fault" in self.frame.flags else ())
 
     @property
     def total_zones(self) -> int:
@@ -212,7 +227,7 @@ class Zones(Sequence[Zone]):
         """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
         if self._labels is not None:
             return labels.moments(self._labels)
-        return self.frame.moments if self.frame.barycenters is None else self.frame.barycenters
+        return records_of(self.frame, self.sheet)
 
     def __iter__(self) -> Iterator[Zone]:
         return iter(self._zones)
@@ -239,6 +254,13 @@ class Zones(Sequence[Zone]):
             if self.sheet.ghosts:
                 values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
         return values
+
+
+def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
+    """The same of a frame by itself."""
+    if frame.bitmap is not None:
+        return labels.moments(labels.label(frame.bitmap, sheet.connectivity))
+    return frame.moments if frame.barycenters is None else frame.barycenters
 
 
 def _order(zone: Zone) -> tuple[bool, float, float, int]:

@@ -1,0 +1,117 @@
+"""Since when each zone is as it is, for frames that carry zones and not cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from contactfpga.skin.sheet import Sheet
+from contactfpga.zones.suspicion import FEW_CELLS, Cell, Limits, Suspicion, away_from, named, reach_of, unchanged
+from contactfpga.zones.zone import Zones
+
+Record = tuple[int, int, int]
+"""Area and sums of a zone, or area and barycenter, as the board sent them."""
+
+
+class ZoneHistory:
+    """Zones over time. One is the same for as long as nothing of its record changes."""
+
+    def __init__(self, first: Zones, limits: Limits, present: np.ndarray):
+        """``present``: as for :class:`~contactfpga.zones.cell_history.CellHistory`."""
+        self._limits = limits
+        self._present = present
+        self._sheet = first.sheet
+        self._shape = first.sheet.rows, first.sheet.columns
+        self._first_us = first.time_us
+        self._since_us = dict.fromkeys(_keys(first.records), first.time_us)
+        self._came_us, self._left_us = (np.full(present.shape, -1) for _ in range(2))
+        self._told: dict[Record, tuple[Cell, ...]] = {}
+
+    @property
+    def stuck(self) -> set[Cell]:
+        """Told as stuck where that is known to the cell, and not changed since."""
+        return {cell for cells in self._told.values() for cell in cells}
+
+    flutters: frozenset[Cell] = frozenset()
+    """Zones do not tell which cells change."""
+
+    def take(self, zones: Zones) -> None:
+        """One more frame."""
+        keys, time_us = _keys(zones.records), zones.time_us
+        if keys == self._since_us.keys():
+            return
+        for key in keys - self._since_us.keys():
+            self._came_us[self._cell(key)] = time_us
+        for key in self._since_us.keys() - keys:
+            self._left_us[self._cell(key)] = time_us
+        self._since_us = {key: self._since_us.get(key, time_us) for key in keys}
+        self._told = {key: cells for key, cells in self._told.items() if key in keys or self._may_have_joined(key)}
+
+    def suspicions(self, time_us: int) -> Iterator[Suspicion]:
+        """Those that are new."""
+        for key, since_us in self._since_us.items():
+            if key in self._told or since_us > time_us - self._limits.stuck_us:
+                continue
+            elsewhere = (
+                away_from([self._cell(key)], reach_of(key[0]), (self._sheet.rows, self._sheet.columns)) & self._present
+            )
+            others = int((elsewhere & (self._came_us > since_us) & (self._left_us > since_us)).sum())
+            if others < self._limits.needed(elsewhere):
+                continue
+            few = key[0] <= FEW_CELLS
+            cells = cells_of(key, self._sheet) if few else ()
+            self._told[key] = cells
+            seconds = (time_us - since_us) / 1e6
+            came = "others came and went"
+            sentence = unchanged(self._what(key, cells), not few, seconds, came, since_us == self._first_us)
+            yield Suspicion("stuck" if few else "held", sentence, cells, time_us)
+
+    def _may_have_joined(self, gone: Record) -> bool:
+        """Whether a zone lies so near that this one may be part of it now."""
+        row, column = self._cell(gone)
+        for key in self._since_us:
+            y, x = self._cell(key)
+            if max(abs(y - row), abs(x - column)) <= reach_of(gone[0]) + reach_of(key[0]):
+                return True
+        return False
+
+    def _what(self, key: Record, cells: tuple[Cell, ...]) -> str:
+        if cells:
+            return f"{named(cells)} pressed"
+        x, y = self._place(key)
+        where = f"x {x * self._sheet.pitch_x_mm:.1f} mm, y {y * self._sheet.pitch_y_mm:.1f} mm"
+        return f'a zone of {key[0]} cells at {where} (report = "cells" would tell which) pressed'
+
+    def _cell(self, key: Record) -> Cell:
+        """The one in which the barycenter lies."""
+        x, y = self._place(key)
+        return min(round(y), self._sheet.rows - 1), min(round(x), self._sheet.columns - 1)
+
+    def _place(self, key: Record) -> tuple[float, float]:
+        """x and y in cells."""
+        area, x, y = key
+        scale = (1 << self._sheet.barycenter_bits) if self._sheet.report == "barycenter" else area
+        return x / scale, y / scale
+
+
+def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
+    """The (row, column) of a zone's cells where its record leaves one choice: a single cell, or two side by side."""
+    area, x, y = record
+    if area not in (1, 2):
+        return ()
+    if sheet.report == "barycenter":
+        steps = 1 << sheet.barycenter_bits
+        if area == 2 and steps == 1:
+            return ()  # rounded to whole cells
+        x, y = area * x // steps, area * y // steps
+    if area == 1:
+        return ((y, x),)
+    if x % 2 and y % 2:
+        return ()  # one of two diagonals
+    return (y // 2, x // 2), (-(-y // 2), -(-x // 2))
+
+
+def _keys(records: np.ndarray) -> set[Record]:
+    """Of the zones that lie somewhere: a frame flagged ``mismatch`` may hold one without cells."""
+    return {(area, x, y) for area, x, y in records.tolist() if area}
