@@ -16,7 +16,7 @@ FIELDS = {
     "rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000,
     "send": "on_change", "keep_alive_ms": 20, "alive": True, "fail_safe": True,
 }  # fmt: skip
-GUARDED = Skin(**FIELDS, guard=True)
+GUARDED = Skin(**FIELDS, guard=True, row_order=(1, 0), column_order=(1, 0))
 SKINS = {
     "guarded": GUARDED,
     "no guard lines": Skin(**FIELDS),
@@ -43,12 +43,13 @@ def events(skin: Skin, cycles: int, pause: int = 1_500) -> Timeline:
 
 
 def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
-    cycles = 600_000
+    """Its lines are soldered in another order."""
+    cycles = 400_000
     timeline = events(GUARDED, cycles, 80_000)
     expected = predict(GUARDED, timeline, cycles)
     assert compare(expected, bench_native.run(GUARDED, timeline, cycles)) > 500
-    assert 50 < len(expected.alive) < 500  # some ticks, and not all
-    assert len(expected.contact) > 10
+    assert 30 < len(expected.alive) < 500  # some ticks, and not all
+    assert len(expected.contact) > 5
 
 
 @pytest.mark.parametrize("name", sample(SKINS, quick=["adaptive"]))
