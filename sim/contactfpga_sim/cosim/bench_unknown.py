@@ -20,7 +20,7 @@ from contactfpga_sim.board import native
 from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
 from contactfpga_sim.cosim.record import OutOfTime, Stimulus
 from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.sheet.matrix import Contention, words
+from contactfpga_sim.sheet.matrix import Contention, Matrix
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -63,7 +63,8 @@ def available() -> bool:
 def run(
     skin: Skin, timeline: Timeline, cycles: int, known_words: Sequence[str] | None = None, limit_s: float = 200.0
 ) -> Trace:
-    """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
+    """What the transmit, the contact and the alive pin do in cycles 0 to ``cycles`` - 1, counted from the end of the
+    reset.
 
     ``known_words``: patterns of what is known at power-up, :func:`initialized` if left out. Raises :class:`Unknown`
     when a row, a line's output enable, the transmit or the contact pin is not known, :class:`Contention`, and
@@ -108,19 +109,22 @@ def forget(gates: str, initialized: Sequence[str]) -> tuple[str, dict[str, str]]
 
 def _trace(output: str, cycles: int) -> Trace:
     trace = Trace(cycles)
-    tx, contact = 1, 0
+    tx, contact, alive = 1, 0, 0
     for line in output.splitlines():
         what, cycle, *levels = line.split()
         if what == "contention":
             raise Contention(f"cycle {cycle}: columns {levels[0]} are driven against rows {levels[1]}")
         if what != "pins":
-            raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}")
+            raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}, alive {levels[3]}")
         if int(levels[0]) != tx:
             tx = int(levels[0])
             trace.line.append((int(cycle), tx))
         if int(levels[1]) != contact:
             contact = int(levels[1])
             trace.contact.append((int(cycle), contact))
+        if int(levels[2]) != alive:
+            alive = int(levels[2])
+            trace.alive.append((int(cycle), alive))
     return trace
 
 
@@ -129,31 +133,31 @@ def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -
     moves = _moves(skin, timeline, cycles)
     moves[1 - RESET_CLOCKS] = " ".join(f"top.{name} = {value};" for name, value in known.items())
     steps = "".join(f"        {cycle}: begin {text} end\n" for cycle, text in sorted(moves.items()))
-    cells = ", ".join(f"pressed{row} = 0" for row in range(skin.rows))
+    cells = ", ".join(f"closed{row} = 0" for row in range(skin.row_lines))
     sheet, pins = _sheet(skin)
     return f"""`timescale 1ns/1ns
 module bench;
 reg clk = 0, rst = 1, rx = 1;
-reg [{skin.columns - 1}:0] stuck = 0, {cells};
-{sheet}wire tx, contact;
-reg [1:0] seen = 2'bxx;
+reg [{skin.column_lines - 1}:0] stuck = 0, {cells};
+{sheet}wire tx, contact, alive{"" if skin.alive else " = 0"};
+reg [2:0] seen = 3'bxxx;
 integer cycle;
-top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins});
+top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins}{", .alive(alive)" if skin.alive else ""});
 initial for (cycle = -{RESET_CLOCKS}; cycle < {cycles}; cycle = cycle + 1) begin
     if (cycle == 0) rst = 0;
     case (cycle)
 {steps}    endcase
     #5;
-    if (cycle > -{RESET_CLOCKS} && ^{{rows, rows_drive, columns_drive, tx, contact}} === 1'bx) begin
-        $display("unknown %0d %b %b %b", cycle, rows, tx, contact);
+    if (cycle > -{RESET_CLOCKS} && ^{{rows, rows_drive, columns_drive, tx, contact, alive}} === 1'bx) begin
+        $display("unknown %0d %b %b %b %b", cycle, rows, tx, contact, alive);
         $finish;
     end
     if (cycle > -{RESET_CLOCKS} && |(pulled & columns_drive)) begin
         $display("contention %0d %b %b", cycle, pulled & columns_drive, selected);
         $finish;
     end
-    if (cycle >= 0 && seen !== {{tx, contact}}) $display("pins %0d %b %b", cycle, tx, contact);
-    seen = {{tx, contact}};
+    if (cycle >= 0 && seen !== {{tx, contact, alive}}) $display("pins %0d %b %b %b", cycle, tx, contact, alive);
+    seen = {{tx, contact, alive}};
     clk = 1;
     #5 clk = 0;
 end
@@ -166,13 +170,14 @@ def _sheet(skin: Skin) -> tuple[str, str]:
 
     Before the first clock of the reset nothing is known; pins that may be driven then read as unknown.
     """
-    rows, columns = f"[{skin.rows - 1}:0]", f"[{skin.columns - 1}:0]"
+    lines = range(skin.row_lines)
+    rows, columns = f"[{skin.row_lines - 1}:0]", f"[{skin.column_lines - 1}:0]"
     selecting, level, let_go = ("~rows", "~reads", "touched") if skin.selects_low else ("rows", "reads", "~touched")
-    pulled = " | ".join(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))
-    feeding = ", ".join(f"|(pressed{row} & columns_drive & ~stuck)" for row in reversed(range(skin.rows)))
+    pulled = " | ".join(f"{{{skin.column_lines}{{selected[{row}]}}}} & closed{row}" for row in lines)
+    feeding = ", ".join(f"|(closed{row} & columns_drive & ~stuck)" for row in reversed(lines))
     reverses = skin.reads_rows
     text = f"""wire {rows} rows;
-wire {rows} rows_drive{"" if reverses else f" = {{{skin.rows}{{1'b1}}}}"};
+wire {rows} rows_drive{"" if reverses else f" = {{{skin.row_lines}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
 wire {rows} selected = {selecting} & rows_drive;
 wire {columns} pulled = {pulled};
@@ -195,9 +200,12 @@ def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
         if level != before:
             moves[cycle] = f"rx = {level};"
         before = level
-    for cycle, cells, stuck in timeline.pieces:
-        levels = words(cells, skin.rows)
-        text = "".join(f" pressed{row} = {skin.columns}'h{word:x};" for row, word in enumerate(levels))
-        always = 0 if stuck is None else words(stuck[None], 1)[0]
-        moves[cycle] = moves.get(cycle, "") + f"{text} stuck = {skin.columns}'h{always:x};"
+    sheet = Matrix(skin)
+    for cycle in sorted({0, *(piece[0] for piece in timeline.pieces), *(cut[0] for cut in timeline.cuts)}):
+        cuts = timeline.cuts_at(cycle)
+        sheet.press(*timeline.at(cycle))
+        sheet.cut(cuts.rows, cuts.columns)
+        width = skin.column_lines
+        text = "".join(f" closed{line} = {width}'h{word:x};" for line, word in enumerate(sheet.closed))
+        moves[cycle] = moves.get(cycle, "") + f"{text} stuck = {width}'h{sheet.stuck:x};"
     return moves

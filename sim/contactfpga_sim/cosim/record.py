@@ -12,8 +12,8 @@ from contactfpga_sim.sheet.shift import Sheet
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer")
-"""Ports of the top that are looked at in every cycle."""
+LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer", "alive")
+"""Ports of the top that are looked at in every cycle; one that it does not have is low."""
 
 PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "item_end", "byte_data")
 """Ports of the top that are read when something is transferred."""
@@ -21,10 +21,11 @@ PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "
 
 def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
     """Those of the names that the top of a Skin has."""
-    return tuple(name for name in names if not name.startswith("item_") or skin.report == "barycenter")
+    has = {"item": skin.report == "barycenter", "alive": skin.alive}
+    return tuple(name for name in names if has.get(name.split("_")[0], True))
 
 
-_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM = (1 << place for place in range(len(LEVELS)))
+_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM, _ALIVE = (1 << place for place in range(len(LEVELS)))
 
 
 class OutOfTime(RuntimeError):
@@ -42,6 +43,7 @@ class Stimulus:
         self.reads = self._sheet.reads
         self.drives = (*self._sheet.drives, "rx")
         self._pieces = list(reversed(timeline.pieces))
+        self._cuts = list(reversed(timeline.cuts))
         self._bit_clocks = facts(skin).bit_clocks
         self._received = list(reversed(timeline.received))
         self._start, self._data = 0, b""
@@ -51,6 +53,9 @@ class Stimulus:
         if self._pieces and self._pieces[-1][0] <= cycle:
             _, cells, stuck = self._pieces.pop()
             self._sheet.matrix.press(cells, stuck)
+        if self._cuts and self._cuts[-1][0] <= cycle:
+            _, cuts = self._cuts.pop()
+            self._sheet.matrix.cut(cuts.rows, cuts.columns)
         return (*self._sheet.step(pins), self._rx(cycle))
 
     def _rx(self, cycle: int) -> int:
@@ -84,4 +89,6 @@ class TraceRecorder:
             self.trace.line.append((cycle, int(bool(levels & _TX))))
         if changed & _CONTACT:
             self.trace.contact.append((cycle, int(bool(levels & _CONTACT))))
+        if changed & _ALIVE:
+            self.trace.alive.append((cycle, int(bool(levels & _ALIVE))))
         self._levels = levels

@@ -51,6 +51,16 @@ class Facts:
     def columns(self) -> int:
         return self.skin.columns
 
+    @property
+    def row_lines(self) -> int:
+        """Rows, and the guard row."""
+        return self.rows + (1 if self.skin.guard else 0)
+
+    @property
+    def column_lines(self) -> int:
+        """Columns, and the guard column."""
+        return self.columns + (1 if self.skin.guard else 0)
+
     @functools.cached_property
     def mask(self) -> np.ndarray:
         """(R, C) bool: True where there is no switch to read."""
@@ -75,14 +85,14 @@ class Facts:
         """X: clocks that the columns of a sample are shifted."""
         if self.skin.column_read == "direct":
             return 0
-        return -(-self.columns // self.skin.column_chains) * self.shift_bit
+        return -(-self.column_lines // self.skin.column_chains) * self.shift_bit
 
     @functools.cached_property
     def row_shift(self) -> int:
         """Z: clocks from which on a row pattern is shifted before its slot, and the first slot begins."""
         if self.skin.row_drive == "direct":
             return 0
-        return 1 + -(-self.rows // self.skin.row_chains) * self.shift_bit + self.shift_bit
+        return 1 + -(-self.row_lines // self.skin.row_chains) * self.shift_bit + self.shift_bit
 
     @functools.cached_property
     def load(self) -> int:
@@ -134,8 +144,8 @@ class Facts:
 
     @functools.cached_property
     def scan_clocks(self) -> int:
-        """Clocks of one scan period: every row once."""
-        return self.rows * self.row_clocks
+        """Clocks of one scan period: every row once, the guard row too."""
+        return self.row_lines * self.row_clocks
 
     @functools.cached_property
     def bit_clocks(self) -> int:
@@ -168,7 +178,7 @@ class Facts:
     def keep_alive_slots(self) -> int:
         """Row times after which an unchanged frame is sent; with one more frame it could come too late."""
         if self.scan.even:
-            return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+            return self.row_lines * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)
         return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
 
@@ -195,7 +205,7 @@ class Facts:
     @functools.cached_property
     def hello_slots(self) -> int:
         """Row times after which a hello is due."""
-        return self.rows * max(1, math.floor(self._scans(Fraction(500_000))))
+        return self.row_lines * max(1, math.floor(self._scans(Fraction(500_000))))
 
     def _scans(self, microseconds: Fraction) -> Fraction:
         return microseconds * self.clocks_per_us / self.scan_clocks
