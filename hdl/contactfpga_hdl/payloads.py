@@ -47,11 +47,15 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     its row times.
 
     ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
-    the frame before.
+    the frame before. ``motion``, where the scan reads rows, is complete with the frame's last row: one read touched as
+    the frame began, and empty when it was driven.
     """
     uneven = not derived.scan.even and not derived.scan.waits
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
-    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
+    motion = {"motion": 1} if derived.skin.reads_rows else {}
+    return data.StructLayout(
+        {"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots, **motion}
+    )
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:
