@@ -54,7 +54,7 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
     motion = {"motion": 1} if derived.skin.reads_rows else {}
     return data.StructLayout(
-        {"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots, **motion}
+        {"time": TIME_BITS, "stuck": STUCK_BITS, "fault": 1, "heard": HEARD_BITS, "requested": 1, **slots, **motion}
     )
 
 

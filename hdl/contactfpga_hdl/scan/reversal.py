@@ -60,7 +60,7 @@ class ReversalScanner(wiring.Component):
         m = Module()
         sheet, turn, checks = Sheet(self.skin), Turn(self.derived), Checks(self.derived)
         self._read_sheet(m, sheet)
-        held = self._drive_sheet(m, sheet, turn, checks)
+        precharge = self._drive_sheet(m, sheet, turn, checks)
         self._take_turns(m, sheet, turn, checks)
         pressed = self._mask(m, sheet, turn)
         offer_rows = offer_driven_rows if self.derived.skips else offer_all_rows
@@ -69,9 +69,9 @@ class ReversalScanner(wiring.Component):
         watch_motion(m, self, sheet, turn, pressed)
         self._tag_frame(m, turn)
         if self.skin.guard:
-            check_lines(m, self, sheet, turn, checks, held)
-            m.d.comb += self.watched.eq(checks.checked[1] & turn.rests)
+            check_lines(m, self, sheet, turn, checks, precharge)
         else:
+            m.d.comb += self.tag.fault.eq(self.tag.stuck.any())
             m.d.comb += self.watched.eq(turned(m, self.time[CHECK_BIT]) & turn.rests)
         return m
 
@@ -91,8 +91,8 @@ class ReversalScanner(wiring.Component):
             sheet.clean.eq((touched & clean_rows(skin)).any()),
         ]
 
-    def _drive_sheet(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks) -> Value:
-        """All pins come from registers; at power-up none is driven. Returns the columns that are let go as stuck."""
+    def _drive_sheet(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks) -> Precharge:
+        """All pins come from registers; at power-up none is driven."""
         skin = self.skin
         m.submodules.precharge = precharge = Precharge(skin)
         driven, begun = Signal(), Signal()
@@ -115,7 +115,7 @@ class ReversalScanner(wiring.Component):
             precharge.turn.eq(self.time[RETRY_BIT]),
         ]
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
-        return precharge.held
+        return precharge
 
     def _take_turns(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks) -> None:
         """What a state does to the sheet is seen at the pins a clock later."""

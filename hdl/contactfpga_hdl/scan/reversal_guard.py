@@ -4,13 +4,13 @@ Rows: the guard column alone is driven to the released level, all others to the 
 reads touched. Columns: the guard row alone is selected, and each column that is whole reads pressed.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.scan.precharge import RETRY_BIT
+from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
-from contactfpga_hdl.scan.stuck import anywhere, present
 
 CHECK_BIT = 8
 """Of the clock in us: when this bit turns, a sheet at rest is checked."""
@@ -43,37 +43,31 @@ def turned(m: Module, bit: Value) -> Signal:
     return turns
 
 
-def check_lines(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, checks: Checks, held: Value) -> None:
-    """When checks are made, and what they tell: a fault is told from the check that finds it until one does not in the
-    round after bit ``RETRY_BIT`` of the clock turned."""
+def check_lines(
+    m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, checks: Checks, precharge: Precharge
+) -> None:
+    """When a sheet at rest is checked, and what checks tell. A guard column that is stuck says nothing about rows."""
     skin = scan.skin
+    m.submodules.told = told = Told(skin)
     m.d.sync += [
         checks.checked.eq(checks.checked << 1),
         checks.of_rows.eq(checks.of_rows ^ checks.starts),
         checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts),
     ]
-    there = checks.checked[1]
-    read_rows, read_columns = Signal(), Signal()
-    blind = scan.faults.stuck[-1] | sheet.pressed[-1]  # the guard column cannot be driven
+    there, guard_reads, at_begin = checks.checked[1], sheet.pressed[-1], Signal()
     m.d.comb += [
         checks.of_guard.eq(there & ~checks.of_rows),
-        read_rows.eq(checks.of_guard & ~blind),
-        read_columns.eq(there & checks.of_rows),
+        told.rows.eq(~sheet.read),
+        told.checks_rows.eq((checks.of_guard & ~guard_reads & ~told.faults.stuck[-1]).replicate(skin.rows)),
+        told.columns.eq(~sheet.pressed),
+        told.checks_columns.eq(there & checks.of_rows),
+        told.stuck.eq(precharge.held | Cat(Const(0, skin.columns), guard_reads)),
+        told.checks_stuck.eq(checks.of_guard),
+        told.round.eq(checks.of_guard),
+        told.turn.eq(precharge.turn),
+        scan.faults.eq(told.faults),
+        scan.tag.fault.eq(scan.tag.stuck.any() | at_begin),
+        scan.watched.eq(there & turn.rests),
     ]
-    retried, renews_rows, renews_columns = Signal(), Signal(), Signal()
-    m.d.sync += [
-        retried.eq(turned(m, scan.time[RETRY_BIT]) | retried & ~turn.released),
-        renews_rows.eq(renews_rows & ~read_rows | retried & turn.released),
-        renews_columns.eq(renews_columns & ~read_columns | retried & turn.released),
-    ]
-    rows = sum(1 << row for row in range(skin.rows) if present(skin, row))
-    told = scan.faults
-    columns = sheet.pressed[: skin.columns]
-    stuck = held | Cat(columns & 0, checks.of_guard & sheet.pressed[-1])
-    _tell(m, told.rows, read_rows, ~sheet.read & rows, renews_rows)
-    _tell(m, told.columns, read_columns, ~columns & anywhere(skin), renews_columns)
-    m.d.sync += told.stuck.eq(stuck | Mux(checks.of_guard & renews_rows, 0, told.stuck))
-
-
-def _tell(m: Module, told: Value, read: Value, found: Value, renews: Value) -> None:
-    m.d.sync += told.eq(Mux(read, found, 0) | Mux(read & renews, 0, told))
+    with m.If(turn.begins):
+        m.d.sync += at_begin.eq(told.faults.as_value().any())

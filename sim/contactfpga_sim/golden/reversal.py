@@ -8,8 +8,9 @@ import numpy as np
 
 from contactfpga_sim.golden import debounce
 from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.reversal_guard import Guard, stuck_at
+from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
 
 RETRY_US = 2**16
@@ -50,13 +51,12 @@ class Scanner:
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
         self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
-        self.guard = Guard(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
+        self.checks = Checks(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
 
     def frame(self) -> None:
         """The next frame."""
         begun = self._begin()
         held = self._hold(begun)
-        self._tell_held([begun])
         touched = self._touched(begun - 2)
         todo = sorted(touched | self._busy)
         scan = Scan(
@@ -89,40 +89,29 @@ class Scanner:
         begin = self.begun[-1] + 1
         while True:
             wanted = max(self._wanted(), self._packed, begin)
-            check = max(self.guard.asked, begin) if self.guard else wanted + 1
+            check = max(self.checks.asked, begin) if self.checks else wanted + 1
             until = min(wanted, check)
             self._rest(begin, until)
             touched = self._first_touched(begin - 2, until - 2)
             if touched is not None:
-                return max(self._wake(begin, touched) + project, self._packed)
-            self._tell_held(range(begin, until + 1))
-            if not self.guard or wanted < check:
+                return max(self._wake(touched) + project, self._packed)
+            if not self.checks or wanted < check:
                 return wanted
-            self._listen_after(self.guard.at_rest(check))
+            self._listen_after(*self.checks.at_rest(check))
             begin = self._listens + project + 1
 
-    def _wake(self, begin: int, touched: int) -> int:
+    def _wake(self, touched: int) -> int:
         """A row reads touched in this cycle; returns the one in which it is seen."""
         seen = touched + 2
         self._held = [entry for entry in self._held if entry[0] <= seen]
-        self._tell_held(range(begin, seen + 1))
         if self._touched(touched) & self._clean_rows():
             self._set_contact(seen + 1, 1)
         return seen
 
-    def _tell_held(self, cycles: Sequence[int]) -> None:
-        """Columns were sampled in these."""
-        if self.guard:
-            for cycle, held in self._held:
-                if cycle in cycles:
-                    self.guard.hold(cycle, held)
-            self.guard.sampled(cycles[-1])
-
-    def _listen_after(self, checked: int) -> None:
+    def _listen_after(self, checked: int, guard_is_stuck: bool) -> None:
         """A check had its sample in this cycle."""
-        guard, facts = np.arange(self._facts.column_lines) == self._facts.columns, self._facts
-        if self.guard and self.guard.of_rows_was and stuck_at(facts, self._timeline, checked)[-1]:
-            self._hold(checked + 2, guard)
+        if guard_is_stuck:
+            self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
         self._listens = checked + 2
 
     def _wanted(self) -> int:
@@ -141,21 +130,11 @@ class Scanner:
 
     def _touched(self, cycle: int) -> frozenset[int]:
         """Rows that read touched at the pins and are not masked whole."""
-        cells, _ = self._timeline.at(cycle)
-        if cells is None:
-            return frozenset()
-        columns = self._facts.columns
-        driven = ~self._undriven(cycle)[:columns] & ~self._facts.mask.all(axis=0)
-        driven &= ~stuck_at(self._facts, self._timeline, cycle)[:columns]
-        closed = np.asarray(cells, bool) & self._reach(cycle)
-        rows = (closed & driven).any(axis=1) & ~self._facts.mask.all(axis=1)
-        return frozenset(np.flatnonzero(rows).tolist())
-
-    def _reach(self, cycle: int) -> np.ndarray:
-        """(R, C) bool: switches that are still between two pins."""
-        cuts = self._timeline.cuts_at(cycle)
         facts = self._facts
-        return np.array([[cuts.reach(row, column) for column in range(facts.columns)] for row in range(facts.rows)])
+        driven = ~self._undriven(cycle) & ~stuck(facts, self._timeline, cycle)
+        lines = closed(facts, self._timeline, cycle)[: facts.rows] & driven
+        rows = (lines[:, : facts.columns] & ~facts.mask.all(axis=0)).any(axis=1) & ~facts.mask.all(axis=1)
+        return frozenset(np.flatnonzero(rows).tolist())
 
     def _clean_rows(self) -> set[int]:
         return set(np.flatnonzero(~self._facts.mask.any(axis=1)).tolist())
@@ -188,7 +167,7 @@ class Scanner:
         """Columns that read pressed in this cycle, or did since the last retry: from then on they are not driven.
         Without ``now`` those that are stuck, but for a guard column."""
         if now is None:
-            now = stuck_at(self._facts, self._timeline, cycle - 2)
+            now = stuck(self._facts, self._timeline, cycle - 2)
             now &= np.arange(len(now)) < self._facts.columns
         retry = RETRY_US * self._facts.clocks_per_us
         before = [held for last, held in self._held[-1:] if last // retry == cycle // retry]
@@ -219,16 +198,14 @@ class Scanner:
             handed.nothing(begun + 1)
         else:
             self._listens = self.slots[-1].sample + 2
-            if self.guard:
-                self._listen_after(self.guard.after(self.slots[-1].sample))
+            if self.checks:
+                self._listen_after(*self.checks.after(self.slots[-1].sample))
         return counted
 
     def _read(self, slot: Slot) -> np.ndarray:
-        pressed, _ = self._timeline.at(slot.sample)
-        columns = stuck_at(self._facts, self._timeline, slot.sample)[: self._facts.columns]
-        if pressed is not None:
-            columns |= np.asarray(pressed[slot.row], bool) & self._reach(slot.sample)[slot.row]
-        return columns & ~self._facts.mask[slot.row]
+        facts = self._facts
+        lines = closed(facts, self._timeline, slot.sample)[slot.row] | stuck(facts, self._timeline, slot.sample)
+        return np.asarray(lines[: facts.columns] & ~facts.mask[slot.row])
 
     def _set_contact(self, cycle: int, level: int) -> None:
         if level != (self.contact[-1][1] if self.contact else 0):
@@ -291,8 +268,8 @@ class Reversal(ScanRule):
         while not scanner.begun or scanner.begun[-1] <= play.cycles:
             scanner.frame()
         slots = [(slot.begin, slot.sample, slot.row) for slot in scanner.slots]
-        if scanner.guard:
-            slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.guard.slots])
+        if scanner.checks:
+            slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.checks.slots])
         driven = [change for begin, sample, row in slots for change in ((begin, 1 << row), (sample + 1, 0))]
         return Scanned(scanner.contact, driven, scanner.begun)
 
