@@ -24,7 +24,8 @@ class Told(wiring.Component):
     is told twice per turn at most. Lines that are masked whole are not told.
 
     rows, columns, stuck (in): lines that a check of this clock finds faulty.
-    checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns all or none.
+    checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns it is of
+    all or none.
     round (in): high for a clock in which a round of checks ends, with its last check or after it.
     turn (in): bit ``RETRY_BIT`` of a clock in us.
     faults (out): what is told.

@@ -41,12 +41,10 @@ class Told:
     """Faulty lines as the board tells them."""
 
     def __init__(self, facts: Facts):
-        self._masked = {
-            "rows": facts.mask.all(axis=1),
-            "columns": facts.mask.all(axis=0),
-            "stuck": np.append(facts.mask.all(axis=0), [False] * (facts.column_lines - facts.columns)),
-        }
-        self._told = {name: np.zeros(len(masked), bool) for name, masked in self._masked.items()}
+        rows, columns = np.asarray(facts.mask.all(axis=1)), np.asarray(facts.mask.all(axis=0))
+        stuck = np.append(columns, [False] * (facts.column_lines - facts.columns))
+        self._masked = {"rows": rows, "columns": columns, "stuck": stuck}
+        self._told = {name: np.zeros_like(masked) for name, masked in self._masked.items()}
 
     def check(
         self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
@@ -55,7 +53,8 @@ class Told:
         others stay as they are. In a round that ``renews`` a line that is well is told no more."""
         place = slice(None) if only is None else slice(only, only + 1)
         told = self._told[lines]
-        told[place] = (found | (told & (not renews)))[place] & ~self._masked[lines][place]
+        kept = np.zeros_like(told) if renews else told
+        told[place] = ((found | kept) & ~self._masked[lines])[place]
 
     @property
     def word(self) -> int:

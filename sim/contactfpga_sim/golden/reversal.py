@@ -69,6 +69,7 @@ class Scanner:
             told=begun + 3,
             slots=0,
             alone=frozenset(todo),
+            faults=self.checks.word if self.checks else 0,
         )
         self.begun.append(begun)
         self._rests = not todo
@@ -113,6 +114,7 @@ class Scanner:
         if guard_is_stuck:
             self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
         self._listens = checked + 2
+        self._stages.tell(checked + 3, self.checks.word if self.checks else 0)
 
     def _wanted(self) -> int:
         """The first cycle in which a frame is, though nothing is touched."""

@@ -19,8 +19,6 @@ class Checks:
 
     def __init__(self, facts: Facts, timeline: Timeline, retry_us: int, undriven: Callable[[int], np.ndarray]):
         """``undriven``: (C + 1,) bool, the columns that are not driven in a cycle as they read stuck."""
-        self.changes: list[tuple[int, int]] = []
-        """(cycle, word) of every change of what is told."""
         self.slots: list[tuple[int, int]] = []
         """First and last cycle of each slot of the guard row."""
         self._facts = facts
@@ -35,6 +33,7 @@ class Checks:
 
     @property
     def word(self) -> int:
+        """What is told, from three cycles after the last check's sample on."""
         return self._told.word
 
     @property
@@ -62,8 +61,6 @@ class Checks:
             self._check_columns(sample)
         else:
             self._check_rows(sample)
-        if self.word != (self.changes[-1][1] if self.changes else 0):
-            self.changes.append((sample + 3, self.word))
         return sample, not self._of_rows and bool(self._stuck(sample)[-1])
 
     def _check_rows(self, sample: int) -> None:
