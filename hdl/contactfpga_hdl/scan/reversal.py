@@ -134,6 +134,7 @@ class ReversalScanner(wiring.Component):
         m.d.sync += [
             clock.eq(clock + 1),
             due.eq(due << 1),
+            checks.checked.eq(checks.checked << 1),
             turn.underway.eq((turn.underway | turn.begins) & ~self.packed),
             turn.todo.eq(Mux(turn.begins, sheet.touched, turn.todo & ~sheet.selected)),
             sheet.selected.eq(0),

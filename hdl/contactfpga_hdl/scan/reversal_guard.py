@@ -50,7 +50,6 @@ def check_lines(
     skin = scan.skin
     m.submodules.told = told = Told(skin)
     m.d.sync += [
-        checks.checked.eq(checks.checked << 1),
         checks.of_rows.eq(checks.of_rows ^ checks.starts),
         checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts),
     ]
