@@ -77,7 +77,8 @@ class Scanner:
         counted = self._drive(begun, todo, rows, scan.cells)
         if not scan.cells.any():
             self._set_contact(self.slots[-1].strobe + 1 if todo else begun + 1, 0)
-        self._packed = rows.end(scan, counted)
+        motion = any(not scan.cells[row].any() for row in touched & self._clean_rows())
+        self._packed = rows.end(dataclasses.replace(scan, motion=motion), counted)
 
     # ---- when a frame begins
 
