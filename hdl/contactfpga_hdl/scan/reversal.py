@@ -99,7 +99,8 @@ class ReversalScanner(wiring.Component):
         m.d.sync += [driven.eq(~sheet.listens), begun.eq(turn.begins)]
         selected, drive, stuck = sheet.selected, driven.replicate(skin.rows), sheet.pressed
         if skin.guard:
-            holds, inverted = Signal(), Signal()
+            holds = Signal()  # from the first clock on
+            inverted = Signal()
             m.d.sync += [holds.eq(1), inverted.eq(sheet.inverts)]
             m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
             selected, drive = Cat(selected, sheet.guard), Cat(drive, holds)
