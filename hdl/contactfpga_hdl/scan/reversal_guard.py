@@ -54,6 +54,8 @@ def check_lines(
         checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts),
     ]
     there, guard_reads, at_begin = checks.checked[1], sheet.pressed[-1], Signal()
+    counted = Signal(2)  # the last bit: the count of stuck columns is there in the next clock
+    m.d.sync += counted.eq(Cat(turn.begins, counted))
     m.d.comb += [
         checks.of_guard.eq(there & ~checks.of_rows),
         told.rows.eq(~sheet.read),
@@ -68,5 +70,5 @@ def check_lines(
         scan.tag.fault.eq(scan.tag.stuck.any() | at_begin),
         scan.watched.eq(there & turn.rests),
     ]
-    with m.If(turn.begins):
+    with m.If(counted[1]):
         m.d.sync += at_begin.eq(told.faults.as_value().any())

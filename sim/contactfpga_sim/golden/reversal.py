@@ -10,6 +10,7 @@ from contactfpga_sim.golden import debounce
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
+from contactfpga_sim.golden import reversal_guard
 from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
 
@@ -95,12 +96,21 @@ class Scanner:
             until = min(wanted, check)
             self._rest(begin, until)
             touched = self._first_touched(begin - 2, until - 2)
+            self._watch(begin, until if touched is None else touched + 2)
             if touched is not None:
                 return max(self._wake(touched) + project, self._packed)
             if not self.checks or wanted < check:
                 return wanted
             self._listen_after(*self.checks.at_rest(check))
+            self._stages.watch(self._listens)
             begin = self._listens + project + 1
+
+    def _watch(self, begin: int, end: int) -> None:
+        """The sheet rests in these cycles; without guard lines that is told now and then."""
+        turn = reversal_guard.CHECK_US * self._facts.clocks_per_us
+        if not self.checks:
+            for cycle in range(-(-begin // turn) * turn, end + 1, turn):
+                self._stages.watch(cycle)
 
     def _wake(self, touched: int) -> int:
         """A row reads touched in this cycle; returns the one in which it is seen."""
