@@ -47,12 +47,14 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     its row times.
 
     ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
-    the frame before. ``fault``: columns are stuck, or other faults were told.
+    the frame before. ``fault``: columns are stuck, or other faults were told. ``motion``, where the scan reads rows, is
+    complete with the frame's last row: one read touched as the frame began, and empty when it was driven.
     """
     uneven = not derived.scan.even and not derived.scan.waits
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
+    motion = {"motion": 1} if derived.skin.reads_rows else {}
     known = {"time": TIME_BITS, "stuck": STUCK_BITS, "fault": 1, "heard": HEARD_BITS, "requested": 1}
-    return data.StructLayout(known | slots)
+    return data.StructLayout(known | slots | motion)
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:

@@ -4,7 +4,7 @@ import importlib
 from collections.abc import Mapping
 
 from amaranth.build import Attrs, Pins, Platform, Resource, Subsignal
-from amaranth.hdl import ClockDomain, Const, Elaboratable, Module, Value
+from amaranth.hdl import Cat, ClockDomain, Const, Elaboratable, Module, Value
 from amaranth.lib import io
 from amaranth.lib.wiring import Out
 
@@ -77,12 +77,17 @@ class BoardTop(Elaboratable):
         return "o" if self._sheet[name].flow == Out else "i"
 
     def _connect_both_ways(self, m: Module, name: str, port: io.SingleEndedPort, core: Top) -> None:
-        """A buffer per line, each with its own output enable. Columns are driven to the released level only."""
-        released = Const(-int(self.skin.selects_low), len(port))
-        levels, read = (core.rows, core.rows_read) if name == "rows" else (released, core.columns)
+        """A buffer per line, each with its own output enable. Columns are driven to the released level only, but for the
+        checks of guard lines."""
+        levels, read = (core.rows, core.rows_read) if name == "rows" else (self._column_levels(core), core.columns)
         for line, (level, drive) in enumerate(zip(levels, getattr(core, f"{name}_drive"), strict=True)):
             m.submodules[f"{name}_{line}"] = buffer = io.Buffer("io", port[line])
             m.d.comb += [buffer.o.eq(level), buffer.oe.eq(drive), read[line].eq(buffer.i)]
+
+    def _column_levels(self, core: Top) -> Value:
+        if not self.skin.guard:
+            return Const(-int(self.skin.selects_low), self.skin.columns)
+        return Cat(core.columns_level.replicate(self.skin.columns), ~core.columns_level)
 
     def _connect_floating(self, m: Module, port: io.SingleEndedPort, rows: Value) -> None:
         for row in range(self.skin.rows):

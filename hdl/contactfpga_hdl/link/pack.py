@@ -49,7 +49,8 @@ def _trailer_layout(derived: Derived) -> data.StructLayout:
             "overwritten": derived.overwritten_bits,
             "overflow": 1,
             "mismatch": 1,
-            "fault": protocol.FLAG_BITS - 2,
+            "fault": 1,
+            "motion": protocol.FLAG_BITS - 3,
             "kind": protocol.KIND_BITS,
         }
     )
@@ -134,6 +135,7 @@ class Packer(wiring.Component):
             trailer.overflow.eq(self.summary.overflow),
             trailer.mismatch.eq(self.summary.mismatch),
             trailer.fault.eq(self.tag.fault),
+            trailer.motion.eq(self.tag.motion if self.skin.reads_rows else 0),
             trailer.heard.eq(self.tag.heard),
             trailer.cells.eq(self.summary.cells),
             trailer.zones.eq(self.summary.zones),

@@ -30,9 +30,14 @@ def row_pins(skin: Skin) -> dict[str, wiring.Member]:
 
 def column_pins(skin: Skin) -> dict[str, wiring.Member]:
     """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
-    chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit."""
+    chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit.
+
+    A scan that reads the rows of a sheet with guard lines drives columns to ``columns_level``, and the guard column, the
+    last one, to the other level.
+    """
     if skin.precharge_us:
-        return _read_pins(skin) | {"columns_drive": Out(skin.column_lines)}
+        level = {"columns_level": Out(1, init=int(skin.selects_low))} if skin.guard and skin.reads_rows else {}
+        return _read_pins(skin) | {"columns_drive": Out(skin.column_lines)} | level
     return _read_pins(skin)
 
 

@@ -16,7 +16,7 @@ from contactfpga.wire.protocol import FLAGS, KINDS
 _LONGEST = 254
 """Bytes of a stuffed packet in which no block can be full."""
 _FLAG_MASK = (1 << len(FLAGS)) - 1
-OVERFLOW, MISMATCH, FAULT = (1 << FLAGS.index(name) for name in ("overflow", "mismatch", "fault"))
+OVERFLOW, MISMATCH, FAULT, MOTION = (1 << bit for bit in range(len(FLAGS)))
 """Bits of :data:`FIELDS`' ``flags``."""
 
 FIELDS = np.dtype(

@@ -82,7 +82,7 @@ __all__ = [
     "unseal",
 ]
 
-FLAGS = ("overflow", "mismatch", "fault")
+FLAGS = ("overflow", "mismatch", "fault", "motion")
 """Names of a frame's flags, lowest bit first."""
 
 KIND_REQUEST = 5

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.wire.many import FAULT, MISMATCH, OVERFLOW
+from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
 
@@ -23,6 +23,7 @@ FRAME_DTYPE = np.dtype(
         ("overflow", np.bool_),
         ("mismatch", np.bool_),
         ("fault", np.bool_),
+        ("motion", np.bool_),
     ]
 )
 """Fields of :attr:`Batch.frames`: those of :class:`Zones` and its flags; ``host_time_s`` is NaN in a recording."""
@@ -78,12 +79,12 @@ def _row(one: Zones) -> tuple[float, ...]:
         one.overwritten,
         one.pressed,
         one.total_zones,
-        *(flag in one.frame.flags for flag in ("overflow", "mismatch", "fault")),
+        *(flag in one.frame.flags for flag in _FLAGS),
     )
 
 
 _SENT = {"sequence": "sequence", "overwritten": "overwritten", "pressed": "cells", "total_zones": "zones"}
-_FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT}
+_FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": MOTION}
 
 
 def _describe(run: Run, out: np.ndarray) -> None:

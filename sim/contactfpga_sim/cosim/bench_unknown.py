@@ -152,8 +152,8 @@ initial for (cycle = -{RESET_CLOCKS}; cycle < {cycles}; cycle = cycle + 1) begin
         $display("unknown %0d %b %b %b %b", cycle, rows, tx, contact, alive);
         $finish;
     end
-    if (cycle > -{RESET_CLOCKS} && |(pulled & columns_drive)) begin
-        $display("contention %0d %b %b", cycle, pulled & columns_drive, selected);
+    if (cycle > -{RESET_CLOCKS} && |(pulled & feeding)) begin
+        $display("contention %0d %b %b", cycle, pulled & feeding, selected);
         $finish;
     end
     if (cycle >= 0 && seen !== {{tx, contact, alive}}) $display("pins %0d %b %b %b", cycle, tx, contact, alive);
@@ -174,11 +174,16 @@ def _sheet(skin: Skin) -> tuple[str, str]:
     rows, columns = f"[{skin.row_lines - 1}:0]", f"[{skin.column_lines - 1}:0]"
     selecting, level, let_go = ("~rows", "~reads", "touched") if skin.selects_low else ("rows", "reads", "~touched")
     pulled = " | ".join(f"{{{skin.column_lines}{{selected[{row}]}}}} & closed{row}" for row in lines)
-    feeding = ", ".join(f"|(closed{row} & columns_drive & ~stuck)" for row in reversed(lines))
+    feeding = ", ".join(f"|(closed{row} & feeding & ~stuck)" for row in reversed(lines))
     reverses = skin.reads_rows
+    checks = reverses and skin.guard
+    released = f"columns_level == 1'b{int(skin.selects_low)}"
+    guard = f"{{~({released}), {{{skin.columns}{{{released}}}}}}}"
     text = f"""wire {rows} rows;
 wire {rows} rows_drive{"" if reverses else f" = {{{skin.row_lines}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
+{"wire columns_level;" if checks else ""}
+wire {columns} feeding = columns_drive{f" & {guard}" if checks else ""};
 wire {rows} selected = {selecting} & rows_drive;
 wire {columns} pulled = {pulled};
 wire {columns} reads = pulled | stuck;
@@ -187,6 +192,7 @@ wire {rows} rows_read = rows & rows_drive | {let_go} & ~rows_drive;
 """
     pins = f", .columns({level}), .rows(rows)"
     pins += ", .columns_drive(columns_drive)" if skin.precharge_us else ""
+    pins += ", .columns_level(columns_level)" if checks else ""
     return text, pins + (", .rows_drive(rows_drive), .rows_read(rows_read)" if reverses else "")
 
 

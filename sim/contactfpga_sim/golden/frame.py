@@ -12,7 +12,7 @@ from contactfpga_sim.golden.packet import Packet
 from contactfpga_sim.golden.scan import Scan
 
 ZONES, CELLS, BARYCENTERS = 5, 6, 7
-OVERFLOW, FAULT = 1, 4
+OVERFLOW, FAULT, MOTION = 1, 4, 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Packer:
                 (cells, facts.area_bits),
                 (zones, facts.zones_bits),
                 (self._overwritten % 2**room, room),
-                (overflow * OVERFLOW | items.scan.fault * FAULT, 4),
+                (overflow * OVERFLOW | items.scan.fault * FAULT | items.scan.motion * MOTION, 4),
                 (BARYCENTERS if facts.divided else ZONES if facts.zones else CELLS, 4),
             )
         )

@@ -8,7 +8,10 @@ import numpy as np
 
 from contactfpga_sim.golden import debounce
 from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
+from contactfpga_sim.golden import reversal_guard
+from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
 
 RETRY_US = 2**16
@@ -49,22 +52,25 @@ class Scanner:
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
         self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
+        self.checks = Checks(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
 
     def frame(self) -> None:
         """The next frame."""
         begun = self._begin()
         held = self._hold(begun)
-        todo = sorted(self._touched(begun - 2) | self._busy)
+        touched = self._touched(begun - 2)
+        todo = sorted(touched | self._busy)
         scan = Scan(
             cells=np.zeros((self._facts.rows, self._facts.columns), bool),
             offered=[],
-            stuck=int(np.sum(held & ~self._facts.mask.all(axis=0))),
+            stuck=int(np.sum(held[: self._facts.columns] & ~self._facts.mask.all(axis=0))),
             time_us=begun // self._facts.clocks_per_us,
             requested=any(one.cycle < begun for one in self._waiting()),
             heard=last_number(self._requests, begun) % 8,
             told=begun + 3,
             slots=0,
             alone=frozenset(todo),
+            faults=self.checks.word if self.checks else 0,
         )
         self.begun.append(begun)
         self._rests = not todo
@@ -72,7 +78,8 @@ class Scanner:
         counted = self._drive(begun, todo, rows, scan.cells)
         if not scan.cells.any():
             self._set_contact(self.slots[-1].strobe + 1 if todo else begun + 1, 0)
-        self._packed = rows.end(scan, counted)
+        motion = any(not scan.cells[row].any() for row in touched & self._clean_rows())
+        self._packed = rows.end(dataclasses.replace(scan, motion=motion), counted)
 
     # ---- when a frame begins
 
@@ -82,16 +89,43 @@ class Scanner:
         project = self._facts.project
         if not self._rests:
             return max(self._listens + project + 1, self._packed)
-        wanted = max(self._wanted(), self._packed)
-        self._rest(self.begun[-1] + 1, wanted)
-        touched = self._first_touched(self.begun[-1] - 1, wanted - 2)
-        if touched is None:
-            return wanted
+        begin = self.begun[-1] + 1
+        while True:
+            wanted = max(self._wanted(), self._packed, begin)
+            check = max(self.checks.asked, begin) if self.checks else wanted + 1
+            until = min(wanted, check)
+            self._rest(begin, until)
+            touched = self._first_touched(begin - 2, until - 2)
+            self._watch(begin, until if touched is None else touched + 2)
+            if touched is not None:
+                return max(self._wake(touched) + project, self._packed)
+            if not self.checks or wanted < check:
+                return wanted
+            self._listen_after(*self.checks.at_rest(check))
+            self._stages.watch(self._listens)
+            begin = self._listens + project + 1
+
+    def _watch(self, begin: int, end: int) -> None:
+        """The sheet rests in these cycles; without guard lines that is told now and then."""
+        turn = reversal_guard.CHECK_US * self._facts.clocks_per_us
+        if not self.checks:
+            for cycle in range(-(-begin // turn) * turn, end + 1, turn):
+                self._stages.watch(cycle)
+
+    def _wake(self, touched: int) -> int:
+        """A row reads touched in this cycle; returns the one in which it is seen."""
         seen = touched + 2
         self._held = [entry for entry in self._held if entry[0] <= seen]
         if self._touched(touched) & self._clean_rows():
             self._set_contact(seen + 1, 1)
-        return max(seen + project, self._packed)
+        return seen
+
+    def _listen_after(self, checked: int, guard_is_stuck: bool) -> None:
+        """A check had its sample in this cycle."""
+        if guard_is_stuck:
+            self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
+        self._listens = checked + 2
+        self._stages.tell(checked + 3, self.checks.word if self.checks else 0)
 
     def _wanted(self) -> int:
         """The first cycle in which a frame is, though nothing is touched."""
@@ -109,13 +143,10 @@ class Scanner:
 
     def _touched(self, cycle: int) -> frozenset[int]:
         """Rows that read touched at the pins and are not masked whole."""
-        cells, stuck = self._timeline.at(cycle)
-        if cells is None:
-            return frozenset()
-        driven = ~self._undriven(cycle) & ~self._facts.mask.all(axis=0)
-        if stuck is not None:
-            driven &= ~np.asarray(stuck, bool)
-        rows = (np.asarray(cells, bool) & driven).any(axis=1) & ~self._facts.mask.all(axis=1)
+        facts = self._facts
+        driven = ~self._undriven(cycle) & ~stuck(facts, self._timeline, cycle)
+        lines = closed(facts, self._timeline, cycle)[: facts.rows] & driven
+        rows = (lines[:, : facts.columns] & ~facts.mask.all(axis=0)).any(axis=1) & ~facts.mask.all(axis=1)
         return frozenset(np.flatnonzero(rows).tolist())
 
     def _clean_rows(self) -> set[int]:
@@ -125,7 +156,7 @@ class Scanner:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
         retry = RETRY_US * self._facts.clocks_per_us
         driven = (cycle + 2 for cycle, _ in self._held)
-        turns = {begin, *self._changes, *driven, *range(begin // retry * retry + 2, end + 1, retry)}
+        turns = {begin, *self._changes, *driven, *(cycle for cycle, _ in self._timeline.cuts), *range(begin // retry * retry + 2, end + 1, retry)}
         return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
 
     def _rest(self, begin: int, end: int) -> None:
@@ -143,12 +174,14 @@ class Scanner:
         for begun, held in reversed(self._held):
             if begun + 2 <= cycle:
                 return held if (cycle - 2) // retry == begun // retry else np.zeros_like(held)
-        return np.zeros(self._facts.columns, bool)
+        return np.zeros(self._facts.column_lines, bool)
 
-    def _hold(self, cycle: int) -> np.ndarray:
-        """Columns that read pressed in this cycle, or did since the last retry: from then on they are not driven."""
-        _, stuck = self._timeline.at(cycle - 2)
-        now = np.zeros(self._facts.columns, bool) if stuck is None else np.asarray(stuck, bool)
+    def _hold(self, cycle: int, now: np.ndarray | None = None) -> np.ndarray:
+        """Columns that read pressed in this cycle, or did since the last retry: from then on they are not driven.
+        Without ``now`` those that are stuck, but for a guard column."""
+        if now is None:
+            now = stuck(self._facts, self._timeline, cycle - 2)
+            now &= np.arange(len(now)) < self._facts.columns
         retry = RETRY_US * self._facts.clocks_per_us
         before = [held for last, held in self._held[-1:] if last // retry == cycle // retry]
         self._held.append((cycle, np.logical_or.reduce([now, *before])))
@@ -178,16 +211,14 @@ class Scanner:
             handed.nothing(begun + 1)
         else:
             self._listens = self.slots[-1].sample + 2
+            if self.checks:
+                self._listen_after(*self.checks.after(self.slots[-1].sample))
         return counted
 
     def _read(self, slot: Slot) -> np.ndarray:
-        pressed, stuck = self._timeline.at(slot.sample)
-        columns = np.zeros(self._facts.columns, bool)
-        if pressed is not None:
-            columns |= np.asarray(pressed[slot.row], bool)
-        if stuck is not None:
-            columns |= np.asarray(stuck, bool)
-        return columns & ~self._facts.mask[slot.row]
+        facts = self._facts
+        lines = closed(facts, self._timeline, slot.sample)[slot.row] | stuck(facts, self._timeline, slot.sample)
+        return np.asarray(lines[: facts.columns] & ~facts.mask[slot.row])
 
     def _set_contact(self, cycle: int, level: int) -> None:
         if level != (self.contact[-1][1] if self.contact else 0):
@@ -246,10 +277,13 @@ class Reversal(ScanRule):
         return facts.rows + -(-facts.project // facts.row_clocks)
 
     def scan(self, play: Play) -> Scanned:
-        scanner = Scanner(play)
+        scanner, facts = Scanner(play), play.facts
         while not scanner.begun or scanner.begun[-1] <= play.cycles:
             scanner.frame()
-        driven = [change for slot in scanner.slots for change in ((slot.begin, 1 << slot.row), (slot.sample + 1, 0))]
+        slots = [(slot.begin, slot.sample, slot.row) for slot in scanner.slots]
+        if scanner.checks:
+            slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.checks.slots])
+        driven = [change for begin, sample, row in slots for change in ((begin, 1 << row), (sample + 1, 0))]
         return Scanned(scanner.contact, driven, scanner.begun)
 
 

@@ -43,6 +43,9 @@ class Scan:
     faults: int = 0
     """What was told of faulty lines when it ended, as :attr:`contactfpga_sim.golden.guard.Told.word` has it."""
 
+    motion: bool = False
+    """A row read touched as the frame began, and empty when it was driven."""
+
     @property
     def fault(self) -> bool:
         """What its frame tells of faults."""

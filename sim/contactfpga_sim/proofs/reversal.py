@@ -36,7 +36,7 @@ class Sheet:
         self.proof, self.skin = proof, skin
         self.dut = dut = ReversalScanner(skin)
         self.inside = proof.put(dut)
-        self.columns, self.rows = proof.free(skin.columns, "columns"), proof.free(skin.rows, "rows")
+        self.columns, self.rows = proof.free(skin.column_lines, "columns"), proof.free(skin.row_lines, "rows")
         self.packed = proof.free(1, "packed")
         m.d.comb += [
             dut.pins.columns.eq(self.columns),
@@ -50,7 +50,7 @@ class Sheet:
         if dut.derived.debounced:
             m.d.comb += dut.busy.eq(proof.free(skin.rows, "busy"))
             busy = dut.busy
-        self.selected = Signal(skin.rows)  # rows that the pins drive to the selecting level
+        self.selected = Signal(skin.row_lines)  # rows that the pins drive to the selecting level
         level = ~dut.pins.rows if skin.selects_low else dut.pins.rows
         m.d.comb += self.selected.eq(level & dut.pins.rows_drive)
         self.undriven_selected = level & ~dut.pins.rows_drive
@@ -58,7 +58,7 @@ class Sheet:
         self.read = ~self.rows if not skin.selects_low else self.rows  # rows that read touched
         self.read_1 = proof.before(self.read)
         self.read_2 = proof.before(self.read_1)
-        released = released_levels(skin, skin.columns)
+        released = released_levels(skin, skin.column_lines)
         columns_1 = proof.before(self.columns, init=released)
         columns_2 = proof.before(columns_1, init=released)
         self.columns_before = columns_1, columns_2

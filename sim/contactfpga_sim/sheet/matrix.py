@@ -80,11 +80,19 @@ class Matrix:
     def _on_lines(self, columns: int) -> int:
         return sum(1 << line for column, line in enumerate(self._column_line) if columns >> column & 1)
 
-    def levels(self, rows: int, rows_driven: int | None = None, columns_driven: int = 0) -> int:
+    def feeding(self, driven: int, level: int | None) -> tuple[int, int]:
+        """Of the columns that are driven those to the released level, and those to the selecting one. ``level`` is that
+        of all but the guard column, which is driven to the other one; None where columns are driven one way only."""
+        if level is None:
+            return driven, 0
+        released = driven & (self._all_columns >> 1 if level == self._selects_low else ~(self._all_columns >> 1))
+        return released, driven & ~released
+
+    def levels(self, rows: int, rows_driven: int | None = None, columns_driven: int = 0, columns_held: int = 0) -> int:
         """Levels of the columns, bit c is column c, for the levels of the row pins, bit r is row r.
 
         ``rows_driven``: which rows are driven, by default all; ``columns_driven``: which columns are, to the released
-        level. Raises :class:`Contention`.
+        level; ``columns_held``: which to the selecting one. Raises :class:`Contention`.
         """
         selected = (rows ^ self._all_rows if self._selects_low else rows) & self._driven(rows_driven)
         pulled = 0
@@ -93,7 +101,7 @@ class Matrix:
                 pulled |= word
         if fights := pulled & columns_driven:
             raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
-        pressed = pulled | self.stuck
+        pressed = pulled | self.stuck | columns_held
         return pressed ^ self._all_columns if self._selects_low else pressed
 
     def row_levels(self, rows: int, rows_driven: int, columns_driven: int) -> int:

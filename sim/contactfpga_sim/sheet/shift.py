@@ -82,6 +82,8 @@ class Sheet:
         self.drives: tuple[str, ...] = (COLUMN_DATA[skin.column_read],)
         if skin.precharge_us:
             self.reads += ("columns_drive",)
+        if skin.reads_rows and skin.guard:
+            self.reads += ("columns_level",)
         if skin.reads_rows:
             self.reads += ("rows_drive",)
             self.drives += ("rows_read",)
@@ -102,8 +104,9 @@ class Sheet:
         else:
             levels = self.row_registers.step(*(pins[name] for name in ROW_PINS["74hc595"]))
             self.row_levels = self._released if levels is None else levels & (1 << self.matrix.row_lines) - 1
-        rows_driven, columns_driven = pins.get("rows_drive"), pins.get("columns_drive", 0)
-        columns = self.matrix.levels(self.row_levels, rows_driven, columns_driven)
+        rows_driven = pins.get("rows_drive")
+        columns_driven, held = self.matrix.feeding(pins.get("columns_drive", 0), pins.get("columns_level"))
+        columns = self.matrix.levels(self.row_levels, rows_driven, columns_driven, held)
         if rows_driven is not None:
             return columns, self.matrix.row_levels(self.row_levels, rows_driven, columns_driven)
         if self.column_registers is None:

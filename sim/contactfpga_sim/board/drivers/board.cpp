@@ -51,7 +51,14 @@ public:
 
     static Word driven(Word row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROW_LINES); }
 
-    // Once a clock; `fights` counts the clocks in which a driven column meets a row that is driven to the other level.
+    // Of the columns that are driven those to the released level, where `level` is that of all but the guard column, the
+    // last one, which is driven to the other one.
+    static Word feeding(Word driven, bool level) {
+        return driven & (level == COL2ROW ? mask(COLUMN_LINES - 1) : ~mask(COLUMN_LINES - 1));
+    }
+
+    // Once a clock, with the columns that are driven to the released level; `fights` counts the clocks in which one meets
+    // a row that is driven to the other level.
     uint64_t fights = 0;
     Word levels(Word driven, Word columns_driven) {
         Word reads = 0;
@@ -200,7 +207,12 @@ class Board {
     auto &columns() { return model_.top.p_columns; }
 #endif
 
-#if PRECHARGE
+#if GUARD && REVERSAL && PROBES
+    Word columns_driven() {
+        const auto &top = model_.top;
+        return Matrix::feeding(static_cast<Word>(get(top.p_columns__drive)), get(top.p_columns__level));
+    }
+#elif PRECHARGE
     Word columns_driven() { return static_cast<Word>(get(model_.top.p_columns__drive)); }
 #else
     Word columns_driven() { return 0; }

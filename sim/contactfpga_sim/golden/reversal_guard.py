@@ -1,0 +1,86 @@
+"""Line reversal with guard lines: when rows and columns are checked, and what these checks tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.guard import Told, closed, stuck
+from contactfpga_sim.golden.trace import Timeline
+
+CHECK_US = 2**8
+"""A sheet at rest is checked when the clock passes a multiple of this."""
+
+
+class Checks:
+    """Of columns and rows in turn."""
+
+    def __init__(self, facts: Facts, timeline: Timeline, retry_us: int, undriven: Callable[[int], np.ndarray]):
+        """``undriven``: (C + 1,) bool, the columns that are not driven in a cycle as they read stuck."""
+        self.slots: list[tuple[int, int]] = []
+        """First and last cycle of each slot of the guard row."""
+        self._facts = facts
+        self._timeline = timeline
+        self._undriven = undriven
+        self._retry = retry_us * facts.clocks_per_us
+        self._retries = 0  # up to the last check of rows
+        self._renews = False
+        self._told = Told(facts)
+        self._of_rows = False
+        self._last = 0  # the cycle in which the last check started
+
+    @property
+    def word(self) -> int:
+        """What is told, from three cycles after the last check's sample on."""
+        return self._told.word
+
+    @property
+    def asked(self) -> int:
+        """The cycle from which on a sheet at rest is checked."""
+        turn = CHECK_US * self._facts.clocks_per_us
+        return (self._last // turn + 1) * turn + 1
+
+    def after(self, sample: int) -> tuple[int, bool]:
+        """The last row of a frame was sampled; returns the cycle of the check's sample, and whether it finds the guard
+        column stuck."""
+        facts = self._facts
+        wait = 1 + max(facts.project, facts.settle) if self._of_rows else facts.row_clocks
+        return self._check(sample, sample + wait)
+
+    def at_rest(self, cycle: int) -> tuple[int, bool]:
+        """The same for a sheet that rests in this cycle, the last one before the check."""
+        return self._check(cycle, cycle + self._facts.settle + (1 if self._of_rows else 2))
+
+    def _check(self, start: int, sample: int) -> tuple[int, bool]:
+        self._last = start
+        self._of_rows = not self._of_rows
+        if self._of_rows:
+            self.slots.append((sample - self._facts.settle + 1, sample))
+            self._check_columns(sample)
+        else:
+            self._check_rows(sample)
+        return sample, not self._of_rows and bool(self._stuck(sample)[-1])
+
+    def _check_rows(self, sample: int) -> None:
+        facts = self._facts
+        answers = closed(facts, self._timeline, sample)[: facts.rows, -1] & ~self._undriven(sample)[-1]
+        guard = self._stuck(sample) & (np.arange(facts.column_lines) == facts.columns)
+        if not guard[-1] and not self._guard_told:
+            self._told.check("rows", ~answers, self._renews)
+        self._told.check("stuck", guard | self._undriven(sample + 3), self._renews)
+        retries = (sample + 2) // self._retry
+        self._renews, self._retries = retries != self._retries, retries
+
+    def _check_columns(self, sample: int) -> None:
+        facts = self._facts
+        answers = (closed(facts, self._timeline, sample)[-1] | self._stuck(sample))[: facts.columns]
+        self._told.check("columns", ~answers, self._renews)
+
+    @property
+    def _guard_told(self) -> bool:
+        return bool(self.word >> self._facts.rows + 2 * self._facts.columns)
+
+    def _stuck(self, cycle: int) -> np.ndarray:
+        return stuck(self._facts, self._timeline, cycle)

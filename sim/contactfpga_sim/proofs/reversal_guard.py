@@ -1,0 +1,168 @@
+"""Line reversal with guard lines: pins never meet, no line that is whole is told, and checks are made."""
+
+from functools import partial
+from typing import Any
+
+from amaranth.hdl import Const, Mux, Signal, Value
+
+from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.precharge import apart
+from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
+
+LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the source names them where there are guard lines
+
+
+def _inverted(sheet: Sheet) -> Value:
+    """The pins drive columns to the selecting level, and the guard column to the released one."""
+    return sheet.dut.pins.columns_level != int(sheet.skin.selects_low)
+
+
+def pins(proof: Proof, **changes: Any) -> None:
+    """Free: the sheet, and what the stages after do in each clock.
+
+    Claimed: at most one row is selected, the guard row counted, and none while rows are let go; no column is driven then
+    nor in the clock before or after; rows are let go together, but for the guard row, which is held at the released
+    level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is driven.
+    """
+    sheet = Sheet(proof, skin_of(guard=True, **changes))
+    drive, columns, every = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive, (1 << sheet.skin.rows) - 1
+    rows = drive[: sheet.skin.rows]
+    apart(proof, columns, sheet.selected)
+    proof.claim(sheet.selected & (sheet.selected - 1) == 0)
+    proof.claim((rows == 0) | (rows == every))
+    proof.claim((rows != 0) | (sheet.selected == 0))
+    proof.claim(sheet.undriven_selected == 0)
+    proof.claim((rows == 0) | ~_inverted(sheet))
+    started = proof.before(1)
+    proof.claim(drive[-1] == started)
+    with proof.m.If(~started):
+        proof.claim((drive == 0) & (columns == 0))
+    pin_lemmas(sheet)
+
+
+def pin_lemmas(sheet: Sheet) -> None:
+    """What a state does to the sheet is seen a clock later."""
+    proof, state, clock, inside, skin = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.skin
+    derived, rows = sheet.dut.derived, sheet.skin.rows
+    before, started = proof.before(state, init=LISTEN), proof.before(1)
+    lets_go = (before == LISTEN) | (before == ANSWER)
+    selects, of_guard = (state == SELECT) & (clock != 0), inside["selects"]
+    row = (Const(1, rows) << inside["y"])[:rows]
+    proof.lemma(state <= SELECT)
+    proof.lemma(inside["selected"] == Mux(selects & ~of_guard, row, 0))
+    proof.lemma(inside["guard"] == (selects & of_guard))
+    proof.lemma((sheet.dut.pins.columns_drive == 0) | lets_go | (before == CHARGE))
+    proof.lemma(sheet.dut.pins.rows_drive[:rows] == Mux(lets_go, 0, (1 << rows) - 1))
+    proof.lemma(inside["inverted"] == (before == ANSWER))
+    proof.lemma(inside["holds"] == started)
+    proof.lemma((state != SELECT) | (before == Mux(clock == 0, GAP, SELECT)) & (clock <= derived.settle_clocks))
+    proof.lemma((state != GAP) | (before == CHARGE) | (before == LISTEN) & of_guard & started)
+    proof.lemma((state != ANSWER) | (before == LISTEN) | (before == SELECT) & (clock == 0) | (before == ANSWER))
+    proof.lemma((state == LISTEN) | (state == ANSWER) | started)
+    proof.lemma((state != ANSWER) | started)
+    with proof.m.If((state == LISTEN) & (clock != 0)):
+        proof.lemma((before == LISTEN) & started)
+
+
+class Lines:
+    """A row and a column that are whole, which the solver chooses: within the settle time the row answers the guard
+    column, and the column the guard row. The guard column may be stuck, and then feeds no row."""
+
+    def __init__(self, sheet: Sheet):
+        proof, skin, settle = sheet.proof, sheet.skin, sheet.dut.derived.settle_clocks
+        y, x = proof.chosen(range(skin.rows), "y"), proof.chosen(range(skin.columns), "x")
+        proof.given((y < skin.rows) & (x < skin.columns))
+        self.of_row = lambda rows: rows.bit_select(y, 1)
+        self.of_column = lambda columns: columns.bit_select(x, 1)
+        pins = sheet.dut.pins
+        feeds = _inverted(sheet) & pins.columns_drive[-1] & (pins.rows_drive[: skin.rows] == 0)
+        self.fed, self.pulled = Signal(range(settle + 1)), Signal(range(settle + 1))  # clocks before this one
+        for count, now in ((self.fed, feeds), (self.pulled, sheet.selected[-1])):
+            proof.m.d.sync += count.eq(Mux(now, Mux(count == settle, settle, count + 1), 0))
+        proof.given(~(feeds & (self.fed >= settle - 1) & ~sheet.pressed[-1]) | self.of_row(sheet.read))
+        proof.given(~(sheet.selected[-1] & (self.pulled >= settle - 1)) | self.of_column(sheet.pressed))
+
+
+def whole(proof: Proof, **changes: Any) -> None:
+    """Free: the sheet, but for one row and one column that are whole, see ``Lines``; and what the stages after do.
+
+    Claimed: these two are never told as open. After the last row of a frame there is a check before the next frame
+    begins, and checks of columns and rows come in turn.
+    """
+    sheet = Sheet(proof, skin_of(guard=True, **changes))
+    lines, inside, m = Lines(sheet), sheet.inside, proof.m
+    told = sheet.dut.faults
+    proof.claim(~lines.of_row(told.rows) & ~lines.of_column(told.columns))
+    owed, last = Signal(), Signal(init=1)  # a check, since a frame with a row began; the last one was of the rows
+    checked, of_rows = inside["checked"], inside["of_rows"]
+    with m.If(sheet.begins & sheet.wanted.any()):
+        m.d.sync += owed.eq(1)
+    with m.If(checked[1]):
+        m.d.sync += [owed.eq(0), last.eq(~of_rows)]
+    proof.claim(~(sheet.begins & owed))
+    proof.claim(~checked[1] | (last == of_rows))
+    pin_lemmas(sheet)
+    synchronizer_lemmas(sheet)
+    _check_lemmas(sheet, lines, owed, last)
+
+
+def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> None:
+    """How far a check is, and what the pins have shown of the two lines."""
+    proof, state, clock, inside, told = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.dut.faults
+    derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
+    settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
+    spared = checks - settle
+    checked, of_rows, selects, free = inside["checked"], inside["of_rows"], inside["selects"], inside["precharge.free"][-1]
+    blind = told.stuck[-1]
+    proof.lemma(free | blind)
+    proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
+    proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= spared) | (before == ANSWER)))
+    proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))
+    proof.lemma(~((state == LISTEN) | (state == ANSWER) | selects) | (inside["todo"] == 0))
+    proof.lemma(~owed | (state != LISTEN) | (checked != 0))
+    pending = (state == ANSWER) | selects | (checked != 0)
+    proof.lemma(last == (of_rows ^ ~pending))
+    proof.lemma((before != ANSWER) | blind | sheet.dut.pins.columns_drive[-1])
+    with proof.m.If((state == ANSWER) & ~blind & (clock > spared)):
+        proof.lemma(lines.fed >= clock - spared - 1)
+    with proof.m.If((state == SELECT) & selects & (clock != 0)):
+        proof.lemma(lines.pulled == clock - 1)
+    for number, read, pressed in ((1, sheet.read_1, sheet.pressed_1), (2, sheet.read_2, sheet.pressed_2)):
+        with proof.m.If(checked == number):
+            proof.lemma(Mux(of_rows, lines.of_column(pressed), blind | pressed[-1] | lines.of_row(read)))
+
+
+_PIN_BUGS = (
+    Bug("the guard row with another one", ReversalScanner, "guard",
+        lambda guard, inside: guard | (inside["turn_state"] == SELECT)),
+    Bug("the guard row while rows are let go", ReversalScanner, "guard",
+        lambda guard, inside: guard | (inside["turn_state"] == ANSWER)),
+    Bug("the guard row is let go", ReversalScanner, "holds", lambda holds, inside: ~inside["listens"]),
+    Bug("no gap before the guard row", ReversalScanner, "charges",
+        lambda charges, inside: charges | (inside["turn_state"] == GAP) & inside["selects"]),
+    Bug("no gap after a row", ReversalScanner, "inverts",
+        lambda inverts, inside: inverts | (inside["turn_state"] == SELECT)),
+    Bug("rows are held against the guard column", ReversalScanner, "listens",
+        lambda listens, inside: listens & ~inside["inverts"]),
+)  # fmt: skip
+_WHOLE_BUGS = (
+    Bug("rows are read too early", ReversalScanner, "clock",
+        lambda clock, inside: clock + (inside["starts"] & inside["of_rows"])),
+    Bug("told by a stuck guard column", ReversalScanner, "checks_rows",
+        lambda _, inside: inside["of_guard"].replicate(len(inside["checks_rows"]))),
+    Bug("columns are told by the rows' check", ReversalScanner, "checks_columns", lambda _, inside: inside["checked"][1]),
+    Bug("rows only", ReversalScanner, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
+    Bug("the next frame without a check", ReversalScanner, "checked",
+        lambda checked, inside: Mux(inside["turn_state"] == SELECT, 0, checked)),
+)  # fmt: skip
+CASES = (
+    Case("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
+    Case("pins never meet", "2x1, guard lines, row2col, shortest times",
+         partial(pins, rows=2, columns=1, diodes="row2col", **SHORT), 2),
+    Case("whole lines are not told", "3x2", partial(whole, rows=3, columns=2, project_us=5), 2),
+    Case("whole lines are not told", "2x1, row2col, shortest times, debounced",
+         partial(whole, rows=2, columns=1, diodes="row2col", debounce="sym_defer_pk", **SHORT), 2, _WHOLE_BUGS, 40),
+)  # fmt: skip
