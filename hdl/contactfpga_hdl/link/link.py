@@ -26,9 +26,8 @@ class _Wire:
         self.take_frame = Signal()  # the frame that waits is next
         self.take_hello = Signal()
         self.is_hello = Signal()
-        reports = bool(faults_layout(Derived(skin)).size)
-        self.take_report = Signal() if reports else Const(0)
-        self.is_report = Signal() if reports else Const(0)
+        self.take_report = Signal()
+        self.is_report = Signal()
         self.offset = Signal(offset_bits(skin))  # of the byte on offer, in its region
         self.fetches = Signal()  # that byte is read
 
@@ -95,13 +94,13 @@ class Link(wiring.Component):
         frames_sent = self._decide(m, wire, regions)
         self._time_hello(m, wire, hello_due)
         byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
-        reporter = self._reports(m, wire) if isinstance(wire.is_report, Signal) else None
+        reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
         if reporter is not None:
             byte = Mux(wire.is_report, reporter.byte, byte)
         self._send(m, wire, regions, hello_due, byte, reporter)
         return m
 
-    def _reports(self, m: Module, wire: _Wire) -> Reporter:
+    def _reporter(self, m: Module, wire: _Wire) -> Reporter:
         m.submodules.reporter = reporter = Reporter(self.skin)
         m.d.comb += [
             reporter.word.eq(self.faults),
@@ -114,6 +113,17 @@ class Link(wiring.Component):
         if self.skin.self_test:
             wiring.connect(m, wiring.flipped(self.slots), reporter.slots)
         return reporter
+
+    def _take_report(
+        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value, reporter: Reporter
+    ) -> None:
+        """Before a frame, but not after another report."""
+        m.d.comb += wire.take_report.eq(reporter.due & ~hello_due & ~(wire.is_report & regions.waits))
+        m.d.sync += wire.is_report.eq(wire.take_report)
+        with m.If(wire.take_report):
+            m.d.comb += wire.take_frame.eq(0)
+            m.d.sync += end.eq(reporter.length)
+            m.next = "FETCH"
 
     def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
         with m.If(wire.take_frame):
@@ -218,7 +228,7 @@ class Link(wiring.Component):
         self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value, reporter: Reporter | None
     ) -> None:
         end = Signal.like(wire.offset)
-        seeded = wire.take_frame | wire.take_report
+        seeded = wire.take_frame if reporter is None else wire.take_frame | wire.take_report
         seeds = Signal()  # one clock after a frame or a report was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
@@ -234,7 +244,7 @@ class Link(wiring.Component):
                 m.d.comb += [
                     wire.idle.eq(1),
                     wire.take_hello.eq(hello_due),
-                    wire.take_frame.eq(regions.waits & ~hello_due & ~wire.take_report),
+                    wire.take_frame.eq(regions.waits & ~hello_due),
                 ]
                 m.d.sync += [
                     wire.is_hello.eq(hello_due),
@@ -244,11 +254,7 @@ class Link(wiring.Component):
                 with m.If(hello_due | regions.waits):
                     m.next = "FETCH"
                 if reporter is not None:
-                    m.d.comb += wire.take_report.eq(reporter.due & ~hello_due & ~(wire.is_report & regions.waits))
-                    m.d.sync += wire.is_report.eq(wire.take_report)
-                    with m.If(wire.take_report):
-                        m.d.sync += end.eq(reporter.length)
-                        m.next = "FETCH"
+                    self._take_report(m, wire, regions, hello_due, end, reporter)
             with m.State("FETCH"):
                 m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"

@@ -1,5 +1,7 @@
 """What the host asks for: requests and commands among the bytes at the receive pin (docs/protocol.md)."""
 
+from typing import Any
+
 from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
@@ -69,8 +71,8 @@ class RequestReader(wiring.Component):
         self._keep_number(m, place, bit)
         if self.commands:
             m.d.comb += self.command.eq(self.received & is_command)
-            self._keep(m, self.what, (place >= _WHAT) & (place < _VALUE), bit)
-            self._keep(m, self.value, (place >= _VALUE) & (place < self._kind), bit)
+            self._keep(m, self.what, _WHAT, _VALUE, place, bit)
+            self._keep(m, self.value, _VALUE, self._kind, place, bit)
         return m
 
     def _read_code(self, m: Module, place: Value, bit: Value) -> Value:
@@ -103,10 +105,9 @@ class RequestReader(wiring.Component):
 
     def _read_kind(self, m: Module, place: Value, bit: Value, is_command: Value) -> Value:
         fits = Signal()
-        request, command = (
-            Const(protocol.last_byte(kind), 8).bit_select(bit, 1) for kind in (protocol.KIND_REQUEST, KIND_COMMAND)
-        )
-        wanted = Mux(is_command, command, request) if self.commands else request
+        wanted = Const(protocol.last_byte(protocol.KIND_REQUEST), 8).bit_select(bit, 1)
+        if self.commands:
+            wanted = Mux(is_command, Const(protocol.last_byte(KIND_COMMAND), 8).bit_select(bit, 1), wanted)
         with m.If(self.bits.bit & (place == self._kind)):
             with m.If(bit == 0):
                 m.d.sync += [self.hello.eq(self.bits.level), fits.eq(1)]
@@ -117,15 +118,12 @@ class RequestReader(wiring.Component):
     def _keep_number(self, m: Module, place: Value, bit: Value) -> None:
         number = Signal.like(self.number)
         whole = Signal()
-        with m.If(self._keep(m, number, (place >= _NUMBER) & (place < _WHAT), bit)):
-            m.d.sync += whole.eq(0)
+        self._keep(m, number, _NUMBER, _WHAT, place, bit, whole.eq(0))
         with m.If(self.received):
             m.d.sync += [whole.eq(1), self.heard.eq(number)]
         m.d.comb += self.number.eq(number & whole.replicate(len(number)))
 
-    def _keep(self, m: Module, kept: Value, here: Value, bit: Value) -> Value:
-        """Shift the bits of digits into a register; returns whether one comes."""
-        comes = self.bits.bit & here & (bit != 7)
-        with m.If(comes):
-            m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level)]
-        return comes
+    def _keep(self, m: Module, kept: Value, first: int, end: int, place: Value, bit: Value, *also: Any) -> None:
+        """Shift the bits of digits at these places into a register."""
+        with m.If(self.bits.bit & (place >= first) & (place < end) & (bit != 7)):
+            m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level), *also]
