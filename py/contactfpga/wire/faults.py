@@ -14,6 +14,7 @@ SLOT_DIGITS = 2
 """Of a slot's number."""
 
 STUCK, UNNAMED = "stuck", "unnamed fault"
+"""Names of a fault where a board cannot name it, and where its name has not come."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,27 +29,27 @@ class Faults:
     """Columns that read pressed while no row was driven; the guard column counts as the one after the last."""
     joined: bool = False
     """The self-test found lines that are joined."""
+    names: tuple[str, ...] = dataclasses.field(default=(), compare=False)
+    """The same in words, sorted, as in :attr:`Zones.faults`."""
 
     def __bool__(self) -> bool:
         """Whether there is any."""
         return bool(self.rows_open or self.columns_open or self.columns_stuck or self.joined)
 
-    def names(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> tuple[str, ...]:
-        """Sorted names, for a sheet of so many rows and columns; switches that are masked check no line.
+    def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:
+        """The same with their names, for a sheet of so many rows and columns; switches that are masked check no line.
 
         Where all columns that are checked are open it is the guard row that is, and likewise for rows.
         """
         masked = set(mask)
-        checked_rows = {row for row in range(rows) if any((row, column) not in masked for column in range(columns))}
-        checked_columns = {
-            column for column in range(columns) if any((row, column) not in masked for row in range(rows))
-        }
+        all_rows, all_columns = range(rows), range(columns)
+        checked_rows = {row for row in all_rows if any((row, column) not in masked for column in all_columns)}
+        checked_columns = {column for column in all_columns if any((row, column) not in masked for row in all_rows)}
         found = _open("row", "guard column open", self.rows_open, checked_rows)
         found += _open("column", "guard row open", self.columns_open, checked_columns)
-        found += [
-            "guard column stuck" if column == columns else f"column {column} stuck" for column in self.columns_stuck
-        ]
-        return tuple(sorted([*found, *(["joined lines"] if self.joined else [])]))
+        stuck = ("guard column" if column == columns else f"column {column}" for column in self.columns_stuck)
+        found += [f"{line} stuck" for line in stuck]
+        return dataclasses.replace(self, names=tuple(sorted(found + ["joined lines"] * self.joined)))
 
 
 def _open(line: str, guard: str, lines: tuple[int, ...], checked: set[int]) -> list[str]:
@@ -97,8 +98,8 @@ def is_slot(plain: bytes) -> bool:
 def decode_faults(plain: bytes, rows: int, columns: int, guard: bool, self_test: bool) -> Faults:
     """Read an unsealed report of faults; raises :class:`PacketError` where it is none of such a board."""
     parts = (rows, columns, columns + 1) if guard else (0, 0, 0)
-    lines = _lines(plain[:-1], *parts, int(self_test))
-    return Faults(*lines[:3], joined=bool(lines[3]))
+    rows_open, columns_open, columns_stuck, joined = _lines(plain[:-1], *parts, int(self_test))
+    return Faults(rows_open, columns_open, columns_stuck, bool(joined))
 
 
 def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
