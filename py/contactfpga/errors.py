@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 UNSOLVED = 3
 """Exit status of a command whose answer is that there is no solution."""
 
@@ -33,7 +35,7 @@ class ReadTimeout(ContactFPGAError, TimeoutError):
 class NoData(ReadTimeout):
     """No frame came for longer than the reader allows; ``silence`` tells how long, and what came last."""
 
-    def __init__(self, message: str, silence: object):
+    def __init__(self, message: str, silence: Any):
         super().__init__(message)
         self.silence = silence
         """A :class:`~contactfpga.Silence`."""

@@ -80,7 +80,8 @@ class Reporter(wiring.Component):
         init = [*self._report, *[0] * ((1 << len(at)) - len(self._report))]
         m.submodules.sent = sent = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = sent.read_port(), sent.write_port()
-        offers, watched = Signal(), Signal()
+        offers = Signal()
+        watched = Signal()
         m.d.sync += [offers.eq(self.fetches & self.sends & ~is_slot), watched.eq(~self.sends)]
         m.d.comb += [read.addr.eq(at), write.en.eq(offers), write.addr.eq(at), write.data.eq(self.byte)]
         return watched & ~self.sends & (read.data != self.byte)

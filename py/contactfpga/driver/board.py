@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
 
 from contactfpga.driver.link import Link
-from contactfpga.driver.silence import checked_deadline
+from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport
@@ -105,6 +105,13 @@ class Board:
         also where it sends no frame. None: none were told, or its Skin has neither ``guard`` nor ``self_test``."""
         self._link.check_open()
         return self._link.conversation.lines.told
+
+    @property
+    def silence(self) -> Silence:
+        """How long no frame has come, and which one came last; of a board that is opened, since then."""
+        self._link.check_open()
+        with self._link.changed:
+            return self._link.silence(-math.inf)
 
     @property
     def stats(self) -> Stats:
