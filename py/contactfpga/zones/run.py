@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, NO_RECORDS, Frame
 from contactfpga.zones.zone import Zones
 
@@ -30,6 +31,8 @@ class Run:
     host_time_s: float | None
     before: Frame | None = None
     """The frame before the first one."""
+    faults: tuple[str, ...] = (STUCK,)
+    """Of its flagged frames; see :attr:`Zones.faults`."""
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -51,7 +54,8 @@ class Run:
 
     def __getitem__(self, index: int) -> Zones:
         before = self._frame(index - 1) if index else self.before
-        return Zones(self._frame(index), self.sheet, self._plain[2][index], before, self.host_time_s)
+        time_us = self._plain[2][index]
+        return Zones(self._frame(index), self.sheet, time_us, before, self.host_time_s, self.faults)
 
     def _frame(self, index: int) -> Frame:
         if (made := self._made.get(index)) is None:

@@ -11,6 +11,7 @@ from typing import overload
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import ghosts, labels, motion
 
@@ -73,6 +74,7 @@ class Zones(Sequence[Zone]):
         time_us: int | None = None,
         before: Frame | None = None,
         host_time_s: float | None = None,
+        faults: tuple[str, ...] = (STUCK,),
     ):
         self.frame = frame
         """The frame as it came over the wire."""
@@ -83,6 +85,11 @@ class Zones(Sequence[Zone]):
         self.host_time_s = host_time_s
         """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
         None in a recording."""
+        self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
+        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
+        ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
+        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
+        the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
         self._before = before
 
     @functools.cached_property
@@ -114,12 +121,6 @@ class Zones(Sequence[Zone]):
     def overwritten(self) -> int:
         """Frames that the board replaced by newer ones before they were sent, modulo what the trailer has room for."""
         return self.frame.overwritten
-
-    @property
-    def faults(self) -> frozenset[str]:
-        """Faults of the sheet that the board noticed: ``stuck``, a column read pressed while no row was driven. How
-        many columns did is in ``board.hello.stuck``."""
-        return frozenset({"stuck"} if "fault" in self.frame.flags else ())
 
     @property
     def total_zones(self) -> int:
@@ -245,7 +246,7 @@ class Zones(Sequence[Zone]):
             name: getattr(self, name)
             for name in ("sequence", "time_us", "host_time_s", "overwritten", "total_zones", "pressed")
         }
-        values["faults"] = sorted(self.faults)
+        values["faults"] = list(self.faults)
         values["flags"] = sorted(self.flags)
         values["rounding_mm"] = list(self.rounding_mm)
         values["zones"] = [dataclasses.asdict(zone) for zone in self]

@@ -39,7 +39,7 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
 
 def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, scan.Scanned]:
     known = facts(skin)
-    heard = request.heard(timeline.received, known.bit_clocks)
+    heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands))
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
     link = Link(known, State(known, frames, heard))
