@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.dual import Dual
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
@@ -32,11 +33,14 @@ class Top(wiring.Component):
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
     the records, and bytes.
+
+    A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
     """
 
-    def __init__(self, skin: Skin, probes: bool = False):
+    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False):
         self.skin = skin
         self.probes = probes
+        self.copy = copy
         self.derived = derived = Derived(skin)
         ports = {
             **row_pins(skin),
@@ -62,6 +66,8 @@ class Top(wiring.Component):
         super().__init__(ports)
 
     def elaborate(self, platform):
+        if self.skin.dual and not self.copy:
+            return self._compared()
         m = Module()
         bit_clocks = self.derived.bit_clocks
         m.submodules.scan = scan = self.derived.scan.load_gateware()(self.skin)
@@ -102,6 +108,13 @@ class Top(wiring.Component):
         if self.probes:
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
+        return m
+
+    def _compared(self) -> Module:
+        m = Module()
+        first, second = Top(self.skin, self.probes, copy=True), Top(self.skin, copy=True)
+        m.submodules.dual = dual = Dual(self.skin, first, second)
+        connect_pins(m, dual, self)
         return m
 
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
