@@ -34,8 +34,10 @@ class Dual(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         differs = Signal()
-        holds, holds_second = Signal(), Signal(init=1)
-        breaks, raises = Signal(), Signal()
+        breaks = Signal()
+        holds = Signal()
+        holds_second = Signal(init=1)
+        raises = Signal()
         m.submodules.first = ResetInserter(holds)(self.first)
         m.submodules.second = ResetInserter(holds_second)(self.second)
         self._connect(m)
