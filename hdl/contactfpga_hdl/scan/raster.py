@@ -1,6 +1,6 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
@@ -38,7 +38,7 @@ class _Sample:
         self.read = Signal(derived.skin.columns)  # columns that read pressed
         self.pressed = Signal(derived.skin.columns)  # and are not masked in this row
         self.is_first = self.row == 0
-        self.is_last = self.row == derived.skin.rows - 1
+        self.is_last = Signal()  # as the slot says, so that a row's number that is wrong is so for one scan at most
 
 
 class Scanner(wiring.Component):
@@ -93,7 +93,9 @@ class Scanner(wiring.Component):
         ends = slots.clock == slot - 1
         m.d.sync += slots.clock.eq(slots.clock + 1)
         with m.If(ends):
-            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(slots.following.rotate_left(1))]
+            # Of one row only, whatever it was.
+            before = slots.following[:-1]
+            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(Cat(~before.any(), before))]
         m.d.comb += [
             driver.pattern.eq(slots.following),
             driver.shift.eq(slots.clock == slot - shifting),
@@ -107,6 +109,8 @@ class Scanner(wiring.Component):
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
         done_is_row = Signal(init=1)  # the two come in turn
+        # None is under way when a row's begins.
+        alone = self.skin.column_read == "direct" and derived.settle_clocks > 2
         m.d.comb += [
             sample.begins.eq(slots.scans & (slots.clock == derived.settle_clocks - lead)),
             begins_released.eq(slots.scans & (slots.clock == derived.row_clocks - lead)),
@@ -114,7 +118,9 @@ class Scanner(wiring.Component):
             sample.of_row.eq(reader.done & done_is_row),
             sample.of_released.eq(reader.done & ~done_is_row),
         ]
-        m.d.sync += done_is_row.eq(done_is_row ^ reader.done)
+        m.d.sync += done_is_row.eq(done_is_row ^ reader.done | sample.begins & alone)
+        with m.If(sample.begins):
+            m.d.sync += sample.is_last.eq(slots.is_last)
         with m.If(sample.of_row):
             m.d.sync += sample.row.eq(Mux(sample.is_last, 0, sample.row + 1))
 

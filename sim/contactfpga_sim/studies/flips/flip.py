@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from contactfpga.driver.stats import Stats
 from contactfpga_sim.board.state import Bit, Place
 from contactfpga_sim.studies.flips import touches
 from contactfpga_sim.studies.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
@@ -163,11 +161,3 @@ def _stale(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
                 yield before._replace(time_s=step * touches.STEP_S + late, flagged=before.flagged)
                 break
 
-
-def clean(stats: Stats) -> bool:
-    """Whether the driver has nothing to tell."""
-    return not stats.damaged.total() and not any(getattr(stats, name) for name in COUNTED)
-
-
-def to_row(found: Found) -> dict[str, object]:
-    return dataclasses.asdict(found) if dataclasses.is_dataclass(found) else found._asdict()
