@@ -18,7 +18,7 @@ class Dual(wiring.Component):
     ever holds the same by construction and synthesis has nothing to merge. The outputs are those of ``first``, in the
     same clock. Two clocks after the first difference at the latest ``tx`` is low, for longer than a byte: the packet on
     the line ends without its check. Then it rests, both copies start from reset, and the host hears a board that was
-    restarted. With ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart is over.
+    restarted. With ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
 
     Nothing in here keeps a state of its own but for the time that a restart takes, and that counts itself to its end.
 

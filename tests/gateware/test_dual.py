@@ -64,12 +64,14 @@ def test_a_difference_of_any_output_breaks_the_line_and_starts_both_anew(said, f
     simulator.run()
     line, contact, *clocks = zip(*seen)
     low = [clock for clock, level in enumerate(line) if not level]
-    assert low == list(range(11, 12 + pause)) and pause >= 10 * Derived(skin).bit_clocks
+    assert low == list(range(11, 12 + pause))
+    assert pause >= 10 * Derived(skin).bit_clocks
     high = [clock for clock, level in enumerate(contact) if level]
     assert high == (list(range(11, 12 + 2 * pause + scan)) if fail_safe else [])
     starts = [[clock for clock in range(1, len(seen)) if one[clock] < one[clock - 1]] for one in clocks]
     assert [times[-1] for times in starts] == [12, 13]
-    assert clocks[0][:10] == tuple(range(10)) and clocks[1][:10] == (0, *range(9))
+    assert clocks[0][:10] == tuple(range(10))
+    assert clocks[1][:10] == (0, *range(9))
     begins = 12 + 2 * pause
     assert [clock - 1 for clock in range(len(seen)) if clocks[0][clock] == 1 and clock > 12] == [begins]
     assert clocks[0][begins:-1] == clocks[1][begins + 1 :]

@@ -53,11 +53,13 @@ def _block(design: str, memory: bool, block: int) -> list[Found]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[Found] = kept.kept("flips", repr((_sources(), native.skin_key(designs.skin(design)), memory, block)), new)
+    rows: list[Found] = kept.kept(
+        "flips", repr((_sources(), native.skin_key(designs.skin(design)), memory, block)), new
+    )
     return rows
 
 
-@functools.lru_cache(maxsize=1)
+@functools.lru_cache(maxsize=len(designs.DESIGNS))
 def _reference(design: str) -> Reference:
     return Reference(designs.skin(design))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
@@ -135,10 +136,18 @@ def _told(reference: Reference, listener: Listener, heard: list[Heard], gone_s: 
 def _wrong(reference: Reference, heard: list[Heard]) -> list[tuple[Heard, str]]:
     """Frames that say what was not there or a time that was not theirs, and moments at which the host believes in a
     frame that a newer one should have replaced."""
-    found = [(one, kind) for one in heard if (kind := _kind(reference, one))]
+    found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
     if reference.skin.send == "on_change":
         found += ((one, "stale") for one in _stale(reference, heard))
     return sorted(found, key=lambda pair: pair[0].time_s)
+
+
+def _since_restart(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
+    """The same with times as if the board had not been restarted: the first frame after it is as late as usual."""
+    begun: dict[int, float] = {0: 0.0}
+    for one in heard:
+        shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)
+        yield one._replace(late_s=one.late_s - shift)
 
 
 def _kind(reference: Reference, one: Heard) -> str:
@@ -152,7 +161,7 @@ def _kind(reference: Reference, one: Heard) -> str:
 def _stale(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
     """For each change of the sheet that the host does not know of in time: that moment."""
     late = reference.late_s[1] + reference.slack_s
-    for before, after in zip(heard, heard[1:]):
+    for before, after in itertools.pairwise(heard):
         if after.time_s - before.time_s > QUIET_S["on_change"]:
             continue  # told
         first, last = (int((one.time_s - shift) / touches.STEP_S) for one, shift in ((before, 0.0), (after, late)))
@@ -160,4 +169,3 @@ def _stale(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
             if reference.truth.still[step] != before.said:
                 yield before._replace(time_s=step * touches.STEP_S + late, flagged=before.flagged)
                 break
-

@@ -35,6 +35,8 @@ class Heard(NamedTuple):
     late_s: float
     """By how much that is after its time of scan, as it says."""
     flagged: bool
+    restarts: int = 0
+    """Of the board, as the driver has counted: its time begins anew with each."""
 
 
 @dataclasses.dataclass
@@ -61,15 +63,16 @@ class Listener:
             now = int(events["cycle"][end - 1]) / clock_hz
             for event in self.conversation.receive(data[start:end].tobytes(), now):
                 if isinstance(event, Arrival):
-                    found.append(_heard(event, now))
+                    found.append(_heard(event, now, self.conversation.stats.restarts))
                 self.surprises += isinstance(event, SkinMismatch | VersionMismatch)
         return found
 
 
-def _heard(event: Arrival, now: float) -> Heard:
+def _heard(event: Arrival, now: float, restarts: int) -> Heard:
     zones = event.zones
     assert zones.time_us is not None
-    return Heard(now, touches.said(zones), now - zones.time_us / 1e6, bool(zones.flags or zones.faults))
+    flagged = bool(zones.flags or zones.faults)
+    return Heard(now, touches.said(zones), now - zones.time_us / 1e6, flagged, restarts)
 
 
 class Step(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 
 import numpy as np
@@ -50,7 +51,7 @@ class Truth:
         self._known: dict[bytes, Said] = {}
         self.still = [self._says(cells) for cells in sheets]
         """What a scan of each sheet says that does not change meanwhile."""
-        self._changing = [self._between(*pair) for pair in zip(sheets, sheets[1:])]
+        self._changing = [self._between(*pair) for pair in itertools.pairwise(sheets)]
 
     def holds(self, what: Said, first: int, last: int) -> bool:
         """Whether a scan can say this while the sheets from ``first`` to ``last`` are there."""
