@@ -2,6 +2,7 @@
 
 import json
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +10,13 @@ import pytest
 from contactfpga import Skin, cli
 from contactfpga_sim.board import native, state
 from contactfpga_sim.board.state import Bit
+from contactfpga_sim.pages import flips_page, writer
 from contactfpga_sim.studies.flips import campaign, flip, reference, summary, touches
 from contactfpga_sim.studies.flips.campaign import Row
+from contactfpga_sim.studies.flips.designs import DESIGNS
 from contactfpga_sim.studies.flips.flip import Flip, Found
 from contactfpga_sim.studies.flips.reference import Heard, Reference
+from contactfpga_sim.studies.flips.summary import Design
 
 SMALL = Skin(rows=4, columns=4, labeller="serial", dual=True, clock_hz=4_000_000, baud=1_000_000)
 
@@ -178,3 +182,27 @@ def test_bad_choices_are_refused_in_a_sentence(capsys):
     assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
     assert cli.main(["flips", "--page", "x.md", "--design", "run"]) == 1
     assert "--page takes all designs; leave --design out" in capsys.readouterr().err
+
+
+def test_the_page_says_what_the_numbers_beside_it_say():
+    page = Path("docs/flips.md").read_text(encoding="utf-8")
+    rows, designs = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
+    assert [design.name for design in designs] == list(DESIGNS)
+    assert writer.update(page, flips_page.tables(rows, designs)) == page
+
+
+def test_tables_count_what_came_out():
+    found = Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
+    rows = [
+        Row("run", found),
+        *3 * [Row("run", found._replace(outcome="masked", kind=""))],
+        Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
+    ]
+    tables = flips_page.tables(rows, [Design("run", 1700, 1000, 14000)])
+    registers, memory = tables["flipped"]().splitlines()[2:]
+    assert registers.startswith(
+        "| `run` | 1,700 | 1,000 of registers | 4 | **25.0 %**, 4.6 to 69.9 % | 250.0 / 250.0 |"
+    )
+    assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
+    assert tables["modules"]().splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
+    assert tables["ways"]().splitlines()[2:] == ["| `run` | silent | time | 1 |", "| `run` | told | lost | 1 |"]

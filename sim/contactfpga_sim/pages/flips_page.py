@@ -12,7 +12,6 @@ from contactfpga_sim.studies.flips.summary import Design
 DESIGNS = (
     "design",
     "LUT4",
-    "64x64",
     "bits",
     "flips",
     "silently wrong, 95 %",
@@ -38,8 +37,10 @@ def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
     for design in designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
             some = summary.of(rows, design.name, memory)
+            if not some:
+                continue
             median, longest = summary.wrong_ms(some)
-            first = [f"`{design.name}`", f"{design.luts:,}", f"{design.luts_64:,}"] if not memory else ["", "", ""]
+            first = ("", "") if memory else (f"`{design.name}`", f"{design.luts:,}")
             silent, told = summary.share(some), summary.share(some, "told")
             lines.append(
                 writer.line(

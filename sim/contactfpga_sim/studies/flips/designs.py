@@ -26,7 +26,6 @@ def skin(design: str) -> Skin:
     return Skin(clock_hz=CLOCK_HZ, baud=BAUD, **DESIGNS[design])
 
 
-def luts(design: str, lines: int = 16) -> int:
-    """LUT4 of the design on a UP5K, at the reference clock, for a square sheet."""
-    sheet = Skin() if lines == 16 else sizes.square(lines)
-    return size.luts(lambda: Top(sheet.replace(**DESIGNS[design])), sizes.UP5K)
+def luts(design: str) -> int:
+    """LUT4 of the design on a UP5K, with the reference Skin's clock."""
+    return size.luts(lambda: Top(Skin(**DESIGNS[design])), sizes.UP5K)

@@ -20,9 +20,7 @@ class Design(NamedTuple):
 
     name: str
     luts: int
-    """LUT4 at 16x16."""
-    luts_64: int
-    """At 64x64."""
+    """LUT4 of a UP5K."""
     registers: int
     """Bits of flip-flops, those in front of and after memories among them."""
     memories: int
@@ -50,9 +48,10 @@ def measured(names: Iterable[str]) -> list[Design]:
     """Bits and LUT4 of designs; needs the programs of the extra ``boards``."""
     found = []
     for name in names:
-        with StateBoard(designs.skin(name)) as board:
-            bits = [sum(place.bits for place in board.places if place.memory == memory) for memory in (False, True)]
-        found.append(Design(name, designs.luts(name), designs.luts(name, 64), *bits))
+        board = StateBoard(designs.skin(name))
+        bits = [sum(place.bits for place in board.places if place.memory == memory) for memory in (False, True)]
+        board.close()
+        found.append(Design(name, designs.luts(name), *bits))
     return found
 
 
