@@ -11,7 +11,7 @@ from contactfpga import Skin, cli
 from contactfpga_sim.board import native, state
 from contactfpga_sim.board.state import Bit
 from contactfpga_sim.pages import flips_page, writer
-from contactfpga_sim.studies.flips import campaign, flip, reference, summary, touches
+from contactfpga_sim.studies.flips import campaign, designs, flip, reference, summary, touches
 from contactfpga_sim.studies.flips.campaign import Row
 from contactfpga_sim.studies.flips.designs import DESIGNS
 from contactfpga_sim.studies.flips.flip import Flip, Found
@@ -186,9 +186,9 @@ def test_bad_choices_are_refused_in_a_sentence(capsys):
 
 def test_the_page_says_what_the_numbers_beside_it_say():
     page = Path("docs/flips.md").read_text(encoding="utf-8")
-    rows, designs = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
-    assert [design.name for design in designs] == list(DESIGNS)
-    assert writer.update(page, flips_page.tables(rows, designs)) == page
+    rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
+    assert [design.name for design in sizes] == list(DESIGNS)
+    assert writer.update(page, flips_page.tables(rows, sizes)) == page
 
 
 def test_tables_count_what_came_out():
@@ -206,3 +206,25 @@ def test_tables_count_what_came_out():
     assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
     assert tables["modules"]().splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
     assert tables["ways"]().splitlines()[2:] == ["| `run` | silent | time | 1 |", "| `run` | told | lost | 1 |"]
+
+
+@pytest.mark.campaign
+def test_a_raster_scan_finds_its_row_again():
+    made = Reference(SMALL.replace(dual=False))
+    for name in ("scan.pattern", "scan.row", "scan.is_last", "scan.done_is_row"):
+        place = place_of(made.board, name)
+        for bit in range(made.board.places[place].width):
+            for clock in (3, 1003, 5501):
+                found = flip.follow(made, Flip(Bit(place, 0, bit), made.step_clocks * 30 + clock))
+                assert found.frames <= 2, (name, bit, clock, found)
+    made.board.close()
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("design", [name for name in DESIGNS if name.endswith("dual")])
+def test_no_flip_of_two_copies_is_silently_wrong(design):
+    made = Reference(designs.skin(design))
+    found = [flip.follow(made, each) for memory in (False, True) for each in flip.drawn(made, memory, 50, 99)]
+    assert [one for one in found if one.outcome == "silent"] == []
+    assert {one.outcome for one in found} == {"masked", "told"}
+    made.board.close()
