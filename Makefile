@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures arm-page settle-page c-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -95,6 +95,9 @@ fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (s
 
 failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
 	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
+
+flips: $(VENV)/.stamp-boards $(VENV)/.stamp-chart | compiler ## flip bits of the running gateware, and write docs/flips.md and its picture (half an hour, unless kept from before) [ARGS="--registers 1000"]
+	$(VENV)/bin/contactfpga flips --page docs/flips.md $(ARGS)
 
 arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
 	$(PY) -m contactfpga_sim.pages.arm_page docs/arm.md docs/images

@@ -10,6 +10,7 @@ from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.link.alive import Alive
+from contactfpga_hdl.dual import Dual
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
@@ -35,11 +36,14 @@ class Top(wiring.Component):
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
     the records, and bytes.
+
+    A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
     """
 
-    def __init__(self, skin: Skin, probes: bool = False):
+    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False):
         self.skin = skin
         self.probes = probes
+        self.copy = copy
         self.derived = derived = Derived(skin)
         ports = {
             **row_pins(skin),
@@ -66,6 +70,8 @@ class Top(wiring.Component):
         super().__init__(ports)
 
     def elaborate(self, platform):
+        if self.skin.dual and not self.copy:
+            return self._compared()
         m = Module()
         bit_clocks = self.derived.bit_clocks
         m.submodules.scan = scan = self.derived.scan.load_gateware()(self.skin)
@@ -112,15 +118,21 @@ class Top(wiring.Component):
         fault = Signal()
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
         if self.skin.fail_safe:
-            m.d.sync += self.contact.eq(
-                scan.contact | fault
-            )  # both may change at once: from a register without a glitch
+            # Both may change at once: from a register without a glitch.
+            m.d.sync += self.contact.eq(scan.contact | fault)
         else:
             m.d.comb += self.contact.eq(scan.contact)
         if self.skin.alive:
             m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
             watched = scan.watched if self.derived.scan.waits else 0
             m.d.comb += [alive.well.eq(_packed(packer) | watched), alive.fault.eq(fault), self.alive.eq(alive.pin)]
+
+    def _compared(self) -> Module:
+        m = Module()
+        first, second = Top(self.skin, self.probes, copy=True), Top(self.skin, copy=True)
+        m.submodules.dual = dual = Dual(self.skin, first, second)
+        connect_pins(m, dual, self)
+        return m
 
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
         """The scanner's rows without bounce."""

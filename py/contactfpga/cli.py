@@ -19,6 +19,7 @@ from contactfpga.commands import (
     failures,
     fit,
     flash,
+    flips,
     latency,
     replay,
     settle,
@@ -61,6 +62,7 @@ COMMANDS: dict[str, Command] = {
     "chart": chart,
     "fit": fit,
     "failures": failures,
+    "flips": flips,
     "arm": arm,
 }
 

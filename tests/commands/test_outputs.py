@@ -31,6 +31,7 @@ COMMANDS = {
     "arm": ["arm"],
     "arm, charts": ["arm", "--charts"],
     "failures": ["failures"],
+    "flips": ["flips"],
     "cover": ["cover", "figures"],
     "build": ["build", "icestick"],
 }

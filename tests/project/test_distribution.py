@@ -195,6 +195,7 @@ def test_the_host_alone_decodes_a_frame(host, tmp_path):
         ("wire sim://", "cli"),
         ("board", "sim"),
         ("failures", "sim"),
+        ("flips", "chart"),
         ("arm", "sim"),
         ("cover figures", "sim"),
         ("chart", "chart"),

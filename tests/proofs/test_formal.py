@@ -36,6 +36,7 @@ LONG = {
     "the next frame in time, 3x2, long precharge",
     "times of a line reversal, 3x2, long release",
     "contact in three clocks, 3x2, shortest times, row2col",
+    "differences stop the line, two copies",
 }
 """Quick for `make formal`; each run of the tests holds another one of the same claim."""
 

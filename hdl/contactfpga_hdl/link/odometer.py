@@ -22,9 +22,12 @@ class Odometer(wiring.Component):
     hold (in): no carry begins.
     place (in), digit (out): the digit of the place of the clock before, when no carry is under way; 0 at places of
     other counters.
+
+    With ``clears`` it first sets all digits to 0, a clock each: it may be reset, and memory is not.
     """
 
-    def __init__(self):
+    def __init__(self, clears: bool = False):
+        self.clears = clears
         super().__init__(
             {
                 "sent": In(1),
@@ -48,7 +51,13 @@ class Odometer(wiring.Component):
             write.addr.eq(at),
             write.data.eq(read.data + 1),
         ]
-        with m.FSM(name="carry"):
+        with m.FSM(name="carry", init="CLEAR" if self.clears else "REST"):
+            if self.clears:
+                with m.State("CLEAR"):
+                    m.d.comb += [write.en.eq(1), write.data.eq(0)]
+                    m.d.sync += at.eq(at + 1)
+                    with m.If(at == STATE_DIGITS - 1):
+                        m.next = "REST"
             with m.State("REST"):
                 with m.If((sent_waits | epoch_waits) & ~self.hold):
                     m.d.sync += at.eq(Mux(sent_waits, LIVE_DIGITS, _EPOCH))

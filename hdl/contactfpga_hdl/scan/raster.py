@@ -1,6 +1,6 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Const, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
@@ -43,7 +43,7 @@ class _Sample:
         self.read = Signal(skin.column_lines)  # columns that read pressed
         self.pressed = Signal(skin.columns)  # and are not masked in this row
         self.is_first = self.row == 0
-        self.is_last = self.row == skin.rows - 1
+        self.is_last = Signal()  # as the slot says, so that a row's number that is wrong is so for one scan at most
         self.is_guard = self.row == skin.rows if skin.guard else Const(0)
 
 
@@ -103,7 +103,9 @@ class Scanner(wiring.Component):
         ends = slots.clock == slot - 1
         m.d.sync += slots.clock.eq(slots.clock + 1)
         with m.If(ends):
-            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(slots.following.rotate_left(1))]
+            # Of one row only, whatever it was.
+            before = slots.following[:-1]
+            m.d.sync += [slots.clock.eq(0), slots.scans.eq(1), slots.following.eq(Cat(~before.any(), before))]
         m.d.comb += [
             driver.pattern.eq(slots.following),
             driver.shift.eq(slots.clock == slot - shifting),
@@ -117,6 +119,8 @@ class Scanner(wiring.Component):
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
         done_is_row = Signal(init=1)  # the two come in turn
+        # None is under way when a row's begins.
+        alone = self.skin.column_read == "direct" and derived.settle_clocks > 2
         m.d.comb += [
             sample.begins.eq(slots.scans & (slots.clock == derived.settle_clocks - lead)),
             begins_released.eq(slots.scans & (slots.clock == derived.row_clocks - lead)),
@@ -125,10 +129,11 @@ class Scanner(wiring.Component):
             sample.of_row.eq(sample.of_driven & ~sample.is_guard),
             sample.of_released.eq(reader.done & ~done_is_row),
         ]
-        m.d.sync += done_is_row.eq(done_is_row ^ reader.done)
+        m.d.sync += done_is_row.eq(done_is_row ^ reader.done | sample.begins & alone)
+        with m.If(sample.begins):
+            m.d.sync += sample.is_last.eq(slots.is_last)
         with m.If(sample.of_driven):
-            ends = sample.is_guard if self.skin.guard else sample.is_last
-            m.d.sync += sample.row.eq(Mux(ends, 0, sample.row + 1))
+            m.d.sync += sample.row.eq(Mux(sample.is_last, slots.first, Mux(sample.is_guard, 0, sample.row + 1)))
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """While no row is driven, but for a clock after the last one and a clock before the next one."""

@@ -12,7 +12,13 @@ from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, turned
-from contactfpga_hdl.scan.reversal_rows import clean_rows, offer_all_rows, offer_driven_rows, watch_contact, watch_motion
+from contactfpga_hdl.scan.reversal_rows import (
+    clean_rows,
+    offer_all_rows,
+    offer_driven_rows,
+    watch_contact,
+    watch_motion,
+)
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
 from contactfpga_hdl.scan.stuck import count_columns, present
 from contactfpga_hdl.util.lowest import lowest

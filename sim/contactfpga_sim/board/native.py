@@ -97,6 +97,8 @@ class Model:
     """Yosys commands that change the flattened netlist before it is written as C++."""
     quiet: bool = False
     """No progress line."""
+    places: Callable[[str], str] | None = None
+    """Makes ``places.inc``, which the driver includes, of the generated ``model.cpp``."""
 
 
 def component_key(component: Any) -> str:
@@ -174,6 +176,8 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
             read = _write(model.elaborate(), folder)
             say("yosys")
             yosys("\n".join((read, FLATTEN, model.passes, _TO_CPP)), folder)
+            if model.places:
+                (folder / "places.inc").write_text(model.places((folder / "model.cpp").read_text()))
             say("compile")
             defines = [f"-D{name}={value}" for name, value in model.defines.items()]
             includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]

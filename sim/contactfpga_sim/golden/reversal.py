@@ -156,7 +156,13 @@ class Scanner:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
         retry = RETRY_US * self._facts.clocks_per_us
         driven = (cycle + 2 for cycle, _ in self._held)
-        turns = {begin, *self._changes, *driven, *(cycle for cycle, _ in self._timeline.cuts), *range(begin // retry * retry + 2, end + 1, retry)}
+        turns = {
+            begin,
+            *self._changes,
+            *driven,
+            *(cycle for cycle, _ in self._timeline.cuts),
+            *range(begin // retry * retry + 2, end + 1, retry),
+        }
         return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
 
     def _rest(self, begin: int, end: int) -> None:

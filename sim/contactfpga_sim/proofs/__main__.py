@@ -8,6 +8,7 @@ from contactfpga.console import interrupt
 from contactfpga_sim.proofs import (
     adaptive,
     divide,
+    dual,
     label,
     label_serial,
     link,
@@ -50,6 +51,7 @@ CASES: tuple[Case, ...] = (
     *odometer.CASES,
     *uart.CASES,
     *pulses.CASES,
+    *dual.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

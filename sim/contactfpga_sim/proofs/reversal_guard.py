@@ -12,7 +12,9 @@ from contactfpga_sim.proofs.precharge import apart
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
 
-LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the source names them where there are guard lines
+LISTEN, ANSWER, GAP, CHARGE, SELECT = range(
+    5
+)  # in the order in which the source names them where there are guard lines
 
 
 def _inverted(sheet: Sheet) -> Value:
@@ -115,7 +117,12 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
     spared = checks - settle
-    checked, of_rows, selects, free = inside["checked"], inside["of_rows"], inside["selects"], inside["precharge.free"][-1]
+    checked, of_rows, selects, free = (
+        inside["checked"],
+        inside["of_rows"],
+        inside["selects"],
+        inside["precharge.free"][-1],
+    )
     blind = told.stuck[-1]
     proof.lemma(free | blind)
     proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))

@@ -1,8 +1,9 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
-// Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
-// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns
-// can be driven, REVERSAL where rows can be let go and are read. With MUTANTS the gateware
-// has an input that picks a mutant.
+// Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and
+// COLUMN_CHAINS, 0 for direct lines; PROBES is 0 for a netlist, which has the pins only; DIVIDED is 1 where items are
+// apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns can be driven, REVERSAL where
+// rows can be let go and are read. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
+// bits can be flipped, and a moment kept and returned to.
 #include <algorithm>
 #include <deque>
 
@@ -11,6 +12,9 @@
 
 #include "clocked.h"
 #include "shift.h"
+#ifdef STATE
+#include "state.h"
+#endif
 
 enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, ALIVE_PIN, DRIVEN, CHARGED, RECEIVED, BOUNDARIES };
 
@@ -175,6 +179,10 @@ public:
 
     static constexpr unsigned rest = BIT_CLOCKS - BIT_CLOCKS / 2;
 
+    bool same(const Reader &other) const {
+        return clock_ == other.clock_ && last_ == other.last_ && byte_ == other.byte_;
+    }
+
 private:
     int clock_ = -1;
     bool last_ = true;
@@ -182,6 +190,8 @@ private:
 };
 
 class Board {
+    Clocked model_;
+
 #if ROW_CHAINS
     RowRegisters<ROW_LINES, ROW_CHAINS> row_registers_;
 
@@ -261,10 +271,47 @@ public:
         }
     }
 
+#ifdef STATE
+    State state{model_.top};
+
+    // All that decides what follows, but for what is captured; lines without shift registers only.
+    struct Moment {
+        std::vector<uint32_t> words;
+        Matrix matrix;
+        Sender sender;
+        Reader reader;
+        uint64_t cycle, levels, row_levels;
+        bool line;
+    };
+    Moment moment() const { return {state.words(), matrix, sender, reader, cycle, levels_, row_levels(), line_}; }
+    void go_to(const Moment &moment) {
+        state.put(moment.words);
+        matrix = moment.matrix, sender = moment.sender, reader = moment.reader;
+        cycle = moment.cycle, line_ = moment.line;
+        put(columns(), levels_ = moment.levels);
+#if REVERSAL
+        put(model_.top.p_rows__read, row_levels_ = moment.row_levels);
+#endif
+    }
+    bool same(const Moment &moment) const { return reader.same(moment.reader) && state.words() == moment.words; }
+    uint64_t row_levels() const {
+#if REVERSAL
+        return row_levels_;
+#else
+        return 0;
+#endif
+    }
+#endif
+
 private:
+<<<<<<< HEAD
     Clocked model_;
     Word levels_ = 0, driven_ = 0, charged_ = 0;
     bool line_ = true, contact_ = false, alive_ = false;
+=======
+    uint64_t levels_ = 0, driven_ = 0, charged_ = 0;
+    bool line_ = true, contact_ = false;
+>>>>>>> flips
 
     void watch(Word driven) {
         auto &top = model_.top;
@@ -364,3 +411,15 @@ EXPORT const Event *board_events(Board *board, unsigned boundary, size_t *count)
     return board->events[boundary].data();
 }
 EXPORT void board_forget(Board *board, unsigned boundary) { board->events[boundary].clear(); }
+
+#ifdef STATE
+EXPORT const Place *board_places(Board *board, size_t *count) {
+    *count = board->state.places.size();
+    return board->state.places.data();
+}
+EXPORT void board_flip(Board *board, uint32_t place, uint32_t word, uint32_t bit) { board->state.flip(place, word, bit); }
+EXPORT Board::Moment *board_moment(Board *board) { return new Board::Moment(board->moment()); }
+EXPORT void board_go_to(Board *board, const Board::Moment *moment) { board->go_to(*moment); }
+EXPORT bool board_same(Board *board, const Board::Moment *moment) { return board->same(*moment); }
+EXPORT void board_drop(Board *, Board::Moment *moment) { delete moment; }
+#endif

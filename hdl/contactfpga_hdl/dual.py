@@ -1,0 +1,84 @@
+"""Two copies of the gateware, compared in each clock."""
+
+from amaranth.hdl import Cat, Module, ResetInserter, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+
+PAUSE_BITS = 16
+"""Bits of the line for which it is broken, and then for which it rests: more than a byte takes."""
+
+
+class Dual(wiring.Component):
+    """What ``first`` is, as long as ``second`` says the same a clock later.
+
+    Each input reaches ``second`` a clock after ``first``, and it starts a clock later, so that no register of the two
+    ever holds the same by construction and synthesis has nothing to merge. The outputs are those of ``first``, in the
+    same clock. Two clocks after the first difference at the latest ``tx`` is low, for longer than a byte: the packet on
+    the line ends without its check. Then it rests, both copies start from reset, and the host hears a board that was
+    restarted. With ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
+
+    Nothing in here keeps a state of its own but for the time that a restart takes, and that counts itself to its end.
+
+    first (component): may have probes, which are passed on.
+    second (component): the same without probes.
+    """
+
+    def __init__(self, skin: Skin, first: wiring.Component, second: wiring.Component):
+        self.skin = skin
+        self.first, self.second = first, second
+        super().__init__(dict(first.signature.members))
+
+    def elaborate(self, platform):
+        m = Module()
+        differs = Signal()
+        breaks = Signal()
+        holds = Signal()
+        holds_second = Signal(init=1)
+        raises = Signal()
+        m.submodules.first = ResetInserter(holds)(self.first)
+        m.submodules.second = ResetInserter(holds_second)(self.second)
+        self._connect(m)
+        m.d.comb += differs.eq(self._compare(m) & ~holds_second)
+        m.d.sync += holds_second.eq(holds)
+        self._restart(m, differs, breaks, holds, raises)
+        m.d.comb += self.tx.eq(self.first.tx & ~breaks)
+        if self.skin.fail_safe:
+            m.d.comb += self.contact.eq(self.first.contact | raises)
+        return m
+
+    def _connect(self, m: Module) -> None:
+        special = {"tx", "contact"} if self.skin.fail_safe else {"tx"}
+        for name, member in self.signature.members.items():
+            outside, inside = getattr(self, name), getattr(self.first, name)
+            if member.flow == Out:
+                if name not in special:
+                    m.d.comb += outside.eq(inside)
+                continue
+            later = Signal.like(outside, name=f"{name}_later", init=member.init or 0)
+            m.d.sync += later.eq(outside)
+            m.d.comb += [inside.eq(outside), getattr(self.second, name).eq(later)]
+
+    def _compare(self, m: Module) -> Value:
+        """High in the clock after one in which the two copies gave different outputs."""
+        names = [name for name, member in self.second.signature.members.items() if member.flow == Out]
+        said = Cat(getattr(self.first, name) for name in names)
+        before = Signal(len(said))
+        m.d.sync += before.eq(said)
+        return before != Cat(getattr(self.second, name) for name in names)
+
+    def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value, raises: Value) -> None:
+        pause = PAUSE_BITS * Derived(self.skin).bit_clocks
+        scan = Derived(self.skin).frame_clocks
+        left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks
+        with m.If(differs):
+            m.d.sync += left.eq(scan + 2 * pause)
+        with m.Elif(left != 0):
+            m.d.sync += left.eq(left - 1)
+        m.d.sync += [
+            breaks.eq(differs | (left > scan + pause)),
+            holds.eq(differs | (left > scan)),
+            raises.eq(differs | (left != 0)),
+        ]

@@ -1,0 +1,57 @@
+"""`contactfpga flips`: flips bits of the running gateware, and says what the host notices."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.console import flags, numbers, outputs
+from contactfpga.console.interrupt import Interrupted
+
+HELP = "Flip bits of the running gateware one by one; does the host notice?"
+EXTRA = "chart"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("--design", action="append", metavar="NAME", help="Flip only this design; can be repeated.")
+    count = numbers.whole(1, 1_000_000)
+    registers = "Flips of flip-flops per design (default: 400); always the same ones."
+    parser.add_argument("--registers", type=count, default=400, metavar="N", help=registers)
+    memories = "Flips of memory bits per design (default: 100)."
+    parser.add_argument("--memories", type=count, default=100, metavar="N", help=memories)
+    flags.workers(parser)
+    page = "Rewrite the tables in this page, with the picture in images and all numbers in flips beside it."
+    parser.add_argument("--page", metavar="FILE", help=page)
+    flags.output(parser, "build/flips")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga_sim.pages import flips_page, writer
+    from contactfpga_sim.studies import pool
+    from contactfpga_sim.studies.flips import campaign, picture, summary
+    from contactfpga_sim.studies.flips.designs import DESIGNS
+
+    names = flags.known("--design", args.design, list(DESIGNS))
+    if args.page and args.design:
+        raise ValueError("--page takes all designs; leave --design out")
+    page = writer.page(args.page, "--page") if args.page else None
+    folder = outputs.folder(page.parent / "flips" if page else args.output, "--page" if page else "--output")
+    try:
+        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+            rows = campaign.run(names, args.registers, args.memories, executor, lambda of: step("blocks of flips", of))
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted; the blocks that were finished are kept, and the same command goes on") from None
+    campaign.write(rows, folder / "flips.csv")
+    print(folder / "flips.csv", flush=True)
+    for name in names:
+        for memory, what in ((False, "registers"), (True, "memories")):
+            some = summary.of(rows, name, memory)
+            print(f"{name}: {what}: {summary.share(some)} silently wrong, {summary.share(some, 'told')} told")
+    if page:
+        found = summary.measured(names)
+        summary.write(found, folder / "designs.csv")
+        writer.write(page, flips_page.tables(rows, found))
+        print(page)
+        print(picture.draw(rows, found, outputs.folder(page.parent / "images", "--page") / "flips.svg"))
+    return 0

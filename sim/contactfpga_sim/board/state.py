@@ -1,0 +1,131 @@
+"""A compiled board whose flip-flops and memory bits can be flipped one by one, and which can go back in time."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from contactfpga.skin import Skin
+from contactfpga_sim.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.board.native import Model
+
+_WIRE = re.compile(r"^\twire<\d+> (\w+);", re.MULTILINE)
+_MEMORY = re.compile(r"^\tmemory<\d+> (\w+) \{ (\d+)u };", re.MULTILINE)
+
+
+class Place(NamedTuple):
+    """A register or a memory of the gateware."""
+
+    name: str
+    """With the submodules that it is in, joined by dots."""
+    width: int
+    """Bits of a word."""
+    depth: int
+    """Words; 1 for a register."""
+    memory: bool
+
+    @property
+    def bits(self) -> int:
+        return self.width * self.depth
+
+
+class Bit(NamedTuple):
+    """One of them."""
+
+    place: int
+    word: int
+    bit: int
+
+
+class Moment:
+    """What a board was at one clock; of use as long as its board is open."""
+
+    def __init__(self, board: StateBoard) -> None:
+        self._board = board
+        self.cycle = board.cycle
+        self.address = board.call("moment")
+
+    def __del__(self) -> None:
+        self._board.drop(self)
+
+
+class StateBoard(CompiledBoard):
+    """A compiled board with its state in reach; between two calls, so between two clocks."""
+
+    def __init__(self, skin: Skin, capture: Iterable[str] = ()):
+        super().__init__(skin, capture, _model(skin))
+        self._library.board_places.restype = ctypes.c_void_p
+        self._library.board_moment.restype = ctypes.c_void_p
+        self._library.board_same.restype = ctypes.c_bool
+        self.places = self._places()
+
+    def call(self, name: str, *arguments: object) -> int:
+        found: int = self._call(name, *arguments)
+        return found
+
+    def flip(self, bit: Bit) -> None:
+        """From the next cycle on this bit is the other one, until the gateware writes it."""
+        place = self.places[bit.place]
+        if not (0 <= bit.word < place.depth and 0 <= bit.bit < place.width):
+            raise ValueError(f"{bit} is outside of {place}")
+        self._call("flip", *map(ctypes.c_uint32, bit))
+
+    def moment(self) -> Moment:
+        """What the board is now."""
+        return Moment(self)
+
+    def go_to(self, moment: Moment) -> None:
+        """Be what it was then; what was captured since stays."""
+        self._call("go_to", ctypes.c_void_p(moment.address))
+
+    def same(self, moment: Moment) -> bool:
+        """Whether all that follows is what followed then."""
+        return bool(self._call("same", ctypes.c_void_p(moment.address)))
+
+    def drop(self, moment: Moment) -> None:
+        if self._board is not None:
+            self._call("drop", ctypes.c_void_p(moment.address))
+
+    def _places(self) -> list[Place]:
+        count = ctypes.c_size_t()
+        address = self._call("places", ctypes.byref(count))
+        array = (_Place * count.value).from_address(address)
+        return [Place(each.name.decode(), each.width, each.depth, each.now == each.next) for each in array]
+
+
+class _Place(ctypes.Structure):
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("width", ctypes.c_uint32),
+        ("depth", ctypes.c_uint32),
+        ("chunks", ctypes.c_uint32),
+        ("now", ctypes.c_void_p),
+        ("next", ctypes.c_void_p),
+    )
+
+
+def _model(skin: Skin) -> Model:
+    model = model_of(skin)
+    return dataclasses.replace(
+        model, title=f"{model.title} with its state", defines={**model.defines, "STATE": 1}, places=places
+    )
+
+
+def places(model: str) -> str:
+    """``places.inc`` for a generated model: its registers, and its memories but for those that are never written,
+    which are logic or configuration."""
+    lines = [f'PLACE("{_plain(name)}", {name})' for name in _WIRE.findall(model)]
+    lines += [
+        f'MEMORY("{_plain(name.removeprefix("memory_"))}", {name}, {depth})'
+        for name, depth in _MEMORY.findall(model)
+        if f"{name}.update(" in model
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _plain(mangled: str) -> str:
+    """A name as it was before it became one of C++."""
+    return re.sub(r"__|_([0-9a-f]+)_", lambda match: chr(int(match[1], 16)) if match[1] else "_", mangled[2:])

@@ -1,0 +1,87 @@
+"""Two copies that differ are stopped before the byte is over."""
+
+from functools import partial
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.dual import PAUSE_BITS, Dual
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+
+class _Core(wiring.Component):
+    """Any gateware at all: what it says is free. ``runs`` is low in the clock after one in which it is reset."""
+
+    def __init__(self, said: Value):
+        self.said = said
+        self.runs = Signal()
+        super().__init__({"tx": Out(1, init=1), "rows": Out(1), "contact": Out(1), "rx": In(1, init=1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.comb += Cat(self.tx, self.rows, self.contact).eq(self.said)
+        m.d.sync += self.runs.eq(1)
+        return m
+
+
+def differences_stop_the_line(proof: Proof, fail_safe: bool) -> None:
+    """Free: what both copies say in each clock, and the level of ``rx``.
+
+    Claimed: until the second first says something else than the first did a clock before, all outputs are those of the
+    first. Such a difference makes ``tx`` low from the next clock on, for longer than a byte takes; ``contact`` is high
+    with ``fail_safe``, until a scan after the restart. Both are then reset until the line was high for as long, the
+    second always a clock after the first, and gets each level of ``rx`` a clock after the first.
+    """
+    m = proof.m
+    skin = Skin(rows=1, columns=1, dual=True, fail_safe=fail_safe)
+    said = [proof.free(3, name) for name in ("first_said", "second_said")]
+    first, second = map(_Core, said)
+    dut = Dual(skin, first, second)
+    inside = proof.put(dut)
+    m.d.comb += dut.rx.eq(proof.free(1, "rx"))
+    pause, scan = PAUSE_BITS * Derived(skin).bit_clocks, Derived(skin).frame_clocks
+    last = 2 * pause + scan
+    since = Signal(range(last + 3), init=last + 2)  # the last difference, in clocks
+    resets = proof.before(inside["holds"], init=1)  # of the second, which starts a clock late
+    differs = (proof.before(said[0]) != said[1]) & ~resets
+    m.d.sync += since.eq(Mux(differs, 1, Mux(since <= last + 1, since + 1, since)))
+    differed = Signal()
+    m.d.sync += differed.eq(differed | differs)
+    with m.If(~differed):
+        proof.claim(Cat(dut.tx, dut.rows, dut.contact) == said[0])
+    with m.If(since <= pause):
+        proof.claim(~dut.tx)
+    with m.If((since > 1) & (since <= 2 * pause + 1)):
+        proof.claim(~first.runs)
+    with m.If(since <= last):
+        proof.claim(dut.contact | (not fail_safe))
+    proof.claim(second.runs == proof.before(first.runs))
+    proof.claim(second.rx == proof.before(dut.rx, init=1))
+    proof.claim(first.rx == dut.rx)
+    proof.lemma(differed | (since == last + 2))
+    proof.lemma(inside["left"] == Mux(since <= last, last + 1 - since, 0))
+    proof.lemma(inside["breaks"] == (since <= pause + 1))
+    proof.lemma(inside["holds"] == (since <= 2 * pause + 1))
+    proof.lemma(inside["raises"] == (since <= last + 1))
+    proof.lemma(inside["holds_second"] == resets)
+    proof.lemma(first.runs == proof.before(~inside["holds"]))
+    proof.lemma(second.runs == proof.before(~resets))
+    proof.lemma(inside["before"] == proof.before(said[0]))
+
+
+_BUGS = (
+    Bug("the line is broken for a clock only", Dual, "breaks", lambda breaks, inside: inside["differs"]),
+    Bug("the copies are not reset together", Dual, "holds_second", lambda holds, inside: 0),
+    Bug("a difference shows in one of the outputs only", Dual, "differs",
+        lambda differs, inside: differs & ~inside["holds"] & inside["tx"]),
+)  # fmt: skip
+CASES = (
+    Case("differences stop the line", "two copies, contact fail-safe",
+         partial(differences_stop_the_line, fail_safe=True), 2, _BUGS),
+    Case("differences stop the line", "two copies", partial(differences_stop_the_line, fail_safe=False), 2),
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Bits of the running gateware flipped one by one: masked, told, or silently wrong."""

@@ -1,0 +1,171 @@
+"""One flip, followed until it is gone or half a second is over, and what the host heard of it."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from contactfpga_sim.board.state import Bit, Place
+from contactfpga_sim.studies.flips import touches
+from contactfpga_sim.studies.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
+
+SETTLED_STEPS = 4
+"""The driver hears this many more once the board is what it was."""
+QUIET_S = {"always": 0.02, "on_change": 0.12}
+"""Silence for longer is told: nothing comes though frames, or keep-alives, have to."""
+COUNTED = ("lost", "unexplained", "restarts", "foreign_skin", "foreign_version", "skin_changes", "unknown_kinds")
+"""Counters of the driver that stay 0 on a good line."""
+
+Outcome = Literal["masked", "told", "silent"]
+
+
+class Flip(NamedTuple):
+    """What is flipped, and when."""
+
+    bit: Bit
+    cycle: int
+
+
+class Found(NamedTuple):
+    """What came of it."""
+
+    name: str
+    memory: bool
+    outcome: Outcome
+    kind: str
+    """What is wrong, or by what it is told."""
+    frames: int
+    """Silently wrong ones."""
+    seconds: float
+    """From the first frame that was silently wrong until the next right one."""
+    gone_s: float
+    """When the board was again what it would have been; infinite if it was not within the time."""
+
+
+def module(name: str) -> str:
+    """The stage that a register or memory belongs to."""
+    parts = name.split(".")
+    inner = parts[2:] if parts[0] == "dual" and len(parts) > 2 else parts
+    return "comparison" if parts[0] == "dual" and len(parts) <= 2 else inner[0].split("$")[0]
+
+
+def drawn(reference: Reference, memory: bool, count: int, seed: int) -> list[Flip]:
+    """Random flips: each bit of all registers, or of all memories, is as likely, and so is each clock."""
+    rng = np.random.default_rng([seed, memory])
+    places = reference.board.places
+    bits = np.array([place.bits * (place.memory == memory) for place in places])
+    ends = np.cumsum(bits)
+    first, last = (round(time * reference.skin.clock_hz) for time in (FIRST_S, LAST_S))
+    flips = []
+    for number, cycle in zip(rng.integers(0, ends[-1], count), rng.integers(first, last, count)):
+        index = int(np.searchsorted(ends, number, "right"))
+        word, bit = divmod(int(number - ends[index] + bits[index]), places[index].width)
+        flips.append(Flip(Bit(index, word, bit), int(cycle)))
+    return flips
+
+
+def follow(reference: Reference, flip: Flip) -> Found:
+    """Flip it and say what comes of it."""
+    listener, heard, gone_s = _run(reference, flip)
+    place = reference.board.places[flip.bit.place]
+    begun_s = flip.cycle / reference.skin.clock_hz
+    told = _told(reference, listener, heard, gone_s, begun_s)
+    wrong = _wrong(reference, heard)
+    silent = [(one, kind) for one, kind in wrong if not one.flagged]
+    if silent:
+        return _silent(place, heard, silent, gone_s)
+    flags = [kind for one, kind in wrong if one.flagged]
+    kind = told or ("flag" if flags or any(one.flagged for one in heard) else "")
+    return Found(place.name, place.memory, "told" if kind else "masked", kind, 0, 0.0, gone_s)
+
+
+def _silent(place: Place, heard: list[Heard], silent: list[tuple[Heard, str]], gone_s: float) -> Found:
+    first, last = silent[0][0].time_s, silent[-1][0].time_s
+    after = [one.time_s for one in heard if one.time_s > last]
+    until = after[0] if after else last
+    kinds = sorted({kind for _, kind in silent})
+    frames = sum(kind != "stale" for _, kind in silent)
+    return Found(place.name, place.memory, "silent", ", ".join(kinds), frames, until - first, gone_s)
+
+
+def _run(reference: Reference, flip: Flip) -> tuple[Listener, list[Heard], float]:
+    """The host after it, all frames since, and how long the board was another one."""
+    board, skin, clocks = reference.board, reference.skin, reference.step_clocks
+    number = flip.cycle // clocks
+    board.go_to(reference.steps[number].moment)
+    board.press(reference.sheets[number])
+    board.run(flip.cycle - board.cycle)
+    board.flip(flip.bit)
+    listener, heard, gone_s = copy.deepcopy(reference.steps[number].listener), [], float("inf")
+    last = number + round(AFTER_S / touches.STEP_S)
+    board.run((number + 1) * clocks - flip.cycle)
+    for step in range(number + 1, last + 1):
+        heard += listener.hear(board.take("received"), skin.clock_hz)
+        if board.same(reference.steps[step].moment):
+            gone_s = (step * clocks - flip.cycle) / skin.clock_hz
+            for following in reference.steps[step : min(step + SETTLED_STEPS, last)]:
+                heard += listener.hear(following.events, skin.clock_hz)
+            break
+        board.press(reference.sheets[step])
+        board.run(clocks)
+    else:
+        heard += listener.hear(board.take("received"), skin.clock_hz)
+    return listener, [one for one in heard if one.time_s > flip.cycle / skin.clock_hz], gone_s
+
+
+def _told(reference: Reference, listener: Listener, heard: list[Heard], gone_s: float, begun_s: float) -> str:
+    """The first of the ways in which the host knows."""
+    stats = listener.conversation.stats
+    if listener.surprises:
+        return "another Skin"
+    for name in COUNTED:
+        if getattr(stats, name):
+            return name
+    if stats.damaged.total():
+        return "damaged"
+    times = [begun_s, *(one.time_s for one in heard)]
+    if gone_s == float("inf"):
+        times.append(begun_s + AFTER_S)
+    return "silence" if max(np.diff(times), default=0.0) > QUIET_S[reference.skin.send] else ""
+
+
+def _wrong(reference: Reference, heard: list[Heard]) -> list[tuple[Heard, str]]:
+    """Frames that say what was not there or a time that was not theirs, and moments at which the host believes in a
+    frame that a newer one should have replaced."""
+    found = [(one, kind) for one in _since_restart(reference, heard) if (kind := _kind(reference, one))]
+    if reference.skin.send == "on_change":
+        found += ((one, "stale") for one in _stale(reference, heard))
+    return sorted(found, key=lambda pair: pair[0].time_s)
+
+
+def _since_restart(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
+    """The same with times as if the board had not been restarted: the first frame after it is as late as usual."""
+    begun: dict[int, float] = {0: 0.0}
+    for one in heard:
+        shift = begun.setdefault(one.restarts, one.late_s - sum(reference.late_s) / 2)
+        yield one._replace(late_s=one.late_s - shift)
+
+
+def _kind(reference: Reference, one: Heard) -> str:
+    early, late = reference.late_s[0] - reference.slack_s, reference.late_s[1] + reference.slack_s
+    first = max(0, int((one.time_s - late) / touches.STEP_S))
+    if not reference.truth.holds(one.said, first, int(one.time_s / touches.STEP_S)):
+        return "zones"
+    return "" if early <= one.late_s <= late else "time"
+
+
+def _stale(reference: Reference, heard: Sequence[Heard]) -> Iterator[Heard]:
+    """For each change of the sheet that the host does not know of in time: that moment."""
+    late = reference.late_s[1] + reference.slack_s
+    for before, after in itertools.pairwise(heard):
+        if after.time_s - before.time_s > QUIET_S["on_change"]:
+            continue  # told
+        first, last = (int((one.time_s - shift) / touches.STEP_S) for one, shift in ((before, 0.0), (after, late)))
+        for step in range(first + 1, last + 1):
+            if reference.truth.still[step] != before.said:
+                yield before._replace(time_s=step * touches.STEP_S + late, flagged=before.flagged)
+                break

@@ -1,0 +1,122 @@
+"""The run without a flip, which all others are compared with, and can be entered at many moments."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import functools
+import random
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.errors import SkinMismatch, VersionMismatch
+from contactfpga.skin import Skin
+from contactfpga.wire import framing
+from contactfpga_sim.board.state import Moment, StateBoard
+from contactfpga_sim.studies.flips import touches
+
+CLOCK_HZ, BAUD = 5_000_000, 1_250_000
+"""Five twelfths of the reference Skin's: as many frames are scanned per second, in fewer clocks."""
+
+FIRST_S, LAST_S = 0.1, 0.6
+"""When bits are flipped: a hello comes in the time after each."""
+AFTER_S = 0.5
+"""How long a flip is followed."""
+
+
+class Heard(NamedTuple):
+    """A frame that the driver passed on."""
+
+    time_s: float
+    """When its last byte came."""
+    said: touches.Said
+    late_s: float
+    """By how much that is after its time of scan, as it says."""
+    flagged: bool
+    restarts: int = 0
+    """Of the board, as the driver has counted: its time begins anew with each."""
+
+
+@dataclasses.dataclass
+class Listener:
+    """The host."""
+
+    conversation: Conversation
+    rest: bytes = b""
+    surprises: int = 0
+    """Hellos of another Skin."""
+
+    @classmethod
+    def new(cls, skin: Skin) -> Listener:
+        return cls(Conversation("the board", expected=skin, rng=random.Random(1)))
+
+    def hear(self, events: np.ndarray, clock_hz: int) -> list[Heard]:
+        """Bytes as they came; each packet is handed on with its delimiter."""
+        data = events["data"].astype(np.uint8)
+        ends = np.flatnonzero(data == framing.DELIMITER) + 1
+        found: list[Heard] = []
+        for start, end in zip([0, *ends], [*ends, len(data)]):
+            if start == end:
+                continue
+            now = int(events["cycle"][end - 1]) / clock_hz
+            for event in self.conversation.receive(data[start:end].tobytes(), now):
+                if isinstance(event, Arrival):
+                    found.append(_heard(event, now, self.conversation.stats.restarts))
+                self.surprises += isinstance(event, SkinMismatch | VersionMismatch)
+        return found
+
+
+def _heard(event: Arrival, now: float, restarts: int) -> Heard:
+    zones = event.zones
+    assert zones.time_us is not None
+    flagged = bool(zones.flags or zones.faults)
+    return Heard(now, touches.said(zones), now - zones.time_us / 1e6, flagged, restarts)
+
+
+class Step(NamedTuple):
+    """The beginning of a sheet."""
+
+    moment: Moment
+    listener: Listener
+    events: np.ndarray
+    """Bytes until the next one."""
+    heard: list[Heard]
+    """Frames among them."""
+
+
+class Reference:
+    """A Skin's board while touches move, from power-up until the last flip has been followed.
+
+    Each instance has a board of its own, ``board``, to be flipped.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.step_clocks = round(touches.STEP_S * skin.clock_hz)
+        self.sheets = touches.sheets(skin, 2 + round((LAST_S + AFTER_S) / touches.STEP_S))
+        self.board = StateBoard(skin)
+        self.steps: list[Step] = []
+        listener = Listener.new(skin)
+        for cells in self.sheets:
+            self.board.press(cells)
+            moment, before = self.board.moment(), copy.deepcopy(listener)
+            self.board.run(self.step_clocks)
+            events = self.board.take("received")
+            self.steps.append(Step(moment, before, events, listener.hear(events, skin.clock_hz)))
+        first = round(FIRST_S / touches.STEP_S)
+        late = [heard.late_s for step in self.steps[first:] for heard in step.heard]
+        self.late_s = min(late), max(late)
+
+    @functools.cached_property
+    def truth(self) -> touches.Truth:
+        return touches.Truth(self.skin, self.sheets)
+
+    @property
+    def slack_s(self) -> float:
+        """By how much frames of another phase of the scan may be later or earlier: two scans, and a hello."""
+        return self.late_s[1] - self.late_s[0] + 0.5e-3
+
+    def close(self) -> None:
+        self.board.close()

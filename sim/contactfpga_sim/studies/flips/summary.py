@@ -1,0 +1,99 @@
+"""Shares of flips, by design and by module, and what they cost."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from contactfpga_sim.board.state import StateBoard
+from contactfpga_sim.studies.flips import designs
+from contactfpga_sim.studies.flips.campaign import Row, wilson
+from contactfpga_sim.studies.flips.flip import module
+
+
+class Design(NamedTuple):
+    """A design's name and size."""
+
+    name: str
+    luts: int
+    """LUT4 of a UP5K."""
+    registers: int
+    """Bits of flip-flops, those in front of and after memories among them."""
+    memories: int
+    """Bits of memory."""
+
+
+class Share(NamedTuple):
+    """How many of some flips came out so."""
+
+    hits: int
+    of: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return wilson(self.hits, self.of)
+
+    def __str__(self) -> str:
+        if not self.of:
+            return ""
+        low, high = self.interval
+        return f"{100 * self.hits / self.of:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def measured(names: Iterable[str]) -> list[Design]:
+    """Bits and LUT4 of designs; needs the programs of the extra ``boards``."""
+    found = []
+    for name in names:
+        board = StateBoard(designs.skin(name))
+        bits = [sum(place.bits for place in board.places if place.memory == memory) for memory in (False, True)]
+        board.close()
+        found.append(Design(name, designs.luts(name), *bits))
+    return found
+
+
+def write(found: Iterable[Design], path: Path) -> None:
+    """A line for each design."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([Design._fields, *found])
+
+
+def read(path: Path) -> list[Design]:
+    """What :func:`write` wrote."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return [
+            Design(line.pop("name"), **{key: int(value) for key, value in line.items()})
+            for line in csv.DictReader(file)
+        ]
+
+
+def of(rows: Iterable[Row], design: str, memory: bool) -> list[Row]:
+    """The flips of a design's registers, or of its memories."""
+    return [row for row in rows if row.design == design and row.found.memory == memory]
+
+
+def share(rows: Sequence[Row], outcome: str = "silent") -> Share:
+    """How many of them came out so."""
+    return Share(sum(row.found.outcome == outcome for row in rows), len(rows))
+
+
+def wrong_ms(rows: Sequence[Row]) -> tuple[float, float]:
+    """For how long the silently wrong ones are wrong: median and longest, in ms."""
+    times = sorted(1e3 * row.found.seconds for row in rows if row.found.outcome == "silent")
+    return (times[len(times) // 2], times[-1]) if times else (math.nan, math.nan)
+
+
+def by(rows: Iterable[Row], key: Callable[[Row], str]) -> dict[str, list[Row]]:
+    """The same by what ``key`` says; first those with the most silently wrong ones."""
+    parts: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        parts[key(row)].append(row)
+    return dict(sorted(parts.items(), key=lambda part: (-share(part[1]).hits, -len(part[1]), part[0])))
+
+
+def stage(row: Row) -> str:
+    """The module of a flip."""
+    return module(row.found.name)

@@ -1,0 +1,74 @@
+"""What touches the sheet meanwhile, and all that a truthful frame can say of it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.zones.zone import Zones
+from contactfpga_sim import golden
+
+STEP_S = 0.005
+"""Another sheet comes this often."""
+
+Said = tuple[int, int, tuple[tuple[int, int, int], ...]]
+"""Pressed cells, zones in all, and the moments of those that are listed."""
+
+
+def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
+    """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, and come and go."""
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((count, skin.rows, skin.columns), bool)
+    for rows, columns in ((2, 2), (3, 3), (4, 2)):
+        most = np.array([skin.rows - rows, skin.columns - columns])
+        place, there = rng.integers(0, most + 1), True
+        for sheet in cells:
+            if rng.random() < 0.08:
+                there, place = not there, rng.integers(0, most + 1)
+            place = np.clip(place + rng.integers(-1, 2, 2), 0, most)
+            if there:
+                sheet[place[0] : place[0] + rows, place[1] : place[1] + columns] = True
+    return cells
+
+
+def said(zones: Zones) -> Said:
+    """What a frame says."""
+    moments = tuple(sorted((int(area), int(x), int(y)) for area, x, y in zones.frame.moments.tolist()))
+    return zones.pressed, zones.total_zones, moments
+
+
+class Truth:
+    """What frames may say at each step: any scan of the sheet, which may have changed between two of its rows.
+
+    ``sheets``: (n, rows, columns) bool.
+    """
+
+    def __init__(self, skin: Skin, sheets: np.ndarray):
+        self._skin = skin
+        self._known: dict[bytes, Said] = {}
+        self.still = [self._says(cells) for cells in sheets]
+        """What a scan of each sheet says that does not change meanwhile."""
+        self._changing = [self._between(*pair) for pair in itertools.pairwise(sheets)]
+
+    def holds(self, what: Said, first: int, last: int) -> bool:
+        """Whether a scan can say this while the sheets from ``first`` to ``last`` are there."""
+        last = min(last, len(self.still) - 1)
+        return what in self.still[first : last + 1] or any(what in self._changing[step] for step in range(first, last))
+
+    def _between(self, before: np.ndarray, after: np.ndarray) -> set[Said]:
+        rows = np.flatnonzero((before != after).any(axis=1)) + 1
+        return {self._says(np.concatenate([before[:row], after[row:]])) for row in self._ends(rows)}
+
+    @staticmethod
+    def _ends(rows: Iterable[int]) -> list[int]:
+        return [0, *map(int, rows)]
+
+    def _says(self, cells: np.ndarray) -> Said:
+        key = cells.tobytes()
+        if key not in self._known:
+            zones = tuple(sorted(golden.zones(cells, self._skin.connectivity)))
+            self._known[key] = int(cells.sum()), len(zones), zones
+        return self._known[key]

@@ -1,0 +1,230 @@
+"""Flips of single bits: every bit is there, each is followed, and what came of it is judged rightly."""
+
+import json
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga import Skin, cli
+from contactfpga_sim.board import native, state
+from contactfpga_sim.board.state import Bit
+from contactfpga_sim.pages import flips_page, writer
+from contactfpga_sim.studies.flips import campaign, designs, flip, reference, summary, touches
+from contactfpga_sim.studies.flips.campaign import Row
+from contactfpga_sim.studies.flips.designs import DESIGNS
+from contactfpga_sim.studies.flips.flip import Flip, Found
+from contactfpga_sim.studies.flips.reference import Heard, Reference
+from contactfpga_sim.studies.flips.summary import Design
+
+SMALL = Skin(rows=4, columns=4, labeller="serial", dual=True, clock_hz=4_000_000, baud=1_000_000)
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """The reference of a small dual board whose flips are followed for less time."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (reference, flip):
+            patch.setattr(module, "AFTER_S", 0.06)
+            patch.setattr(module, "LAST_S", 0.14)
+        made = Reference(SMALL)
+        yield made
+        made.board.close()
+
+
+def place_of(board, name):
+    (index,) = (index for index, place in enumerate(board.places) if place.name == name)
+    return index
+
+
+def test_every_bit_of_the_synthesized_design_can_be_flipped(followed, tmp_path):
+    from contactfpga_hdl.top import Top
+
+    (tmp_path / "top.il").write_text(native.rtlil(Top(SMALL)))
+    native.yosys(f"read_rtlil top.il; {native.FLATTEN}; memory_collect; opt_clean; write_json top.json", tmp_path)
+    (module,) = [
+        module for module in json.loads((tmp_path / "top.json").read_text())["modules"].values() if "cells" in module
+    ]
+    cells = list(module["cells"].values())
+    ports = [cell["parameters"] for cell in cells if cell["type"] == "$mem_v2"]
+    written = [port for port in ports if int(port["WR_PORTS"], 2)]
+    registers = sum(len(cell["connections"]["Q"]) for cell in cells if "dff" in cell["type"])
+    registers += sum(int(port["WIDTH"], 2) * port["RD_CLK_ENABLE"].count("1") for port in written)
+    memories = sum(int(port["WIDTH"], 2) * int(port["SIZE"], 2) for port in written)
+    bits = [sum(place.bits for place in followed.board.places if place.memory == memory) for memory in (False, True)]
+    assert bits == [registers, memories]
+
+
+def test_each_place_is_drawn_as_often_as_it_has_bits(followed):
+    places = followed.board.places
+    for memory in (False, True):
+        drawn = [each.bit for each in flip.drawn(followed, memory, 4000, 1)]
+        assert all(places[bit.place].memory == memory for bit in drawn)
+        assert all(bit.word < places[bit.place].depth and bit.bit < places[bit.place].width for bit in drawn)
+        wide = max(
+            (index for index, place in enumerate(places) if place.memory == memory), key=lambda i: places[i].bits
+        )
+        share = places[wide].bits / sum(place.bits for place in places if place.memory == memory)
+        assert abs(np.mean([bit.place == wide for bit in drawn]) - share) < 0.05
+
+
+def test_a_board_returns_to_a_moment(followed):
+    board, step = followed.board, followed.steps[4]
+    board.go_to(step.moment)
+    board.press(followed.sheets[4])
+    board.take("received")
+    board.run(followed.step_clocks)
+    assert board.take("received").tolist() == step.events.tolist()
+    assert board.same(followed.steps[5].moment)
+    assert not board.same(followed.steps[6].moment)
+    board.flip(Bit(0, 0, 0))
+    assert not board.same(followed.steps[5].moment)
+    with pytest.raises(ValueError, match="is outside of"):
+        board.flip(Bit(0, 1, 0))
+
+
+def test_the_reference_is_right_all_the_time(followed):
+    heard = [one for step in followed.steps[4:] for one in step.heard]
+    assert len(heard) > 100
+    assert flip._wrong(followed, heard) == []
+    assert not any(one.flagged for one in heard)
+
+
+@pytest.mark.parametrize("copy", ["first", "second"])
+@pytest.mark.parametrize("place", ["scan.time", "transmitter.shift", "scan.driver.selected"])
+def test_what_is_wrong_in_either_copy_ends_with_a_restart(followed, copy, place):
+    bit = Bit(place_of(followed.board, f"dual.{copy}.{place}"), 0, 2)
+    found = [flip.follow(followed, Flip(bit, followed.step_clocks * 24 + clock)) for clock in (17, 4321)]
+    assert {one.outcome for one in found} <= {"told", "masked"}
+    assert "restarts" in {one.kind for one in found}
+
+
+def test_a_bit_that_nothing_reads_changes_nothing(followed):
+    place = place_of(followed.board, "dual.first.link.store")
+    last = followed.board.places[place].depth // 2 - 1  # the end of a region, where short frames never come
+    found = flip.follow(followed, Flip(Bit(place, last, 3), followed.step_clocks * 23 + 5))
+    assert (found.outcome, found.frames) == ("masked", 0)
+
+
+def fake(send="always"):
+    """Four sheets of 5 ms, and frames that come half a millisecond after their scan."""
+    skin = Skin(rows=4, columns=4, send=send)
+    sheets = np.zeros((8, 4, 4), bool)
+    sheets[2:, 1:3, 1] = True
+    sheets[5:, 1:3, 1] = False
+    truth = touches.Truth(skin, sheets)
+    return types.SimpleNamespace(skin=skin, truth=truth, late_s=(0.4e-3, 0.6e-3), slack_s=0.5e-3)
+
+
+NOTHING, HALF, ALL = (0, 0, ()), (1, 1, ((1, 1, 1),)), (2, 1, ((2, 2, 3),))
+
+
+def heard(time_s, said, late_s=0.5e-3, flagged=False):
+    return Heard(time_s, said, late_s, flagged)
+
+
+@pytest.mark.parametrize(
+    ("frame", "kind"),
+    [
+        (heard(0.008, NOTHING), ""),
+        (heard(0.008, ALL), "zones"),
+        (heard(0.0105, HALF), "zones"),  # the upper row was read after it was touched, the lower one before
+        (heard(0.0105, (1, 1, ((1, 1, 2),))), ""),
+        (heard(0.0104, ALL), ""),
+        (heard(0.0104, NOTHING), ""),
+        (heard(0.020, NOTHING), "zones"),
+        (heard(0.020, ALL, late_s=3e-3), "time"),
+        (heard(0.020, ALL, late_s=-1.0), "time"),
+    ],
+)
+def test_a_frame_is_judged_by_what_was_there(frame, kind):
+    assert flip._kind(fake(), frame) == kind
+
+
+def test_a_change_that_does_not_come_is_wrong_where_frames_come_on_change_only():
+    late = [heard(0.008, NOTHING), heard(0.024, ALL)]
+    assert [kind for _, kind in flip._wrong(fake("on_change"), late)] == ["stale"]
+    assert flip._wrong(fake("on_change"), [heard(0.008, NOTHING), heard(0.0108, ALL)]) == []
+    assert flip._wrong(fake(), late) == []
+
+
+@pytest.mark.parametrize(("hits", "of", "low", "high"), [(0, 100, 0.0, 0.0370), (10, 100, 0.0552, 0.1744)])
+def test_wilsons_interval_is_the_one_of_the_tables(hits, of, low, high):
+    assert campaign.wilson(hits, of) == pytest.approx((low, high), abs=1e-4)
+
+
+def test_names_are_those_of_the_gateware():
+    model = "\twire<3> p_a_2e_b__c_24_7;\n\tmemory<8> memory_p_a_2e_m { 5u };\n\tmemory<8> memory_i_rom { 2u };\n"
+    used = model + "memory_p_a_2e_m.update("
+    assert state.places(used) == 'PLACE("a.b_c$7", p_a_2e_b__c_24_7)\nMEMORY("a.m", memory_p_a_2e_m, 5)\n'
+    assert [flip.module(name) for name in ("scan.row", "dual.first.link.check.crc", "dual.left", "request$9.crc")] == [
+        "scan",
+        "link",
+        "comparison",
+        "request",
+    ]
+
+
+def test_numbers_are_read_back_as_they_were_written(tmp_path):
+    rows = [
+        Row("run", Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))),
+        Row("run, dual", Found("dual.first.link.store", True, "masked", "", 0, 0.0, 0.005)),
+    ]
+    campaign.write(rows, tmp_path / "flips.csv")
+    assert campaign.read(tmp_path / "flips.csv") == rows
+    assert str(summary.share(rows)) == "50.0 % (9.5 to 90.5)"
+    assert summary.wrong_ms(rows) == (250.0, 250.0)
+
+
+def test_bad_choices_are_refused_in_a_sentence(capsys):
+    assert cli.main(["flips", "--design", "triple"]) == 1
+    assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
+    assert cli.main(["flips", "--page", "x.md", "--design", "run"]) == 1
+    assert "--page takes all designs; leave --design out" in capsys.readouterr().err
+
+
+def test_the_page_says_what_the_numbers_beside_it_say():
+    page = Path("docs/flips.md").read_text(encoding="utf-8")
+    rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
+    assert [design.name for design in sizes] == list(DESIGNS)
+    assert writer.update(page, flips_page.tables(rows, sizes)) == page
+
+
+def test_tables_count_what_came_out():
+    found = Found("scan.time", False, "silent", "time", 3, 0.25, float("inf"))
+    rows = [
+        Row("run", found),
+        *3 * [Row("run", found._replace(outcome="masked", kind=""))],
+        Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
+    ]
+    tables = flips_page.tables(rows, [Design("run", 1700, 1000, 14000)])
+    registers, memory = tables["flipped"]().splitlines()[2:]
+    assert registers.startswith(
+        "| `run` | 1,700 | 1,000 of registers | 4 | **25.0 %**, 4.6 to 69.9 % | 250.0 / 250.0 |"
+    )
+    assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
+    assert tables["modules"]().splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
+    assert tables["ways"]().splitlines()[2:] == ["| `run` | silent | time | 1 |", "| `run` | told | lost | 1 |"]
+
+
+@pytest.mark.campaign
+def test_a_raster_scan_finds_its_row_again():
+    made = Reference(SMALL.replace(dual=False))
+    for name in ("scan.pattern", "scan.row", "scan.is_last", "scan.done_is_row"):
+        place = place_of(made.board, name)
+        for bit in range(made.board.places[place].width):
+            for clock in (3, 1003, 5501):
+                found = flip.follow(made, Flip(Bit(place, 0, bit), made.step_clocks * 30 + clock))
+                assert found.frames <= 2, (name, bit, clock, found)
+    made.board.close()
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("design", [name for name in DESIGNS if name.endswith("dual")])
+def test_no_flip_of_two_copies_is_silently_wrong(design):
+    made = Reference(designs.skin(design))
+    found = [flip.follow(made, each) for memory in (False, True) for each in flip.drawn(made, memory, 50, 99)]
+    assert [one for one in found if one.outcome == "silent"] == []
+    assert {one.outcome for one in found} == {"masked", "told"}
+    made.board.close()
