@@ -18,7 +18,7 @@ from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
-from contactfpga_hdl.scan.pins import column_pins, connect_pins, row_pins
+from contactfpga_hdl.scan.pins import column_pins, connect_lines, row_pins
 
 
 class Top(wiring.Component):
@@ -77,7 +77,7 @@ class Top(wiring.Component):
         wiring.connect(m, packer.frames, link.frames)
         wiring.connect(m, link.bytes, transmitter.bytes)
         wiring.connect(m, receiver.bits, request.bits)
-        connect_pins(m, scan.pins, self)
+        connect_lines(m, self.skin, scan.pins, self)
         m.d.comb += [
             self.contact.eq(scan.contact),
             self.tx.eq(transmitter.pin),

@@ -1,6 +1,13 @@
-"""Between scanner and sheet: which pins there are, and the drivers for one pin per row and per column."""
+"""Between scanner and sheet: which pins there are, and the drivers for one pin per row and per column.
 
-from amaranth.hdl import Module, Signal
+A scanner counts rows and columns as the sheet does, the guard lines last. Its direct pins are in that order too;
+:func:`connect_lines` puts them on the lines that they are soldered to. Pins of shift registers are in the order of the
+lines already.
+"""
+
+from collections.abc import Sequence
+
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -15,9 +22,9 @@ def row_pins(skin: Skin) -> dict[str, wiring.Member]:
     A scan that reads the rows drives ``rows`` while ``rows_drive``, both bit by bit, and reads ``rows_read``.
     """
     if skin.reads_rows:
-        return {"rows": Out(skin.rows), "rows_drive": Out(skin.rows), "rows_read": In(skin.rows)}
+        return {"rows": Out(skin.row_lines), "rows_drive": Out(skin.row_lines), "rows_read": In(skin.row_lines)}
     if skin.row_drive == "direct":
-        return {"rows": Out(skin.rows)}
+        return {"rows": Out(skin.row_lines)}
     return {"row_data": Out(skin.row_chains), "row_clock": Out(1), "row_latch": Out(1), "row_enable_n": Out(1, init=1)}
 
 
@@ -25,13 +32,13 @@ def column_pins(skin: Skin) -> dict[str, wiring.Member]:
     """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
     chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit."""
     if skin.precharge_us:
-        return _read_pins(skin) | {"columns_drive": Out(skin.columns)}
+        return _read_pins(skin) | {"columns_drive": Out(skin.column_lines)}
     return _read_pins(skin)
 
 
 def _read_pins(skin: Skin) -> dict[str, wiring.Member]:
     if skin.column_read == "direct":
-        return {"columns": In(skin.columns)}
+        return {"columns": In(skin.column_lines)}
     return {"column_load_n": Out(1, init=1), "column_clock": Out(1), "column_data": In(skin.column_chains)}
 
 
@@ -40,6 +47,43 @@ def connect_pins(m: Module, inner: wiring.PureInterface, outer: wiring.PureInter
     for name, member in inner.signature.members.items():
         inside, outside = getattr(inner, name), getattr(outer, name)
         m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
+
+
+def connect_lines(m: Module, skin: Skin, scan: wiring.PureInterface, lines: wiring.PureInterface) -> None:
+    """Connect the pins of a scanner to the ones of the same names at the lines, each row and column to its own."""
+    for name, member in scan.signature.members.items():
+        inside, outside = getattr(scan, name), getattr(lines, name)
+        order = line_order(skin, name)
+        if member.flow == Out:
+            m.d.comb += outside.eq(on_lines(inside, order))
+        else:
+            m.d.comb += inside.eq(of_lines(outside, order))
+
+
+def line_order(skin: Skin, name: str) -> tuple[int, ...]:
+    """The line of each bit of a port that has one per row or column; of any other port ()."""
+    if name in ("rows", "rows_drive", "rows_read"):
+        return skin.line_of_row
+    return skin.line_of_column if name in ("columns", "columns_drive") else ()
+
+
+def on_lines(word: Value, order: Sequence[int]) -> Value:
+    """A word of rows or columns in the order of the lines that they are soldered to; () leaves it as it is."""
+    return word if _in_order(order) else Cat(word[order.index(line)] for line in range(len(order)))
+
+
+def of_lines(word: Value, order: Sequence[int]) -> Value:
+    """The other way."""
+    return word if _in_order(order) else Cat(word[line] for line in order)
+
+
+def _in_order(order: Sequence[int]) -> bool:
+    return tuple(order) == tuple(range(len(order)))
+
+
+def first_row(skin: Skin) -> int:
+    """The row of a raster's first slot, in which a guard row is driven."""
+    return skin.rows if skin.guard else 0
 
 
 def row_driver(skin: Skin) -> wiring.Signature:
@@ -52,12 +96,12 @@ def row_driver(skin: Skin) -> wiring.Signature:
     drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
     release (in): high in the last clock in which they are driven.
 
-    Direct rows drive row 0 after power-up, in an adaptive scan all rows.
+    Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
     """
     return wiring.Signature(
         {
             "pins": Out(wiring.Signature(row_pins(skin))),
-            "pattern": In(skin.rows),
+            "pattern": In(skin.row_lines),
             "shift": In(1),
             "drive": In(1),
             "release": In(1),
@@ -77,7 +121,7 @@ def column_reader(skin: Skin) -> wiring.Signature:
         {
             "pins": Out(wiring.Signature(_read_pins(skin))),
             "begin": In(1),
-            "levels": Out(skin.columns),
+            "levels": Out(skin.column_lines),
             "done": Out(1),
         }
     )
@@ -97,13 +141,14 @@ class DirectRows(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        first = 1 if scans.find(self.skin.scan).even else (1 << self.skin.rows) - 1
-        selected = Signal(self.skin.rows, init=first)
+        skin = self.skin
+        first = 1 << first_row(skin) if scans.find(skin.scan).even else (1 << skin.row_lines) - 1
+        selected = Signal(skin.row_lines, init=first)
         with m.If(self.drive):
             m.d.sync += selected.eq(self.pattern)
         with m.Elif(self.release):
             m.d.sync += selected.eq(0)
-        m.d.comb += self.pins.rows.eq(~selected if self.skin.selects_low else selected)
+        m.d.comb += self.pins.rows.eq(~selected if skin.selects_low else selected)
         return m
 
 
@@ -116,7 +161,7 @@ class DirectColumns(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        released = released_levels(self.skin, self.skin.columns)
+        released = released_levels(self.skin, self.skin.column_lines)
         m.submodules.sync = FFSynchronizer(self.pins.columns, self.levels, init=released)
         begun = Signal()
         m.d.sync += [begun.eq(self.begin), self.done.eq(begun)]

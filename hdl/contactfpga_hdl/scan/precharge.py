@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.stuck import anywhere
+from contactfpga_hdl.scan.stuck import watched
 
 RETRY_BIT = 16
 """Of the clock in us: a column that read stuck is driven again when this bit turns."""
@@ -27,20 +27,21 @@ class Precharge(wiring.Component):
         super().__init__(
             {
                 "drive": In(1),
-                "columns": In(skin.columns),
+                "columns": In(skin.column_lines),
                 "stuck": In(1),
                 "turn": In(1),
-                "held": Out(skin.columns),
-                "pins": Out(skin.columns),
+                "held": Out(skin.column_lines),
+                "pins": Out(skin.column_lines),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        free = Signal(self.skin.columns, init=anywhere(self.skin))
+        lines = watched(self.skin)
+        free = Signal(self.skin.column_lines, init=lines)
         before = Signal()
-        m.d.comb += self.held.eq(~free & anywhere(self.skin))
+        m.d.comb += self.held.eq(~free & lines)
         m.d.sync += [before.eq(self.turn), self.pins.eq(Mux(self.drive, free, 0))]
-        retried = Mux(self.turn ^ before, anywhere(self.skin), free)
+        retried = Mux(self.turn ^ before, lines, free)
         m.d.sync += free.eq(retried & ~Mux(self.stuck, self.columns, 0))
         return m

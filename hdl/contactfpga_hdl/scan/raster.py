@@ -73,7 +73,7 @@ class Scanner(wiring.Component):
         slots, sample = _Slots(self.derived), _Sample(self.derived)
         self._drive_rows(m, slots, driver)
         self._sample_columns(m, slots, reader, sample)
-        self._mask_row(m, reader.levels, sample)
+        self._mask_row(m, reader.levels[: skin.columns], sample)
         self._offer_row(m, sample)
         self._watch_contact(m, sample)
         time = self._tag_frame(m, slots, sample)

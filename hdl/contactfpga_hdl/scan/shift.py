@@ -11,7 +11,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
+from contactfpga_hdl.scan.pins import column_reader, of_lines, on_lines, released_levels, row_driver
 
 
 class RowChain(wiring.Component):
@@ -30,7 +30,8 @@ class RowChain(wiring.Component):
         m = Module()
         derived = Derived(self.skin)
         lines, clocks = derived.row_chain_lines, derived.shift_clocks
-        levels = ~self.pattern if self.skin.selects_low else self.pattern
+        pattern = on_lines(self.pattern, self.skin.line_of_row)
+        levels = ~pattern if self.skin.selects_low else pattern
         busy = Signal()
         left = Signal(range(lines + 1), init=lines)  # bits to shift; then the latch takes as long as one
         clock = Signal(range(clocks))
@@ -97,5 +98,5 @@ class ColumnChain(wiring.Component):
             with m.If(taken[-1]):
                 m.d.sync += before.eq(word[1:])
             chains.append(word)
-        m.d.comb += self.levels.eq(Cat(chains))
+        m.d.comb += self.levels.eq(of_lines(Cat(chains), self.skin.line_of_column))
         return m

@@ -22,6 +22,11 @@ def anywhere(skin: Skin) -> int:
     return word
 
 
+def watched(skin: Skin) -> int:
+    """Columns, as bits, that are not masked in every row, and the guard column."""
+    return anywhere(skin) | (1 << skin.columns if skin.guard else 0)
+
+
 class Stuck(wiring.Component):
     """How many columns read pressed in any ``released`` clock up to ``take``; ``count`` is there two clocks after that.
 

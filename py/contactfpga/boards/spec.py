@@ -142,14 +142,14 @@ class BoardSpec:
 def row_wires(skin: Skin) -> dict[str, int]:
     """Bits of each port at the rows, in the order of their pins."""
     if skin.row_drive == "direct":
-        return {"rows": skin.rows}
+        return {"rows": skin.row_lines}
     return {"row_clock": 1, "row_latch": 1, "row_enable_n": 1, "row_data": skin.row_chains}
 
 
 def column_wires(skin: Skin) -> dict[str, int]:
     """Bits of each port at the columns, in the order of their pins."""
     if skin.column_read == "direct":
-        return {"columns": skin.columns}
+        return {"columns": skin.column_lines}
     return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}
 
 

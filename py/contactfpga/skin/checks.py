@@ -179,7 +179,7 @@ def _check_mask(skin: Skin) -> Mask:
 
 def _check_registers(skin: Skin) -> None:
     for kind, wiring, registers in (("row", "row_drive", "74hc595"), ("column", "column_read", "74hc165")):
-        lines, chains = getattr(skin, f"{kind}s"), getattr(skin, f"{kind}_chains")
+        lines, chains = getattr(skin, f"{kind}_lines"), getattr(skin, f"{kind}_chains")
         if getattr(skin, wiring) == "direct":
             if chains != 1:
                 raise SkinError(f"{kind}_chains is {shown(chains)}; leave it out, or set {wiring} = '{registers}'")
@@ -188,8 +188,9 @@ def _check_registers(skin: Skin) -> None:
         length = math.ceil(lines / chains)
         filled = math.ceil(lines / length)
         if filled < chains:
+            guarded = " with the guard line" if skin.guard else ""
             raise SkinError(
-                f"{kind}_chains is {shown(chains)}; {lines} {kind}s in chains of {length} fill {filled}, set "
+                f"{kind}_chains is {shown(chains)}; {lines} {kind}s{guarded} in chains of {length} fill {filled}, set "
                 f"{kind}_chains = {filled}"
             )
     _within("shift_hz", skin.shift_hz, limits.MIN_SHIFT_HZ, limits.MAX_SHIFT_HZ, "Hz")

@@ -268,11 +268,11 @@ class Derived(Widths):
 
     @property
     def row_chain_lines(self) -> int:
-        return math.ceil(self.skin.rows / self.skin.row_chains)
+        return math.ceil(self.skin.row_lines / self.skin.row_chains)
 
     @property
     def column_chain_lines(self) -> int:
-        return math.ceil(self.skin.columns / self.skin.column_chains)
+        return math.ceil(self.skin.column_lines / self.skin.column_chains)
 
     @functools.cached_property
     def open_zones(self) -> int:

@@ -75,7 +75,8 @@ class Skin:
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
     row_chains: int = 1
-    """Chains of 74HC595 that are shifted at once; chain j drives rows j n to j n + n - 1, n = ceil(rows / chains)."""
+    """Chains of 74HC595 that are shifted at once; chain j drives lines j n to j n + n - 1, n = ceil(lines / chains).
+    Lines are the rows, in their ``row_order``, and the guard row."""
     column_read: Literal["direct", "74hc165"] = "direct"
     """``direct``: a pin per column; ``74hc165``: columns on shift registers, which settle and release may have to wait
     for."""
@@ -200,6 +201,16 @@ class Skin:
     def column_lines(self) -> int:
         """Columns, and the guard column."""
         return self.columns + self.guard
+
+    @property
+    def line_of_row(self) -> tuple[int, ...]:
+        """The line that each row is soldered to, and after them the guard row."""
+        return (*(self.row_order or range(self.rows)), *range(self.rows, self.row_lines))
+
+    @property
+    def line_of_column(self) -> tuple[int, ...]:
+        """The line that each column is soldered to, and after them the guard column."""
+        return (*(self.column_order or range(self.columns)), *range(self.columns, self.column_lines))
 
     @property
     def ghosts(self) -> bool:

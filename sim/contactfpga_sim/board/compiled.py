@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,8 @@ driven, and bytes decoded from the line. The order is that of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven lines; and for a row whether it is the frame's last, for a record or an item
-whether it is the end mark."""
+wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's last, for a record or an
+item whether it is the end mark."""
 
 
 class CompiledBoard:
@@ -70,16 +70,32 @@ class CompiledBoard:
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:
-        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven."""
-        word = 0 if columns is None else int(to_words(np.asarray(columns, bool)))
-        self._call("stick", ctypes.c_uint64(word))
+        """From the next cycle on these (columns,) bool columns read pressed whatever row is driven; the guard column
+        may come after them."""
+        stuck = np.zeros(self.skin.column_lines, np.uint8)
+        if columns is not None:
+            stuck[: len(columns)] = columns
+        self._call("stick", stuck.ctypes.data_as(ctypes.c_void_p))
+
+    def cut(self, rows: Mapping[int, int], columns: Mapping[int, int]) -> None:
+        """From the next cycle on these lines are cut, and all others whole: of ``rows`` the switches from a column on
+        no longer reach the pin, of ``columns`` those from a row on. Guard lines are the last."""
+        skin = self.skin
+        ends = (
+            np.array([cut.get(line, whole) for line in range(lines)], np.uint8)
+            for cut, lines, whole in (
+                (rows, skin.row_lines, skin.column_lines),
+                (columns, skin.column_lines, skin.row_lines),
+            )
+        )
+        self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
 
     def settle(self, line: Line) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none."""
         clock_s = 1 / self.skin.clock_hz
         press, pulled = (np.array(each) for each in ([line.share(tau, clock_s) for tau in line.press_s], line.pulled))
-        if len(press) != self.skin.columns + 1:
-            raise ValueError(f"a line for {len(press) - 1} columns; the sheet has {self.skin.columns}")
+        if len(press) != self.skin.column_lines + 1:
+            raise ValueError(f"a line for {len(press) - 1} columns; the sheet has {self.skin.column_lines}")
         arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
         self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
 
@@ -158,6 +174,9 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
         defines={
             "ROWS": skin.rows,
             "COLUMNS": skin.columns,
+            "GUARD": int(skin.guard),
+            "LINE_OF_ROW": _initializer(skin.line_of_row),
+            "LINE_OF_COLUMN": _initializer(skin.line_of_column),
             "COL2ROW": int(skin.selects_low),
             "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
@@ -168,6 +187,11 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "DIVIDED": int(skin.report == "barycenter"),
         },
     )
+
+
+def _initializer(numbers: Iterable[int]) -> str:
+    """Of a C++ array."""
+    return "{" + ",".join(map(str, numbers)) + "}"
 
 
 def _library(model: native.Model) -> ctypes.CDLL:

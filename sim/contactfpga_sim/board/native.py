@@ -91,7 +91,7 @@ class Model:
     """Stands for everything that decides what ``elaborate`` returns."""
     elaborate: Callable[[], Any]
     """Makes the Amaranth component or the :class:`Netlist`; called only when there is no library yet."""
-    defines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    defines: Mapping[str, int | str] = dataclasses.field(default_factory=dict)
     """Constants of the driver."""
     passes: str = ""
     """Yosys commands that change the flattened netlist before it is written as C++."""

@@ -20,7 +20,7 @@ from contactfpga_sim.board import native
 from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
 from contactfpga_sim.cosim.record import OutOfTime, Stimulus
 from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.sheet.matrix import Contention, words
+from contactfpga_sim.sheet.matrix import Contention, Matrix
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -129,12 +129,12 @@ def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -
     moves = _moves(skin, timeline, cycles)
     moves[1 - RESET_CLOCKS] = " ".join(f"top.{name} = {value};" for name, value in known.items())
     steps = "".join(f"        {cycle}: begin {text} end\n" for cycle, text in sorted(moves.items()))
-    cells = ", ".join(f"pressed{row} = 0" for row in range(skin.rows))
+    cells = ", ".join(f"closed{row} = 0" for row in range(skin.row_lines))
     sheet, pins = _sheet(skin)
     return f"""`timescale 1ns/1ns
 module bench;
 reg clk = 0, rst = 1, rx = 1;
-reg [{skin.columns - 1}:0] stuck = 0, {cells};
+reg [{skin.column_lines - 1}:0] stuck = 0, {cells};
 {sheet}wire tx, contact;
 reg [1:0] seen = 2'bxx;
 integer cycle;
@@ -166,13 +166,14 @@ def _sheet(skin: Skin) -> tuple[str, str]:
 
     Before the first clock of the reset nothing is known; pins that may be driven then read as unknown.
     """
-    rows, columns = f"[{skin.rows - 1}:0]", f"[{skin.columns - 1}:0]"
+    lines = range(skin.row_lines)
+    rows, columns = f"[{skin.row_lines - 1}:0]", f"[{skin.column_lines - 1}:0]"
     selecting, level, let_go = ("~rows", "~reads", "touched") if skin.selects_low else ("rows", "reads", "~touched")
-    pulled = " | ".join(f"{{{skin.columns}{{selected[{row}]}}}} & pressed{row}" for row in range(skin.rows))
-    feeding = ", ".join(f"|(pressed{row} & columns_drive & ~stuck)" for row in reversed(range(skin.rows)))
+    pulled = " | ".join(f"{{{skin.column_lines}{{selected[{row}]}}}} & closed{row}" for row in lines)
+    feeding = ", ".join(f"|(closed{row} & columns_drive & ~stuck)" for row in reversed(lines))
     reverses = skin.reads_rows
     text = f"""wire {rows} rows;
-wire {rows} rows_drive{"" if reverses else f" = {{{skin.rows}{{1'b1}}}}"};
+wire {rows} rows_drive{"" if reverses else f" = {{{skin.row_lines}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
 wire {rows} selected = {selecting} & rows_drive;
 wire {columns} pulled = {pulled};
@@ -195,9 +196,12 @@ def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:
         if level != before:
             moves[cycle] = f"rx = {level};"
         before = level
-    for cycle, cells, stuck in timeline.pieces:
-        levels = words(cells, skin.rows)
-        text = "".join(f" pressed{row} = {skin.columns}'h{word:x};" for row, word in enumerate(levels))
-        always = 0 if stuck is None else words(stuck[None], 1)[0]
-        moves[cycle] = moves.get(cycle, "") + f"{text} stuck = {skin.columns}'h{always:x};"
+    sheet = Matrix(skin)
+    for cycle in sorted({0, *(piece[0] for piece in timeline.pieces), *(cut[0] for cut in timeline.cuts)}):
+        cuts = timeline.cuts_at(cycle)
+        sheet.press(*timeline.at(cycle))
+        sheet.cut(cuts.rows, cuts.columns)
+        width = skin.column_lines
+        text = "".join(f" closed{line} = {width}'h{word:x};" for line, word in enumerate(sheet.closed))
+        moves[cycle] = moves.get(cycle, "") + f"{text} stuck = {width}'h{sheet.stuck:x};"
     return moves

@@ -42,6 +42,7 @@ class Stimulus:
         self.reads = self._sheet.reads
         self.drives = (*self._sheet.drives, "rx")
         self._pieces = list(reversed(timeline.pieces))
+        self._cuts = list(reversed(timeline.cuts))
         self._bit_clocks = facts(skin).bit_clocks
         self._received = list(reversed(timeline.received))
         self._start, self._data = 0, b""
@@ -51,6 +52,9 @@ class Stimulus:
         if self._pieces and self._pieces[-1][0] <= cycle:
             _, cells, stuck = self._pieces.pop()
             self._sheet.matrix.press(cells, stuck)
+        if self._cuts and self._cuts[-1][0] <= cycle:
+            _, cuts = self._cuts.pop()
+            self._sheet.matrix.cut(cuts.rows, cuts.columns)
         return (*self._sheet.step(pins), self._rx(cycle))
 
     def _rx(self, cycle: int) -> int:

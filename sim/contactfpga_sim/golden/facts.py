@@ -51,6 +51,16 @@ class Facts:
     def columns(self) -> int:
         return self.skin.columns
 
+    @property
+    def row_lines(self) -> int:
+        """Rows, and the guard row."""
+        return self.rows + (1 if self.skin.guard else 0)
+
+    @property
+    def column_lines(self) -> int:
+        """Columns, and the guard column."""
+        return self.columns + (1 if self.skin.guard else 0)
+
     @functools.cached_property
     def mask(self) -> np.ndarray:
         """(R, C) bool: True where there is no switch to read."""
@@ -75,14 +85,14 @@ class Facts:
         """X: clocks that the columns of a sample are shifted."""
         if self.skin.column_read == "direct":
             return 0
-        return -(-self.columns // self.skin.column_chains) * self.shift_bit
+        return -(-self.column_lines // self.skin.column_chains) * self.shift_bit
 
     @functools.cached_property
     def row_shift(self) -> int:
         """Z: clocks from which on a row pattern is shifted before its slot, and the first slot begins."""
         if self.skin.row_drive == "direct":
             return 0
-        return 1 + -(-self.rows // self.skin.row_chains) * self.shift_bit + self.shift_bit
+        return 1 + -(-self.row_lines // self.skin.row_chains) * self.shift_bit + self.shift_bit
 
     @functools.cached_property
     def load(self) -> int:

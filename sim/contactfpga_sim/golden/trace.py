@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import dataclasses
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,17 +25,33 @@ def boundaries(skin: Skin) -> tuple[str, ...]:
 
 
 @dataclasses.dataclass(frozen=True)
+class Cuts:
+    """Lines that are cut; a guard row counts as the last row, a guard column as the last column."""
+
+    rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
+    """By row the column from which on its switches no longer reach its pin."""
+    columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
+    """By column the row from which on its switches no longer reach its pin."""
+
+    def reach(self, row: int, column: int) -> bool:
+        """Whether a switch is still between two pins."""
+        return column < self.rows.get(row, column + 1) and row < self.columns.get(column, row + 1)
+
+
+@dataclasses.dataclass(frozen=True)
 class Timeline:
     """What happens at the pins of the board, from cycle 0 on.
 
     ``pieces`` are (start cycle, cells, stuck): from that cycle on the (R, C) bool array ``cells`` is pressed,
-    and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven.
-    Starts rise; before the first one nothing is pressed. ``received`` are (cycle, bytes): bytes whose first start
-    bit begins at the receive pin in that cycle, back to back; cycles rise, and those before are over.
+    and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven; with a guard
+    column it may be (C + 1,). Starts rise; before the first one nothing is pressed. ``received`` are (cycle, bytes):
+    bytes whose first start bit begins at the receive pin in that cycle, back to back; cycles rise, and those before are
+    over. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; before the first one all lines are whole.
     """
 
     pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
     received: Sequence[tuple[int, bytes]] = ()
+    cuts: Sequence[tuple[int, Cuts]] = ()
 
     def __post_init__(self) -> None:
         starts = [piece[0] for piece in self.pieces]
@@ -43,7 +59,11 @@ class Timeline:
             raise ValueError("pieces must start at rising cycles")
         if any(late[0] <= early[0] for early, late in itertools.pairwise(self.received)):
             raise ValueError("bytes must be received at rising cycles")
+        cut = [start for start, _ in self.cuts]
+        if any(late <= early for early, late in itertools.pairwise(cut)):
+            raise ValueError("lines must be cut at rising cycles")
         object.__setattr__(self, "_starts", starts)
+        object.__setattr__(self, "_cut", cut)
 
     @classmethod
     def frames(
@@ -65,6 +85,11 @@ class Timeline:
         """Cells and stuck columns in ``cycle``; None stands for none pressed."""
         index = bisect.bisect_right(self._starts, cycle) - 1  # type: ignore[attr-defined]
         return (None, None) if index < 0 else (self.pieces[index][1], self.pieces[index][2])
+
+    def cuts_at(self, cycle: int) -> Cuts:
+        """Lines that are cut in ``cycle``."""
+        index = bisect.bisect_right(self._cut, cycle) - 1  # type: ignore[attr-defined]
+        return Cuts() if index < 0 else self.cuts[index][1]
 
 
 @dataclasses.dataclass

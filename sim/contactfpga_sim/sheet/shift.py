@@ -85,15 +85,15 @@ class Sheet:
         if skin.reads_rows:
             self.reads += ("rows_drive",)
             self.drives += ("rows_read",)
-        self._released = (1 << skin.rows) - 1 if skin.selects_low else 0
+        self._released = (1 << skin.row_lines) - 1 if skin.selects_low else 0
         self.row_levels = self._released
         contents = random.Random(power_up)
         self.row_registers: RowRegisters | None = None
         self.column_registers: ColumnRegisters | None = None
         if skin.row_drive != "direct":
-            self.row_registers = RowRegisters(skin.rows, skin.row_chains, contents)
+            self.row_registers = RowRegisters(skin.row_lines, skin.row_chains, contents)
         if skin.column_read != "direct":
-            self.column_registers = ColumnRegisters(skin.columns, skin.column_chains, contents, column_delay)
+            self.column_registers = ColumnRegisters(skin.column_lines, skin.column_chains, contents, column_delay)
 
     def step(self, pins: Mapping[str, int]) -> tuple[int, ...]:
         """Levels of ``drives`` in this cycle, for those of ``reads``."""
@@ -101,7 +101,7 @@ class Sheet:
             self.row_levels = pins["rows"]
         else:
             levels = self.row_registers.step(*(pins[name] for name in ROW_PINS["74hc595"]))
-            self.row_levels = self._released if levels is None else levels & (1 << self.matrix.rows) - 1
+            self.row_levels = self._released if levels is None else levels & (1 << self.matrix.row_lines) - 1
         rows_driven, columns_driven = pins.get("rows_drive"), pins.get("columns_drive", 0)
         columns = self.matrix.levels(self.row_levels, rows_driven, columns_driven)
         if rows_driven is not None:

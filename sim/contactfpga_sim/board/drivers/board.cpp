@@ -1,9 +1,13 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
-// Compiled for one Skin: ROWS, COLUMNS, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
+// Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
 // 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records; PRECHARGE is 1 where columns
 // can be driven, REVERSAL where rows can be let go and are read. With MUTANTS the gateware
 // has an input that picks a mutant.
+#include <algorithm>
 #include <deque>
+
+#define ROW_LINES (ROWS + GUARD)
+#define COLUMN_LINES (COLUMNS + GUARD)
 
 #include "clocked.h"
 #include "shift.h"
@@ -14,51 +18,92 @@ struct Event {
     uint64_t cycle, data, mark;
 };
 
+// The line that each row and each column is soldered to, the guard lines last.
+constexpr uint8_t line_of_row[] = LINE_OF_ROW, line_of_column[] = LINE_OF_COLUMN;
+
 // A pressed switch passes the selecting level of its row to its column, and nothing else: the diode sees to that.
+// Switches and faults are told in the sheet's rows and columns, guard lines last; levels are those of lines.
 class Matrix {
 public:
-    uint64_t pressed[ROWS] = {};
-    uint64_t stuck = 0;
+    Word stuck = 0;
     // A column with capacitance goes a share of its way a clock: to the level that a pressed switch pulls it to, or back
     // to 0. It reads pressed above the threshold. Share and level depend on how many columns are pulled at once.
     bool slow = false;
-    double press_share[COLUMNS + 1], pulled[COLUMNS + 1], release_share = 1, threshold = 0.5;
+    double press_share[COLUMN_LINES + 1], pulled[COLUMN_LINES + 1], release_share = 1, threshold = 0.5;
 
-    static uint64_t driven(uint64_t row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROWS); }
+    Matrix() {
+        std::fill_n(row_end_, ROW_LINES, COLUMN_LINES);
+        std::fill_n(column_end_, COLUMN_LINES, ROW_LINES);
+        solder();
+    }
+
+    void press(unsigned row, uint64_t cells) {
+        pressed_[row] = cells;
+        solder(row);
+    }
+
+    // From where on the switches of each row, and of each column, no longer reach its pin.
+    void cut(const uint8_t *row_ends, const uint8_t *column_ends) {
+        std::copy_n(row_ends, ROW_LINES, row_end_);
+        std::copy_n(column_ends, COLUMN_LINES, column_end_);
+        solder();
+    }
+
+    static Word driven(Word row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROW_LINES); }
 
     // Once a clock; `fights` counts the clocks in which a driven column meets a row that is driven to the other level.
     uint64_t fights = 0;
-    uint64_t levels(uint64_t driven, uint64_t columns_driven) {
-        uint64_t reads = 0;
+    Word levels(Word driven, Word columns_driven) {
+        Word reads = 0;
         for (; driven; driven &= driven - 1)
-            reads |= pressed[__builtin_ctzll(driven)];
+            reads |= closed_[lowest(driven)];
         fights += (reads & columns_driven) != 0;
         reads |= stuck;
         if (slow)
             reads = settled(reads, columns_driven);
-        return (COL2ROW ? ~reads : reads) & mask(COLUMNS);
+        return (COL2ROW ? ~reads : reads) & mask(COLUMN_LINES);
     }
 
     // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
-    uint64_t row_levels(uint64_t levels, uint64_t rows_driven, uint64_t columns_driven) const {
-        uint64_t touched = 0;
-        for (unsigned row = 0; row < ROWS; row++)
-            touched |= static_cast<uint64_t>((pressed[row] & columns_driven & ~stuck) != 0) << row;
-        return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROWS));
+    Word row_levels(Word levels, Word rows_driven, Word columns_driven) const {
+        Word touched = 0;
+        for (unsigned line = 0; line < ROW_LINES; line++)
+            touched |= Word{(closed_[line] & columns_driven & ~stuck) != 0} << line;
+        return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROW_LINES));
     }
 
 private:
-    double volts_[COLUMNS] = {};
+    uint64_t pressed_[ROWS] = {};
+    uint8_t row_end_[ROW_LINES], column_end_[COLUMN_LINES];
+    Word closed_[ROW_LINES];  // by a row's line, the lines of the columns that it reaches through closed switches
+    double volts_[COLUMN_LINES] = {};
 
-    uint64_t settled(uint64_t pulls, uint64_t columns_driven) {
-        uint64_t reads = 0;
-        const int count = __builtin_popcountll(pulls);
-        for (unsigned column = 0; column < COLUMNS; column++) {
+    void solder() {
+        for (unsigned row = 0; row < ROW_LINES; row++)
+            solder(row);
+    }
+
+    void solder(unsigned row) {
+        Word cells = row < ROWS ? pressed_[row] | Word{GUARD} << COLUMNS % (8 * sizeof(Word)) : mask(COLUMNS);
+        Word reached = 0;
+        for (; cells; cells &= cells - 1) {
+            const unsigned column = lowest(cells);
+            if (column < row_end_[row] && row < column_end_[column])
+                reached |= Word{1} << line_of_column[column];
+        }
+        closed_[line_of_row[row]] = reached;
+    }
+
+    Word settled(Word pulls, Word columns_driven) {
+        Word reads = 0;
+        const unsigned together = count(pulls);
+        for (unsigned column = 0; column < COLUMN_LINES; column++) {
             const bool pull = pulls >> column & 1;
             if (columns_driven >> column & 1 && !pull)
                 volts_[column] = 0;
-            volts_[column] += ((pull ? pulled[count] : 0) - volts_[column]) * (pull ? press_share[count] : release_share);
-            reads |= static_cast<uint64_t>(volts_[column] > threshold) << column;
+            volts_[column] +=
+                ((pull ? pulled[together] : 0) - volts_[column]) * (pull ? press_share[together] : release_share);
+            reads |= Word{volts_[column] > threshold} << column;
         }
         return reads;
     }
@@ -131,47 +176,47 @@ private:
 
 class Board {
 #if ROW_CHAINS
-    RowRegisters<ROWS, ROW_CHAINS> row_registers_;
+    RowRegisters<ROW_LINES, ROW_CHAINS> row_registers_;
 
-    uint64_t rows() {
+    Word rows() {
         const auto &top = model_.top;
         const auto data = static_cast<uint64_t>(get(top.p_row__data));
         const bool clock = get(top.p_row__clock), latch = get(top.p_row__latch), enable_n = get(top.p_row__enable__n);
-        return row_registers_.step(data, clock, latch, enable_n, COL2ROW ? mask(ROWS) : 0);
+        return row_registers_.step(data, clock, latch, enable_n, COL2ROW ? mask(ROW_LINES) : 0);
     }
 #else
-    uint64_t rows() { return static_cast<uint64_t>(get(model_.top.p_rows)); }
+    Word rows() { return static_cast<Word>(get(model_.top.p_rows)); }
 #endif
 
 #if COLUMN_CHAINS
-    ColumnRegisters<COLUMNS, COLUMN_CHAINS> column_registers_;
+    ColumnRegisters<COLUMN_LINES, COLUMN_CHAINS> column_registers_;
 
-    uint64_t read(uint64_t levels) {
+    uint64_t read(Word levels) {
         return column_registers_.step(get(model_.top.p_column__load__n), get(model_.top.p_column__clock), levels);
     }
     auto &columns() { return model_.top.p_column__data; }
 #else
-    uint64_t read(uint64_t levels) { return levels; }
+    Word read(Word levels) { return levels; }
     auto &columns() { return model_.top.p_columns; }
 #endif
 
 #if PRECHARGE
-    uint64_t columns_driven() { return static_cast<uint64_t>(get(model_.top.p_columns__drive)); }
+    Word columns_driven() { return static_cast<Word>(get(model_.top.p_columns__drive)); }
 #else
-    uint64_t columns_driven() { return 0; }
+    Word columns_driven() { return 0; }
 #endif
 
 #if REVERSAL
-    uint64_t rows_driven() { return static_cast<uint64_t>(get(model_.top.p_rows__drive)); }
+    Word rows_driven() { return static_cast<Word>(get(model_.top.p_rows__drive)); }
     bool put_rows() {
-        const uint64_t levels = matrix.row_levels(rows(), rows_driven(), columns_driven());
+        const Word levels = matrix.row_levels(rows(), rows_driven(), columns_driven());
         const bool changed = levels != row_levels_;
         put(model_.top.p_rows__read, row_levels_ = levels);
         return changed;
     }
-    uint64_t row_levels_ = 0;
+    Word row_levels_ = 0;
 #else
-    uint64_t rows_driven() { return mask(ROWS); }
+    Word rows_driven() { return mask(ROW_LINES); }
     bool put_rows() { return false; }
 #endif
 
@@ -191,8 +236,8 @@ public:
             put(model_.top.p_mutant, mutant);
 #endif
             model_.settle();
-            const uint64_t driven = Matrix::driven(rows()) & rows_driven();
-            const uint64_t levels = read(matrix.levels(driven, columns_driven()));
+            const Word driven = Matrix::driven(rows()) & rows_driven();
+            const Word levels = read(matrix.levels(driven, columns_driven()));
             const bool rows_change = put_rows();
             if (levels != levels_ || rows_change) {
                 // Lines enter flip-flops only, so the second evaluation changes nothing but what those take.
@@ -206,10 +251,10 @@ public:
 
 private:
     Clocked model_;
-    uint64_t levels_ = 0, driven_ = 0, charged_ = 0;
+    Word levels_ = 0, driven_ = 0, charged_ = 0;
     bool line_ = true, contact_ = false;
 
-    void watch(uint64_t driven) {
+    void watch(Word driven) {
         auto &top = model_.top;
         const bool line = get(top.p_tx);
         uint8_t byte;
@@ -221,9 +266,9 @@ private:
         if (contact != contact_)
             note(CONTACT, contact_ = contact, 0, cycle);
         if (driven != driven_)
-            note(DRIVEN, driven_ = driven, 0, cycle);
+            note_lines(DRIVEN, driven_ = driven);
         if (columns_driven() != charged_)
-            note(CHARGED, charged_ = columns_driven(), 0, cycle);
+            note_lines(CHARGED, charged_ = columns_driven());
 #if PROBES
         if (get(top.p_row__transfer))
             note(ROW, static_cast<uint64_t>(get(top.p_row__cells)), get(top.p_row__last), cycle);
@@ -236,6 +281,10 @@ private:
         if (get(top.p_byte__transfer))
             note(BYTE, static_cast<uint64_t>(get(top.p_byte__data)), 0, cycle);
 #endif
+    }
+
+    void note_lines(Boundary boundary, Word lines) {
+        note(boundary, static_cast<uint64_t>(lines), high_half(lines), cycle);
     }
 
     void note(Boundary boundary, uint64_t data, uint64_t mark, uint64_t at) {
@@ -257,12 +306,19 @@ EXPORT void board_restart(Board *board, unsigned mutant) {
     board->captured = captured;
     board->mutant = mutant;
 }
-EXPORT void board_stick(Board *board, uint64_t columns) { board->matrix.stuck = columns; }
+EXPORT void board_stick(Board *board, const uint8_t *columns) {
+    board->matrix.stuck = 0;
+    for (unsigned column = 0; column < COLUMN_LINES; column++)
+        board->matrix.stuck |= Word{columns[column]} << line_of_column[column];
+}
+EXPORT void board_cut(Board *board, const uint8_t *row_ends, const uint8_t *column_ends) {
+    board->matrix.cut(row_ends, column_ends);
+}
 EXPORT void board_settle(
     Board *board, const double *press_share, const double *pulled, double release_share, double threshold) {
     Matrix &matrix = board->matrix;
     matrix.slow = true;
-    for (unsigned count = 0; count <= COLUMNS; count++) {
+    for (unsigned count = 0; count <= COLUMN_LINES; count++) {
         matrix.press_share[count] = press_share[count];
         matrix.pulled[count] = pulled[count];
     }
@@ -275,7 +331,7 @@ EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 EXPORT void board_hold(Board *board, const uint64_t *cells, size_t frames, uint64_t cycles) {
     for (; frames--; cells += ROWS) {
         for (unsigned row = 0; row < ROWS; row++)
-            board->matrix.pressed[row] = cells[row];
+            board->matrix.press(row, cells[row]);
         board->run(cycles);
     }
 }

@@ -3,12 +3,24 @@
 
 #include <cstdint>
 #include <random>
+#include <type_traits>
 
-constexpr uint64_t mask(unsigned bits) { return bits == 64 ? ~0ull : (1ull << bits) - 1; }
+// A bit per line of the rows or of the columns: of 64, and a guard line.
+using Word = std::conditional_t<(ROW_LINES > 64 || COLUMN_LINES > 64), unsigned __int128, uint64_t>;
+
+constexpr Word mask(unsigned bits) { return bits == 8 * sizeof(Word) ? ~Word{0} : (Word{1} << bits) - 1; }
+constexpr uint64_t high_half(Word word) { return static_cast<uint64_t>(word >> 32 >> 32); }
+inline unsigned lowest(Word word) {
+    const auto low = static_cast<uint64_t>(word);
+    return low ? __builtin_ctzll(low) : 64 + __builtin_ctzll(high_half(word));
+}
+inline unsigned count(Word word) {
+    return __builtin_popcountll(static_cast<uint64_t>(word)) + __builtin_popcountll(high_half(word));
+}
 
 // What registers hold at power-up: random bits, the same in every run.
 template <size_t COUNT>
-void power_up(uint64_t (&registers)[COUNT], unsigned bits, unsigned seed) {
+void power_up(Word (&registers)[COUNT], unsigned bits, unsigned seed) {
     std::mt19937_64 random(seed);
     for (auto &content : registers)
         content = random() & mask(bits);
@@ -24,10 +36,10 @@ public:
     }
 
     // Levels of the outputs in this cycle, or `released` while they are switched off.
-    uint64_t step(uint64_t data, bool clock, bool latch, bool enable_n, uint64_t released) {
-        uint64_t levels = 0;
+    Word step(uint64_t data, bool clock, bool latch, bool enable_n, Word released) {
+        Word levels = 0;
         for (unsigned chain = 0; chain < CHAINS; chain++) {
-            uint64_t &bits = bits_[chain];
+            Word &bits = bits_[chain];
             if (latch && !latch_)
                 latched_[chain] = bits;
             if (clock && !clock_)
@@ -40,7 +52,8 @@ public:
 
 private:
     static constexpr unsigned length = (LINES + CHAINS - 1) / CHAINS;
-    uint64_t bits_[CHAINS], latched_[CHAINS], data_ = 0;
+    Word bits_[CHAINS], latched_[CHAINS];
+    uint64_t data_ = 0;
     bool clock_ = true, latch_ = true;
 };
 
@@ -50,15 +63,15 @@ class ColumnRegisters {
 public:
     ColumnRegisters() { power_up(bits_, length, 3); }
 
-    uint64_t step(bool load_n, bool clock, uint64_t columns) {
+    uint64_t step(bool load_n, bool clock, Word columns) {
         uint64_t data = 0;
         for (unsigned chain = 0; chain < CHAINS; chain++) {
-            uint64_t &bits = bits_[chain];
+            Word &bits = bits_[chain];
             if (!load_n)
                 bits = columns >> chain * length & mask(length);
             else if (clock && !clock_)
                 bits >>= 1;
-            data |= (bits & 1) << chain;
+            data |= static_cast<uint64_t>(bits & 1) << chain;
         }
         clock_ = clock;
         return data;
@@ -66,6 +79,6 @@ public:
 
 private:
     static constexpr unsigned length = (LINES + CHAINS - 1) / CHAINS;
-    uint64_t bits_[CHAINS];
+    Word bits_[CHAINS];
     bool clock_ = true;
 };
