@@ -47,11 +47,12 @@ def tag_layout(derived: Derived) -> data.StructLayout:
     its row times.
 
     ``heard`` is of the last request before the frame's first sample, and ``requested`` says that it came since that of
-    the frame before.
+    the frame before. ``fault``: columns are stuck, or other faults were told.
     """
     uneven = not derived.scan.even and not derived.scan.waits
     slots = {"slots": derived.max_frame_slots.bit_length()} if uneven else {}
-    return data.StructLayout({"time": TIME_BITS, "stuck": STUCK_BITS, "heard": HEARD_BITS, "requested": 1, **slots})
+    known = {"time": TIME_BITS, "stuck": STUCK_BITS, "fault": 1, "heard": HEARD_BITS, "requested": 1}
+    return data.StructLayout(known | slots)
 
 
 def faults_layout(derived: Derived) -> data.StructLayout:

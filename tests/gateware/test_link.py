@@ -29,7 +29,7 @@ KEEP_ALIVE = {"on change": 4, "every scan": 1, "cells on change": 4}  # scans
 HELLO_EVERY = 24
 ITEM_BYTES = {"moments": 2, "cells": 1}  # 5 + 5 + 5 bits, 4 bits
 TRAILER_BYTES = 7  # 24 + 8 + 3 + 5 + 4 + 4 bits and the last byte
-TAG = {"time": 24, "stuck": 3, "heard": 3, "requested": 1}
+TAG = {"time": 24, "stuck": 3, "fault": 1, "heard": 3, "requested": 1}
 SUMMARY = {"cells": 5, "zones": 4, "overflow": 1, "mismatch": 1, "changed": 1}
 
 
@@ -100,7 +100,7 @@ def hello_of(skin, digits=(0,) * 16):
 
 
 def frame_of(skin, frame, sequence, overwritten):
-    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten, "fault": int(frame.facts["stuck"] > 0)}
+    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten}
     widths = {"time": 24, "sequence": 8, "heard": 3, "cells": 5, "zones": 4, "overwritten": 4}
     word = offset = 0
     for name, width in (widths | {"overflow": 1, "mismatch": 1, "fault": 1}).items():

@@ -39,7 +39,7 @@ class Frame:
 
     def plain(self, skin, verdict):
         _, area, zones = sizes(skin)
-        fields = self.trailer | verdict | {"fault": int(self.trailer["stuck"] > 0)}
+        fields = self.trailer | verdict
         widths = {"time": 24, "sequence": 8, "heard": 3, "cells": area, "zones": zones}
         widths["overwritten"] = overwritten_width(area, zones)
         widths |= {"overflow": 1, "mismatch": 1, "fault": 1}
@@ -75,7 +75,7 @@ def stuffed(plain):
 
 def random_trailer(rng, skin):
     _, area, zones = sizes(skin)
-    widths = {"time": 24, "overflow": 1, "mismatch": 1, "stuck": 3, "heard": 3, "cells": area, "zones": zones}
+    widths = {"time": 24, "overflow": 1, "mismatch": 1, "fault": 1, "heard": 3, "cells": area, "zones": zones}
     return {name: rng.randrange(1 << width) for name, width in widths.items()}
 
 
@@ -107,7 +107,7 @@ def run(bench, skin, frames, rng, gap=0.0):
 
     for name in ("cells", "zones", "overflow", "mismatch"):
         sim.drive(dut.summary[name], lambda cycle, name=name: frames[frame_now()[0]].trailer[name])
-    for name in ("time", "stuck", "heard"):
+    for name in ("time", "fault", "heard"):
         sim.drive(dut.tag[name], lambda cycle, name=name: frames[frame_now()[0]].trailer[name])
     for name, width in widths.items():  # noise until the end mark is decided upon
 
@@ -195,7 +195,7 @@ def test_blocks_around_254_bytes_and_their_clocks(bench, rng, length):
 def test_a_frame_that_ends_with_a_full_block_has_no_empty_one_behind_it(bench, rng):
     skin = skin_of("zones of 5 bytes")
     # 5 * 49 + 9 bytes. The counters differ from frame to frame; in most of them they hold no zero.
-    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "stuck": 7, "heard": 7, "cells": 1023, "zones": 255}
+    largest = {"time": 0xFFFFFF, "overflow": 1, "mismatch": 1, "fault": 1, "heard": 7, "cells": 1023, "zones": 255}
     frames = [Frame(random_items(rng, 5, 49, 0.0), largest) for _ in range(8)]
     got, source, verdicts = run(bench, skin, frames, rng)
     assert [written for _, written in got] == wanted(skin, frames, verdicts)

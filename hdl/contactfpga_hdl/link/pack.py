@@ -133,7 +133,7 @@ class Packer(wiring.Component):
             trailer.overwritten.eq(self.frames.verdict.overwritten),
             trailer.overflow.eq(self.summary.overflow),
             trailer.mismatch.eq(self.summary.mismatch),
-            trailer.fault.eq(self.tag.stuck.any()),
+            trailer.fault.eq(self.tag.fault),
             trailer.heard.eq(self.tag.heard),
             trailer.cells.eq(self.summary.cells),
             trailer.zones.eq(self.summary.zones),

@@ -77,6 +77,7 @@ class AdaptiveScanner(wiring.Component):
             stuck.released.eq(sample.of_released),
             stuck.take.eq(seek.ends),
             self.tag.stuck.eq(stuck.count),
+            self.tag.fault.eq(stuck.count.any()),
         ]
         return m
 

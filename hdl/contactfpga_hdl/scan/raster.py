@@ -1,11 +1,12 @@
 """Drives one row after the other and samples all columns of it at once."""
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
-from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
+from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row
 from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
@@ -13,18 +14,20 @@ from contactfpga_hdl.scan.stuck import Stuck, present
 
 
 class _Slots:
-    """Which slot it is: rows follow each other, and before the first one there is the time to shift its row."""
+    """Which slot it is: rows follow each other, a guard row before row 0; and before the first slot there is the time
+    to shift its row."""
 
     def __init__(self, derived: Derived):
-        slot, shifting = derived.row_clocks, derived.row_shift_clocks
+        slot, shifting, lines = derived.row_clocks, derived.row_shift_clocks, derived.skin.row_lines
         begun = int(not shifting)
+        self.first = first_row(derived.skin)
         self.clock = Signal(range(slot), init=(slot - shifting) % slot)
         self.scans = Signal(init=begun)  # in the first slot and after it
-        self.following = Signal(derived.skin.rows, init=1 << begun % derived.skin.rows)  # row of the next one, one-hot
+        self.following = Signal(lines, init=1 << (self.first + begun) % lines)  # row of the next one, one-hot
 
     @property
     def is_last(self) -> Value:
-        return self.following[0] & self.scans
+        return self.following[self.first] & self.scans
 
 
 class _Sample:
@@ -32,20 +35,24 @@ class _Sample:
 
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
-        self.of_row = Signal()  # high for a clock: it is there, and was taken while the row was driven
+        skin = derived.skin
+        self.of_driven = Signal()  # high for a clock: it is there, and was taken while a row was driven
+        self.of_row = Signal()  # and this is one of the sheet's rows
         self.of_released = Signal()  # likewise while no row was driven
-        self.row = Signal(range(max(2, derived.skin.rows)))  # the next to be sampled
-        self.read = Signal(derived.skin.columns)  # columns that read pressed
-        self.pressed = Signal(derived.skin.columns)  # and are not masked in this row
+        self.row = Signal(range(max(2, skin.row_lines)), init=first_row(skin))  # the next to be sampled
+        self.read = Signal(skin.column_lines)  # columns that read pressed
+        self.pressed = Signal(skin.columns)  # and are not masked in this row
         self.is_first = self.row == 0
-        self.is_last = self.row == derived.skin.rows - 1
+        self.is_last = self.row == skin.rows - 1
+        self.is_guard = self.row == skin.rows if skin.guard else Const(0)
 
 
 class Scanner(wiring.Component):
     """Raster scan: each row for the settle time, then no row for the release time.
 
     A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
-    stages and the row register), and later by what its columns take on shift registers.
+    stages and the row register), and later by what its columns take on shift registers. With ``guard`` a frame begins
+    with the guard row, which is not offered.
 
     pins: those of the row driver and of the column reader.
     rows (out): rows in ascending order.
@@ -53,6 +60,8 @@ class Scanner(wiring.Component):
     request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
     heard (in): taken over into that tag.
     epoch (out): high for a clock when another 2^22 us are over.
+    faults (out): with ``guard``; a row's bit one clock after its sample is there, those of all columns one clock after
+    the guard row's, and of stuck columns one clock after the last row's.
     contact (out): rises with the offer of the first row that holds a pressed switch, and falls with the last row of a
     scan without one.
     """
@@ -73,7 +82,7 @@ class Scanner(wiring.Component):
         slots, sample = _Slots(self.derived), _Sample(self.derived)
         self._drive_rows(m, slots, driver)
         self._sample_columns(m, slots, reader, sample)
-        self._mask_row(m, reader.levels[: skin.columns], sample)
+        self._mask_row(m, reader.levels, sample)
         self._offer_row(m, sample)
         self._watch_contact(m, sample)
         time = self._tag_frame(m, slots, sample)
@@ -84,6 +93,7 @@ class Scanner(wiring.Component):
             stuck.released.eq(sample.of_released),
             stuck.take.eq(sample.of_row & sample.is_last),
             self.tag.stuck.eq(stuck.count),
+            self.tag.fault.eq(stuck.count.any() | (self._check_lines(m, sample, stuck, time) if skin.guard else 0)),
         ]
         return m
 
@@ -111,12 +121,14 @@ class Scanner(wiring.Component):
             sample.begins.eq(slots.scans & (slots.clock == derived.settle_clocks - lead)),
             begins_released.eq(slots.scans & (slots.clock == derived.row_clocks - lead)),
             reader.begin.eq(sample.begins | begins_released),
-            sample.of_row.eq(reader.done & done_is_row),
+            sample.of_driven.eq(reader.done & done_is_row),
+            sample.of_row.eq(sample.of_driven & ~sample.is_guard),
             sample.of_released.eq(reader.done & ~done_is_row),
         ]
         m.d.sync += done_is_row.eq(done_is_row ^ reader.done)
-        with m.If(sample.of_row):
-            m.d.sync += sample.row.eq(Mux(sample.is_last, 0, sample.row + 1))
+        with m.If(sample.of_driven):
+            ends = sample.is_guard if self.skin.guard else sample.is_last
+            m.d.sync += sample.row.eq(Mux(ends, 0, sample.row + 1))
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """While no row is driven, but for a clock after the last one and a clock before the next one."""
@@ -130,6 +142,28 @@ class Scanner(wiring.Component):
             precharge.turn.eq(time[RETRY_BIT]),
             self.pins.columns_drive.eq(precharge.pins),
         ]
+
+    def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
+        """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as the
+        frame ended; it is there with the number of stuck columns."""
+        skin = self.skin
+        m.submodules.told = told = Told(skin)
+        ended, at_end = Signal(), Signal()
+        m.d.comb += [
+            told.rows.eq((~sample.read[-1]).replicate(skin.rows)),
+            told.columns.eq(~sample.read),
+            told.stuck.eq(stuck.seen),
+            told.checks_rows.eq(Mux(sample.of_row, Const(1, skin.rows) << sample.row, 0)),
+            told.checks_columns.eq(sample.of_driven & sample.is_guard),
+            told.checks_stuck.eq(stuck.take),
+            told.round.eq(stuck.take),
+            told.turn.eq(time[RETRY_BIT]),
+            self.faults.eq(told.faults),
+        ]
+        m.d.sync += ended.eq(stuck.take)
+        with m.If(ended):
+            m.d.sync += at_end.eq(told.faults.as_value().any())
+        return at_end
 
     def _mask_row(self, m: Module, levels: Value, sample: _Sample) -> None:
         m.d.comb += [
@@ -161,12 +195,13 @@ class Scanner(wiring.Component):
             ]
 
     def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> Value:
-        """Time and request at the first row's sample; the tag takes them over with the last row's strobe. Returns the
+        """Time and request at the sample of row 0; the tag takes them over with the last row's strobe. Returns the
         clock in us."""
         per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
-        # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of the
-        # first row's sample: no register has to keep that.
-        ahead = self.derived.row_shift_clocks - late
+        # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of row
+        # 0's sample: no register has to keep that.
+        guarded = self.derived.row_clocks if self.skin.guard else 0
+        ahead = self.derived.row_shift_clocks + guarded - late
         prescaler = Signal(range(max(2, per_us)), init=ahead % per_us)
         time = Signal(TIME_BITS, init=ahead // per_us % (1 << TIME_BITS))
         runs = Signal()

@@ -126,6 +126,7 @@ class ReversalScanner(wiring.Component):
             precharge.turn.eq(self.time[RETRY_BIT]),
         ]
         count_columns(m, precharge.held, begun, self.tag.stuck)
+        m.d.comb += self.tag.fault.eq(self.tag.stuck.any())
 
     def _take_turns(self, m: Module, sheet: _Sheet, turn: _Turn) -> None:
         """What a state does to the sheet is seen at the pins a clock later."""

@@ -30,23 +30,28 @@ def watched(skin: Skin) -> int:
 class Stuck(wiring.Component):
     """How many columns read pressed in any ``released`` clock up to ``take``; ``count`` is there two clocks after that.
 
-    Columns that are masked in every row do not count.
+    Columns that are masked in every row do not count, nor does a guard column. ``seen`` are the lines so far.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         super().__init__(
-            {"columns": In(skin.columns), "released": In(1), "take": In(1), "count": Out(STUCK_BITS)},
+            {
+                "columns": In(skin.column_lines),
+                "released": In(1),
+                "take": In(1),
+                "seen": Out(skin.column_lines),
+                "count": Out(STUCK_BITS),
+            },
         )
 
     def elaborate(self, platform):
         m = Module()
-        seen = Signal(self.skin.columns)
         with m.If(self.released):
-            m.d.sync += seen.eq(seen | self.columns & anywhere(self.skin))
+            m.d.sync += self.seen.eq(self.seen | self.columns & watched(self.skin))
         with m.If(self.take):
-            m.d.sync += seen.eq(0)
-        count_columns(m, seen, self.take, self.count)
+            m.d.sync += self.seen.eq(0)
+        count_columns(m, self.seen[: self.skin.columns], self.take, self.count)
         return m
 
 

@@ -82,8 +82,7 @@ def _reversal_frame_clocks(derived: Derived) -> int:
 
 def _raster_min_row_clocks(derived: Derived) -> int:
     packed = derived.packed_clocks + derived.items_clocks(derived.max_items)
-    rows, columns = derived.skin.rows, derived.skin.columns
-    return max(columns + 6, 10, derived.label_clocks + 1, math.ceil(packed / rows))
+    return max(derived.skin.columns + 6, 10, derived.label_clocks + 1, math.ceil(packed / derived.skin.row_lines))
 
 
 def _adaptive_min_row_clocks(derived: Derived) -> int:
@@ -123,7 +122,7 @@ SCANS: dict[str, Scan] = {
             guards=True,
             check=lambda skin: None,
             choice_clocks=lambda derived: 0,
-            max_frame_slots=lambda derived: derived.skin.rows,
+            max_frame_slots=lambda derived: derived.skin.row_lines,
             max_frame_clocks=lambda derived: derived.frame_clocks,
             min_row_clocks=_raster_min_row_clocks,
         ),

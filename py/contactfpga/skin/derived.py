@@ -146,8 +146,8 @@ class Derived(Widths):
 
     @property
     def frame_clocks(self) -> int:
-        """One scan period: every row once. Frames of an adaptive scan take fewer or more clocks."""
-        return self.row_clocks * self.skin.rows
+        """One scan period: every row once, a guard row too. Frames of an adaptive scan take fewer or more clocks."""
+        return self.row_clocks * self.skin.row_lines
 
     @property
     def bit_clocks(self) -> int:

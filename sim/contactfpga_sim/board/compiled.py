@@ -24,8 +24,8 @@ driven, and bytes decoded from the line. The order is that of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's last, for a record or an
-item whether it is the end mark."""
+wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's
+last, for a record or an item whether it is the end mark."""
 
 
 class CompiledBoard:

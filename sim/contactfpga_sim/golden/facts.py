@@ -144,8 +144,8 @@ class Facts:
 
     @functools.cached_property
     def scan_clocks(self) -> int:
-        """Clocks of one scan period: every row once."""
-        return self.rows * self.row_clocks
+        """Clocks of one scan period: every row once, the guard row too."""
+        return self.row_lines * self.row_clocks
 
     @functools.cached_property
     def bit_clocks(self) -> int:
@@ -178,7 +178,7 @@ class Facts:
     def keep_alive_slots(self) -> int:
         """Row times after which an unchanged frame is sent; with one more frame it could come too late."""
         if self.scan.even:
-            return self.rows * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
+            return self.row_lines * downwards(self._scans(exact(self.skin.keep_alive_ms) * 1000))
         row_us = Fraction(self.row_clocks, self.clocks_per_us)
         return downwards(exact(self.skin.keep_alive_ms) * 1000 / row_us) - self.frame_slots + 1
 
@@ -205,7 +205,7 @@ class Facts:
     @functools.cached_property
     def hello_slots(self) -> int:
         """Row times after which a hello is due."""
-        return self.rows * max(1, math.floor(self._scans(Fraction(500_000))))
+        return self.row_lines * max(1, math.floor(self._scans(Fraction(500_000))))
 
     def _scans(self, microseconds: Fraction) -> Fraction:
         return microseconds * self.clocks_per_us / self.scan_clocks

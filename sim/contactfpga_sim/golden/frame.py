@@ -113,7 +113,7 @@ class Packer:
                 (cells, facts.area_bits),
                 (zones, facts.zones_bits),
                 (self._overwritten % 2**room, room),
-                (overflow * OVERFLOW | (items.scan.stuck > 0) * FAULT, 4),
+                (overflow * OVERFLOW | items.scan.fault * FAULT, 4),
                 (BARYCENTERS if facts.divided else ZONES if facts.zones else CELLS, 4),
             )
         )

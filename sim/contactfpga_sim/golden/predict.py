@@ -63,9 +63,16 @@ class Stages:
         self._trace = trace
         self._packer = packer
         self._scanned = scanned
+        self.told: scan.Changes = []
+        """(cycle, faults) of every change of what is told of faulty lines."""
         self._free = 0
         self._handed = -1
         self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
+
+    def tell(self, cycle: int, faults: int) -> None:
+        """Note what is told of faulty lines, from a cycle on."""
+        if faults != (self.told[-1][1] if self.told else 0):
+            self.told.append((cycle, faults))
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
         """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced."""

@@ -10,8 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
+from contactfpga_sim.golden import guard
 from contactfpga_sim.golden.debounce import debounced
 from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.guard import Told, closed, stuck
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.trace import Timeline
 
@@ -25,7 +27,7 @@ class Scan:
     offered: list[int]
     """Cycle at which each row is offered to the next stage."""
     stuck: int
-    """Columns that read pressed while no row was driven."""
+    """Columns that read pressed while no row was driven, without a guard column."""
     time_us: int
     """Device time of the first row's strobe, less what the columns were shifted; unbounded."""
     requested: bool
@@ -38,6 +40,13 @@ class Scan:
     """Row times it took."""
     alone: frozenset[int]
     """Rows that were driven alone."""
+    faults: int = 0
+    """What was told of faulty lines when it ended, as :attr:`contactfpga_sim.golden.guard.Told.word` has it."""
+
+    @property
+    def fault(self) -> bool:
+        """What its frame tells of faults."""
+        return self.stuck > 0 or self.faults > 0
 
 
 Changes = list[tuple[int, int]]
@@ -73,6 +82,9 @@ class Stages(Protocol):
     @property
     def due(self) -> int:
         """The cycle from which on a frame is due, for a scan that waits."""
+
+    def tell(self, cycle: int, faults: int) -> None:
+        """From a cycle on, no earlier than any before, this is told of faulty lines."""
 
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
@@ -124,7 +136,7 @@ class Raster(ScanRule):
         return 0
 
     def frame_slots(self, facts: Facts) -> int:
-        return facts.rows
+        return facts.row_lines
 
     def scan(self, play: Play) -> Scanned:
         facts, frames = play.facts, play.cycles // play.facts.scan_clocks + 1
@@ -132,12 +144,15 @@ class Raster(ScanRule):
         counted = debounced(
             np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
         )
-        for one, cells in zip(scanned, counted, strict=True):
-            play.stages.frame(one, cells)
+        told = checks(facts, play.timeline, frames)
+        for number, (one, cells) in enumerate(zip(scanned, counted, strict=True)):
+            for cycle, word in told[number]:
+                play.stages.tell(cycle, word)
+            play.stages.frame(dataclasses.replace(one, faults=told[number][-1][1] if told[number] else 0), cells)
         driven = []
-        for slot in range(frames * facts.rows):
+        for slot in range(frames * facts.row_lines):
             start = facts.row_shift + slot * facts.row_clocks
-            driven += [(start, 1 << slot % facts.rows), (start + facts.settle, 0)]
+            driven += [(start, 1 << _line(facts, slot)), (start + facts.settle, 0)]
         beginnings = [facts.row_shift + number * facts.scan_clocks for number in range(frames + 1)]
         return Scanned(contact(facts, scanned), driven, beginnings)
 
@@ -164,20 +179,20 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
     """The first ``count`` scans, with the requests in the order in which they were received."""
     result = []
     for index in range(count):
-        slots = range(index * facts.rows, (index + 1) * facts.rows)
+        slots = row_slots(facts, index)
         begin = strobe(facts, slots[0])
         late = _asked_before(facts, slots[0])
-        early = _asked_before(facts, slots[0] - facts.rows) if index else 0
+        early = _asked_before(facts, slots[0] - facts.row_lines) if index else 0
         result.append(
             Scan(
-                cells=np.array([_sample(facts, timeline, slot) for slot in slots]),
+                cells=np.array([_read(facts, timeline, slot)[: facts.columns] for slot in slots]) & ~facts.mask,
                 offered=[strobe(facts, slot) + 1 for slot in slots],
-                stuck=_stuck(facts, timeline, slots),
+                stuck=int(np.sum((_stuck(facts, timeline, index)[: facts.columns]) & ~facts.mask.all(axis=0))),
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
                 requested=any(early <= request.cycle < late for request in requests),
                 heard=last_number(requests, late) % 8,
                 told=strobe(facts, slots[-1]) + 2,
-                slots=facts.rows,
+                slots=facts.row_lines,
                 alone=frozenset(range(facts.rows)),
             )
         )
@@ -209,23 +224,68 @@ def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
     return changes
 
 
-def _sample(facts: Facts, timeline: Timeline, slot: int) -> np.ndarray:
-    row = slot % facts.rows
-    cells, stuck = timeline.at(sampled(facts, slot))
-    columns = np.zeros(facts.columns, bool)
-    if cells is not None:
-        columns |= np.asarray(cells[row], bool)
-    if stuck is not None:
-        columns |= np.asarray(stuck, bool)
-    return columns & ~facts.mask[row]
+def row_slots(facts: Facts, frame: int) -> range:
+    """The slots of a frame's rows; a guard row has the one before them."""
+    end = (frame + 1) * facts.row_lines
+    return range(end - facts.rows, end)
 
 
-def _stuck(facts: Facts, timeline: Timeline, slots: range) -> int:
-    columns = np.zeros(facts.columns, bool)
-    for slot in range(slots[0] - 1, slots[-1]):
-        if slot < 0:
-            continue
-        _, stuck = timeline.at(facts.row_shift + (slot + 1) * facts.row_clocks - 1)
-        if stuck is not None:
-            columns |= np.asarray(stuck, bool)
-    return int(np.sum(columns & ~facts.mask.all(axis=0)))
+def _row(facts: Facts, slot: int) -> int:
+    """The row of a slot, counting a guard row as the last one."""
+    return (slot - (facts.row_lines - facts.rows)) % facts.row_lines
+
+
+def _line(facts: Facts, slot: int) -> int:
+    """The line that is driven in a slot."""
+    return (*(facts.skin.row_order or range(facts.rows)), facts.rows)[_row(facts, slot)]
+
+
+def _read(facts: Facts, timeline: Timeline, slot: int) -> np.ndarray:
+    """(column lines,) bool: columns that read pressed in a slot."""
+    cycle = sampled(facts, slot)
+    return np.asarray(closed(facts, timeline, cycle)[_row(facts, slot)] | stuck(facts, timeline, cycle))
+
+
+def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
+    """(column lines,) bool: columns that read pressed while no row was driven, from the sample before the frame's first
+    slot to the one before its last."""
+    columns = np.zeros(facts.column_lines, bool)
+    for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
+        if slot:
+            columns |= stuck(facts, timeline, facts.row_shift + slot * facts.row_clocks - 1)
+    return columns
+
+
+def checks(facts: Facts, timeline: Timeline, count: int) -> list[Changes]:
+    """By frame what is told of faulty lines: (cycle, word) of each check, the last one at the frame's end."""
+    if not facts.skin.guard:
+        return [[]] * count
+    told, result = Told(facts), []
+    for frame in range(count):
+        changes, renews = [], _renews(facts, frame)
+        slots = row_slots(facts, frame)
+        told.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
+        changes.append((strobe(facts, slots[0] - 1) + 1, told.word))
+        for row, slot in enumerate(slots):
+            whole = _read(facts, timeline, slot)[-1]
+            told.check("rows", np.full(facts.rows, not whole), renews, row)
+            if slot == slots[-1]:
+                told.check("stuck", _stuck(facts, timeline, frame), renews)
+            changes.append((strobe(facts, slot) + 1, told.word))
+        result.append(changes)
+    return result
+
+
+def _renews(facts: Facts, frame: int) -> bool:
+    """Whether a frame's checks end what is told no more: the clock in us passed a multiple of 2^16 in the frame before,
+    which ends with its last row's strobe."""
+    late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
+
+    def turns(ended: int) -> int:
+        return (
+            0
+            if ended < 0
+            else (strobe(facts, row_slots(facts, ended)[-1]) - late) // (guard.RETRY_US * facts.clocks_per_us)
+        )
+
+    return turns(frame - 1) != turns(frame - 2)

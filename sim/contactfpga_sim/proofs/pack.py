@@ -103,7 +103,7 @@ def _trailer(derived: Derived, dut: Packer):
         verdict.overwritten,
         summary.overflow,
         summary.mismatch,
-        dut.tag.stuck != 0,
+        dut.tag.fault,
         Const(0, 1),
         Const(kind, 4),
     )

@@ -1,0 +1,68 @@
+"""Which lines are told as faulty: what the checks of the guard lines and the released columns found, kept for a while.
+
+Guard switches are closed for good. So a row that is whole reaches the guard column, and a column the guard row.
+"""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import faults_layout
+from contactfpga_hdl.scan.stuck import anywhere, present, watched
+
+
+def checked_rows(skin: Skin) -> int:
+    """Rows, as bits, that are not masked whole."""
+    return sum(1 << row for row in range(skin.rows) if present(skin, row))
+
+
+class Told(wiring.Component):
+    """A line that is found faulty is told from the next clock on. It is told no more once a check in a *renewing* round
+    finds it well; that is the first whole round of checks after ``turn`` turns, so faults that come and go change what
+    is told twice per turn at most. Lines that are masked whole are not told.
+
+    rows, columns, stuck (in): lines that a check of this clock finds faulty.
+    checks_rows, checks_columns, checks_stuck (in): of which lines there is a check in this clock; of columns it is of
+    all or none.
+    round (in): high for a clock in which a round of checks ends, with its last check or after it.
+    turn (in): bit ``RETRY_BIT`` of a clock in us.
+    faults (out): what is told.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self._layout = faults_layout(Derived(skin))
+        super().__init__(
+            {
+                "rows": In(skin.rows),
+                "columns": In(skin.columns),
+                "stuck": In(skin.column_lines),
+                "checks_rows": In(skin.rows),
+                "checks_columns": In(1),
+                "checks_stuck": In(1),
+                "round": In(1),
+                "turn": In(1),
+                "faults": Out(self._layout),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        skin, faults = self.skin, self.faults
+        before, turned, renewing = Signal(), Signal(), Signal()
+        turns = self.turn ^ before
+        m.d.sync += before.eq(self.turn)
+        with m.If(self.round):
+            m.d.sync += [renewing.eq(turned | turns), turned.eq(0)]
+        with m.Elif(turns):
+            m.d.sync += turned.eq(1)
+        kept = ~Mux(renewing, self.checks_rows, 0)
+        found = self.rows & self.checks_rows & checked_rows(skin)
+        m.d.sync += faults.rows.eq(faults.rows & kept | found)
+        with m.If(self.checks_columns):
+            m.d.sync += faults.columns.eq(self.columns & anywhere(skin) | Mux(renewing, 0, faults.columns))
+        with m.If(self.checks_stuck):
+            m.d.sync += faults.stuck.eq(self.stuck & watched(skin) | Mux(renewing, 0, faults.stuck))
+        return m

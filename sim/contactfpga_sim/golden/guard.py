@@ -1,0 +1,63 @@
+"""Guard lines: what the sheet shows with them, which lines are found faulty, and for how long these are told."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.trace import Timeline
+
+RETRY_US = 2**16
+"""The first whole round of checks after the clock passes a multiple of this renews what is told."""
+
+
+def closed(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
+    """(row lines, column lines) bool: switches that are closed and whose two pins are whole up to them; with ``guard``
+    the guard lines come last, and their corner is open."""
+    cells, _ = timeline.at(cycle)
+    shut = np.ones((facts.row_lines, facts.column_lines), bool)
+    shut[-1, -1] = not facts.skin.guard
+    shut[: facts.rows, : facts.columns] = False if cells is None else cells
+    cuts = timeline.cuts_at(cycle)
+    for row, end in cuts.rows.items():
+        shut[row, end:] = False
+    for column, end in cuts.columns.items():
+        shut[end:, column] = False
+    return shut
+
+
+def stuck(facts: Facts, timeline: Timeline, cycle: int) -> np.ndarray:
+    """(column lines,) bool: columns that read pressed whatever is driven, a guard column last."""
+    _, columns = timeline.at(cycle)
+    lines = np.zeros(facts.column_lines, bool)
+    if columns is not None:
+        lines[: len(columns)] = columns
+    return lines
+
+
+class Told:
+    """Faulty lines as the board tells them."""
+
+    def __init__(self, facts: Facts):
+        rows, columns = np.asarray(facts.mask.all(axis=1)), np.asarray(facts.mask.all(axis=0))
+        stuck = np.append(columns, [False] * (facts.column_lines - facts.columns))
+        self._masked = {"rows": rows, "columns": columns, "stuck": stuck}
+        self._told = {name: np.zeros_like(masked) for name, masked in self._masked.items()}
+
+    def check(
+        self, lines: Literal["rows", "columns", "stuck"], found: np.ndarray, renews: bool, only: int | None = None
+    ) -> None:
+        """A check finds these of all rows, columns or stuck columns faulty; or it checks ``only`` one row, and the
+        others stay as they are. In a round that ``renews`` a line that is well is told no more."""
+        place = slice(None) if only is None else slice(only, only + 1)
+        told = self._told[lines]
+        kept = np.zeros_like(told) if renews else told
+        told[place] = ((found | kept) & ~self._masked[lines])[place]
+
+    @property
+    def word(self) -> int:
+        """Bits: rows lowest, then columns, then stuck columns, the guard column's highest."""
+        bits = np.concatenate([self._told[name] for name in ("rows", "columns", "stuck")])
+        return sum(1 << int(place) for place in np.flatnonzero(bits))

@@ -1,0 +1,137 @@
+"""Guard lines in a raster scan: the gateware in lockstep with the golden model, with lines that break and heal."""
+
+import itertools
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat
+from sample import sample
+
+from contactfpga import Skin
+from contactfpga_hdl.scan import raster
+from contactfpga_hdl.scan.raster import Scanner
+from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.cosim.record import Stimulus
+from contactfpga_sim.golden import Timeline, guard, predict, requests
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.scan import checks
+from contactfpga_sim.golden.trace import Cuts
+
+TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True}
+SKINS = {
+    "direct": Skin(rows=3, columns=4, settle_us=16, release_us=2, **TINY),
+    "released for a clock": Skin(rows=3, columns=4, settle_us=18, release_us=1, diodes="row2col", **TINY),
+    "masked": Skin(
+        rows=4,
+        columns=3,
+        settle_us=12,
+        release_us=3,
+        mask=((0, 0), (0, 1), (0, 2), (1, 1), (2, 1), (3, 1), (3, 0)),
+        **TINY,
+    ),
+    "precharged": Skin(rows=3, columns=4, settle_us=14, precharge_us=3, diodes="row2col", **TINY),
+    "chains": Skin(rows=3, columns=4, row_drive="74hc595", column_read="74hc165", **TINY),
+    "two chains": Skin(
+        rows=5, columns=3, row_drive="74hc595", column_read="74hc165", row_chains=2, column_chains=2, **TINY
+    ),
+    "debounced": Skin(
+        rows=3,
+        columns=4,
+        settle_us=16,
+        release_us=2,
+        debounce="sym_defer_pk",
+        debounce_press_us=100,
+        debounce_release_us=200,
+        **TINY,
+    ),
+    "one row, one column": Skin(rows=1, columns=1, settle_us=12, release_us=2, report="cells", **TINY),
+    "on change": Skin(
+        rows=2, columns=2, settle_us=14, release_us=2, send="on_change", keep_alive_ms=0.5, clock_hz=2_000_000,
+        baud=500_000, guard=True,
+    ),
+}  # fmt: skip
+
+
+def events(skin: Skin, seed: int, frames: int) -> Timeline:
+    """Random touches, stuck columns and cuts that come and go at any clock."""
+    rng = np.random.default_rng(seed)
+    scan = facts(skin).scan_clocks
+    pieces, cuts, start = [], [], 0
+    while start < frames * scan:
+        cells = rng.random((skin.rows, skin.columns)) < rng.choice([0, 0.3, 1])
+        stuck = rng.random(skin.columns + 1) < 0.2 if rng.random() < 0.2 else None
+        pieces.append((start, cells, stuck))
+        start += int(rng.integers(1, 3 * scan))
+    start = 0
+    while start < frames * scan:
+        cuts.append((start, random_cuts(skin, rng)))
+        start += int(rng.integers(1, 3 * scan))
+    return Timeline(pieces, requests([scan, 3 * scan + 7], facts(skin).bit_clocks), cuts)
+
+
+def random_cuts(skin: Skin, rng) -> Cuts:
+    share = rng.choice([0, 0, 0.2, 0.5])
+    rows = {row: int(rng.integers(skin.columns + 2)) for row in range(skin.rows + 1) if rng.random() < share}
+    columns = {column: int(rng.integers(skin.rows + 2)) for column in range(skin.columns + 1) if rng.random() < share}
+    return Cuts(rows, columns)
+
+
+@pytest.mark.parametrize("name", sample(SKINS, quick=["precharged", "two chains", "debounced", "on change"]))
+def test_the_whole_board_is_the_golden_models_in_every_clock(name):
+    skin = SKINS[name]
+    timeline, cycles = events(skin, len(name), 20), 20 * facts(skin).scan_clocks
+    expected = predict(skin, timeline, cycles)
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+def faults(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[tuple[int, int]]:
+    """(cycle, word) of every change of what the scanner tells of its lines."""
+    dut = Scanner(skin)
+    sim, sheet = bench(dut), Stimulus(skin, timeline)
+    watched = sim.watch(dut.faults)
+    sim.sink(dut.rows)
+    ports = [getattr(dut.pins, name) for name in sheet.reads]
+    places = list(itertools.accumulate((len(port) for port in ports), initial=0))
+
+    def levels(cycle, pins):
+        seen = [pins >> begin & (1 << end - begin) - 1 for begin, end in itertools.pairwise(places)]
+        return sheet.pins(cycle, dict(zip(sheet.reads, seen, strict=True)))[0]
+
+    sim.drive(getattr(dut.pins, sheet.drives[0]), levels, Cat(*ports))
+    sim.run(cycles)
+    return changes(enumerate(watched.values))
+
+
+def changes(words) -> list[tuple[int, int]]:
+    """Those of (cycle, word) that differ from the one before; the first one from 0."""
+    found, before = [], 0
+    for cycle, word in words:
+        if word != before:
+            found.append((cycle, word))
+        before = word
+    return found
+
+
+def golden(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
+    frames = cycles // facts(skin).scan_clocks + 1
+    told = [change for frame in checks(facts(skin), timeline, frames) for change in frame]
+    return [change for change in changes(told) if change[0] < cycles]
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    """What is told is renewed every 512 us."""
+    monkeypatch.setattr(raster, "RETRY_BIT", 9)
+    monkeypatch.setattr(guard, "RETRY_US", 2**9)
+
+
+@pytest.mark.parametrize("name", SKINS)
+def test_what_is_told_of_lines_is_the_golden_models_in_every_clock(bench, soon, name):
+    skin = SKINS[name]
+    timeline, cycles = events(skin, 3 + len(name), 80), max(60 * facts(skin).scan_clocks, 4_000)
+    expected = golden(skin, timeline, cycles)
+    assert faults(skin, timeline, cycles, bench) == expected
+    assert len(expected) > 8
+    ended = [word & ~later for (_, word), (_, later) in itertools.pairwise(expected)]
+    assert any(ended), "nothing was told no more"
