@@ -31,18 +31,24 @@ def diodes_table() -> str:
     rows[0].append("`release_us` without precharge")
     for name, diode in DIODES.items():
         needs = needed(PULLED.replace(diode=diode), SIZE, SIZE)
-        rows.append([name, *_level(needs.pressed), *_level(needs.touched), _us(needs.settle), _us(needs.pulled_release)])
+        rows.append(
+            [name, *_level(needs.pressed), *_level(needs.touched), _us(needs.settle), _us(needs.pulled_release)]
+        )
     return writer.table_of(rows)
 
 
 def pulls_table() -> str:
     """Which times and currents each pull-up of the columns comes to."""
-    rows = [["pull-up", "`release_us` without precharge", "`settle_us`", "row's pin, all columns pressed", "left to VIL"]]
+    rows = [
+        ["pull-up", "`release_us` without precharge", "`settle_us`", "row's pin, all columns pressed", "left to VIL"]
+    ]
     for ohm in PULLS_OHM:
         needs = needed(PULLED.replace(column_pull_ohm=ohm), SIZE, SIZE)
         over = " (too much)" if needs.pressed.pin_ma > PULLED.pin_ma else ""
         current = f"{needs.pressed.pin_ma:.1f} mA{over}"
-        rows.append([_kilo(ohm), _us(needs.pulled_release), _us(needs.settle), current, f"{needs.pressed.margin_v:.2f} V"])
+        rows.append(
+            [_kilo(ohm), _us(needs.pulled_release), _us(needs.settle), current, f"{needs.pressed.margin_v:.2f} V"]
+        )
     return writer.table_of(rows)
 
 

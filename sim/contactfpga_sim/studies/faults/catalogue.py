@@ -100,12 +100,20 @@ def _bare(skin: Skin) -> Mapping[str, Hurt]:
 
 
 def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
-    """The selected row's pin wins: where it does not, both rows are missing, and a guard column sees that."""
-    return {f"rows {row} and {row + 1}": Hurt(joined_rows=((row, row + 1),)) for row in range(skin.rows - 1)}
+    """Two pins drive against each other: which level a column comes to is tried both ways."""
+    return {
+        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": Hurt(
+            joined_rows=((row, row + 1),), pulls_win=released
+        )
+        for row in range(skin.rows - 1)
+        for released in (False, True)
+    }
 
 
 def _joined_columns(skin: Skin) -> Mapping[str, Hurt]:
-    return {f"columns {line} and {line + 1}": Hurt(joined_columns=((line, line + 1),)) for line in range(skin.columns - 1)}
+    return {
+        f"columns {line} and {line + 1}": Hurt(joined_columns=((line, line + 1),)) for line in range(skin.columns - 1)
+    }
 
 
 def _slow(skin: Skin) -> Mapping[str, Hurt]:
@@ -116,7 +124,9 @@ def _slow(skin: Skin) -> Mapping[str, Hurt]:
             ("40 kΩ pull-up", Circuit(column_pull_ohm=40_000.0)),
             ("22 kΩ pull-up", Circuit(column_pull_ohm=22_000.0)),
         ):
-            line = Line.of(circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4)
+            line = Line.of(
+                circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4
+            )
             found[f"{picofarad} pF, {name}"] = Hurt(line=line)
     return found
 
@@ -129,50 +139,82 @@ METER = "check with a meter before the first power-up"
 
 FAULTS: Mapping[str, Fault] = {
     "broken row": Fault(
-        "A row is broken, or its driver never selects it", "its switches past the break are dead", _cut_rows, "strain relief"
+        "A row is broken, or its driver never selects it",
+        "its switches past the break are dead",
+        _cut_rows,
+        "strain relief",
     ),
     "broken column": Fault(
-        "A column is broken, or its input reads released", "its switches past the break are dead", _cut_columns, "strain relief"
+        "A column is broken, or its input reads released",
+        "its switches past the break are dead",
+        _cut_columns,
+        "strain relief",
     ),
     "row connector": Fault(
-        "A connector or 74HC595 of rows is dead, or all after it", "eight rows or more are dead", _row_chips, "locked connectors"
+        "A connector or 74HC595 of rows is dead, or all after it",
+        "eight rows or more are dead",
+        _row_chips,
+        "locked connectors",
     ),
     "column connector": Fault(
-        "A connector or 74HC165 of columns is dead, or all after it", "eight columns or more are dead", _column_chips, "locked connectors"
+        "A connector or 74HC165 of columns is dead, or all after it",
+        "eight columns or more are dead",
+        _column_chips,
+        "locked connectors",
     ),
     "selected row": Fault(
-        "A row is shorted to its selecting level, or its driver is", "pressed switches of it show in all rows", _selected, METER
+        "A row is shorted to its selecting level, or its driver is",
+        "pressed switches of it show in all rows",
+        _selected,
+        METER,
     ),
     "stuck column": Fault(
         "A column is shorted to its pressed level, or its input is", "the column reads as empty", _stuck_columns, METER
     ),
     "closed switch": Fault(
-        "A switch is stuck closed", "a zone that nobody makes; touches beside it are joined to it", _closed, "list it in `mask`", "watch"
+        "A switch is stuck closed",
+        "a zone that nobody makes; touches beside it are joined to it",
+        _closed,
+        "list it in `mask`",
+        "watch",
     ),
     "dead switch": Fault(
-        "A switch does not close, or its diode is open or missing", "touches of it alone are not seen", _dead,
+        "A switch does not close, or its diode is open or missing",
+        "touches of it alone are not seen",
+        _dead,
         "press every switch once (`contactfpga wire`); only a press can tell it from one that nobody presses",
     ),
     "shorted diode": Fault(
         "A diode is shorted", "pressed cells of its column are undefined", _bare, METER, "self_test"
     ),
-    "shorted rows": Fault("Two rows are shorted to each other", "touches show in both rows", _joined_rows, METER, "self_test"),
+    "shorted rows": Fault(
+        "Two rows are shorted to each other", "touches show in both rows", _joined_rows, METER, "self_test"
+    ),
     "shorted columns": Fault(
         "Two columns are shorted to each other", "touches show in both columns", _joined_columns, METER, "self_test"
     ),
     "slow columns": Fault(
-        "Columns are slower than the Skin's times", "pressed switches are missed, or show in the next row", _slow, "`contactfpga settle`"
+        "Columns are slower than the Skin's times",
+        "pressed switches are missed, or show in the next row",
+        _slow,
+        "`contactfpga settle`",
     ),
     "dead board": Fault(
-        "The board has no supply, no clock or no configuration", "nothing is reported", _once(running=False),
+        "The board has no supply, no clock or no configuration",
+        "nothing is reported",
+        _once(running=False),
         "a deadline for each read, a watchdog at `alive`",
     ),
     "broken link": Fault(
-        "USB, its bridge or the UART is broken", "nothing is reported", _once(connected=False),
+        "USB, its bridge or the UART is broken",
+        "nothing is reported",
+        _once(connected=False),
         "a deadline for each read; `contact` still works",
     ),
     "broken contact": Fault(
-        "The wire of `contact` is broken", "the robot is not stopped by it", _once(contact_connected=False),
+        "The wire of `contact` is broken",
+        "the robot is not stopped by it",
+        _once(contact_connected=False),
         "take zones as the second way to a stop; test the stop at every start",
     ),
 }

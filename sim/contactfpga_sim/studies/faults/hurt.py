@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.sheet import guards
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.wiring import Wiring
 
@@ -19,9 +20,10 @@ class Hurt:
     """What is wrong. Rows and columns are those of the sheet; cells are (row, column)."""
 
     rows: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut rows: the column from which on their switches no longer reach the pin. 0 is also a driver that never selects."""
+    """Cut rows: the column from which on their switches no longer reach the pin; 0 is also a driver that never
+    selects."""
     columns: Mapping[int, int] = dataclasses.field(default_factory=dict)
-    """Cut columns, likewise. 0 is also an input that always reads released."""
+    """Cut columns, likewise; 0 is also an input that always reads released."""
     selected: tuple[int, ...] = ()
     """Rows that are at the selecting level all the time."""
     stuck: tuple[int, ...] = ()
@@ -61,21 +63,21 @@ class Hurt:
 
     def press(self, board: CompiledBoard, touched: np.ndarray) -> None:
         """The sheet of a running board from the next cycle on, touched so."""
-        board.cut(self.rows, self.columns)
+        read = self._read(guards.extended(touched))
+        cuts = guards.missed(read)
+        board.cut(cuts.rows | dict(self.rows), cuts.columns | dict(self.columns))
         stuck = np.zeros(board.skin.column_lines, bool)
         stuck[list(self.stuck)] = True
-        cells = self._conducting(touched)
         for row in self.selected:  # its columns read pressed whatever row is driven, its guard column too
-            stuck[: board.skin.columns] |= cells[row]
-            stuck[board.skin.columns :] = True
+            stuck |= read[row, : len(stuck)]
         board.stick(stuck)
         if self.line is not None:
             board.settle(self.line)
-        board.press(cells)
+        board.press(read[:-1, :-1])
 
-    def _conducting(self, touched: np.ndarray) -> np.ndarray:
-        """The switches that read pressed, each in its row's time."""
-        cells = touched.copy()
+    def _read(self, closed: np.ndarray) -> np.ndarray:
+        """The switches that read pressed, each in its row's time, of those of an extended sheet that are closed."""
+        cells = closed.copy()
         for cell in self.closed:
             cells[cell] = True
         for cell in self.dead:

@@ -7,14 +7,13 @@ import functools
 from collections.abc import Iterator, Mapping
 
 from contactfpga.skin import Skin
+from contactfpga_sim.studies.failures.rig import GUARDED, REFERENCE
 from contactfpga_sim.studies.faults import trial
 from contactfpga_sim.studies.faults.catalogue import FAULTS
 from contactfpga_sim.studies.faults.hurt import Hurt
 from contactfpga_sim.studies.faults.trial import Told
 
-PLAIN = Skin()
-GUARDED = Skin(guard=True, alive=True, fail_safe=True)
-SKINS = {"plain": PLAIN, "guarded": GUARDED}
+SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 
 PHASES = (0.03, 0.37, 0.71)
 """Shares of a scan after whose beginning faults come, in turn: the longest time counts."""

@@ -10,7 +10,6 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board.compiled import CAPTURABLE
 from contactfpga_sim.studies.failures.rig import Rig, faults, hello_clocks, moments, reported
 from contactfpga_sim.studies.faults.hurt import Hurt
 
@@ -23,10 +22,12 @@ QUIET_US = 2500
 DEADLINE_US = 1000
 """Without a frame for this long the host's deadline passes; a user sets it, ten frames is a short one."""
 
+WARM_UP_US = 3000
+"""The board has run for this long after its hello: frames come and `alive` turns."""
 SEEN_SCANS = 6
 """A fault that is told is watched for so many scans, to see what it does."""
 
-PINS = tuple(pin for pin in ("contact", "alive") if pin in CAPTURABLE)
+PINS = ("contact", "alive")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,10 +56,11 @@ def run(skin: Skin, hurt: Hurt, touched: np.ndarray, phase: float = 0.0) -> Told
     """A sheet that is touched so gets the fault this share of a scan after its beginning."""
     with Rig(skin, capture=PINS) as rig:
         board = rig.board
-        board.hold(touched[None], hello_clocks(skin) + int((4 + phase) * rig.scan))
+        board.hold(touched[None], hello_clocks(skin) + Derived(skin).clocks(WARM_UP_US) + int(phase * rig.scan))
         rig.frames()
-        edges = {pin: board.take(pin) for pin in PINS}
-        watched = _Watched(skin, touched, board.cycle, int(edges["contact"]["data"][-1]) if len(edges["contact"]) else 0)
+        before = {pin: board.take(pin)["data"] for pin in PINS}
+        assert len(before["alive"]) >= 2 or not skin.alive
+        watched = _Watched(skin, touched, bool(len(before["contact"])) and bool(before["contact"][-1]))
         if hurt.running:
             hurt.press(board, touched)
         return _watch(rig, hurt, watched)
@@ -86,10 +88,9 @@ def _watch(rig: Rig, hurt: Hurt, watched: _Watched) -> Told:
 class _Watched:
     """What the host and a watchdog see from the fault on."""
 
-    def __init__(self, skin: Skin, touched: np.ndarray, cycle: int, contact: int):
+    def __init__(self, skin: Skin, touched: np.ndarray, contact: bool):
         self._skin = skin
         self._truth = [moments(touched)] if touched.any() else []  # every scene is one contact
-        self._since_us = cycle // Derived(skin).clocks_per_us
         self._contact = contact
         self._by: dict[str, int] = {}
         self._words: tuple[str, ...] = ()
@@ -112,7 +113,7 @@ class _Watched:
             said = faults(zones)
             if said and "flags" not in self._by:
                 self._by["flags"], self._words = now_us, said
-            if zones.time_us > self._since_us + self._scan_us and self._differs(zones):
+            if reported(zones) != self._truth:
                 self._harmful = True
                 self._wrong += "flags" not in self._by
         if now_us - self._last_frame >= DEADLINE_US:
@@ -120,7 +121,7 @@ class _Watched:
             self._harmful = True
         if "alive" in edges:
             self._last_edge = now_us
-        elif self._skin.alive and "alive" in PINS and now_us - self._last_edge >= QUIET_US:
+        elif self._skin.alive and now_us - self._last_edge >= QUIET_US:
             self._by.setdefault("alive", now_us)
         if hurt.contact_connected and edges.get("contact") and not self._contact:
             self._by.setdefault("contact", now_us)
@@ -129,9 +130,6 @@ class _Watched:
     @property
     def _scan_us(self) -> int:
         return -(-Derived(self._skin).frame_clocks // Derived(self._skin).clocks_per_us)
-
-    def _differs(self, zones: Zones) -> bool:
-        return reported(zones) != self._truth
 
     def told(self) -> Told:
         """All of it."""
