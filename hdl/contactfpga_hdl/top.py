@@ -2,13 +2,14 @@
 
 from typing import Any
 
-from amaranth.hdl import Module, Mux, Value
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
@@ -27,7 +28,9 @@ class Top(wiring.Component):
     rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
     :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
     tx (out), rx (in): the UART.
-    contact (out): high while something touches the sheet.
+    contact (out): high while something touches the sheet; with ``fail_safe`` also while a fault is known, and a clock
+    later.
+    alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
@@ -44,6 +47,7 @@ class Top(wiring.Component):
             "tx": Out(1, init=1),
             "rx": In(1, init=1),
             "contact": Out(1),
+            **({"alive": Out(1)} if skin.alive else {}),
         }
         if probes:
             ports |= {
@@ -78,8 +82,8 @@ class Top(wiring.Component):
         wiring.connect(m, link.bytes, transmitter.bytes)
         wiring.connect(m, receiver.bits, request.bits)
         connect_lines(m, self.skin, scan.pins, self)
+        self._watch_faults(m, scan, packer)
         m.d.comb += [
-            self.contact.eq(scan.contact),
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
             scan.request.eq(request.received),
@@ -93,9 +97,8 @@ class Top(wiring.Component):
             link.number.eq(request.number),
         ]
         if self.derived.scan.waits:
-            frames = packer.frames
             m.d.comb += [
-                scan.packed.eq(frames.commit | frames.decide & ~frames.verdict.send),
+                scan.packed.eq(_packed(packer)),
                 scan.due.eq(link.due),
                 link.time.eq(scan.time),
             ]
@@ -103,6 +106,21 @@ class Top(wiring.Component):
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
+
+    def _watch_faults(self, m: Module, scan: Any, packer: Packer) -> None:
+        """What a fault does to the pins."""
+        fault = Signal()
+        m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
+        if self.skin.fail_safe:
+            m.d.sync += self.contact.eq(
+                scan.contact | fault
+            )  # both may change at once: from a register without a glitch
+        else:
+            m.d.comb += self.contact.eq(scan.contact)
+        if self.skin.alive:
+            m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
+            watched = scan.watched if self.derived.scan.waits else 0
+            m.d.comb += [alive.well.eq(_packed(packer) | watched), alive.fault.eq(fault), self.alive.eq(alive.pin)]
 
     def _debounced(self, m: Module, scan: Any) -> stream.Interface:
         """The scanner's rows without bounce."""
@@ -166,3 +184,9 @@ class Top(wiring.Component):
         m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
         for field, value in fields.items():
             m.d.comb += getattr(self, f"{name}_{field}").eq(value)
+
+
+def _packed(packer: Packer) -> Value:
+    """A frame is packed in this clock, or left out."""
+    frames = packer.frames
+    return frames.commit | frames.decide & ~frames.verdict.send

@@ -82,6 +82,29 @@ def test_wires_to_shift_registers_are_ports_of_the_gateware_and_share_no_pin(boa
 
 
 @every_board
+def test_alive_takes_one_pin_which_the_sheet_then_does_not(board):
+    most = board.lines - 2
+    skin = Skin(rows=most, columns=1, alive=True, settle_us=9)
+    pins = board.pins(skin)
+    used = [*itertools.chain(*pins.values()), board.contact]
+    assert (len(used), pins["alive"]) == (board.lines + 1, (board.column_side[-1],))
+    assert len({*used}) == len(used)
+    board.check(skin.replace(clock_hz=board.clock_hz, baud=1_000_000))
+    plan = plan_for(board, skin.replace(rows=3, columns=3, clock_hz=board.clock_hz, baud=1_000_000))
+    suffix = board.constraints.partition(".")[2]
+    text = plan.files[f"contactfpga.{suffix}"]
+    alive = [line for line in (text if isinstance(text, str) else text.decode()).splitlines() if "alive_0" in line]
+    assert connector_sites(board)[board.alive] in alive[0].replace('"', " ").split()
+
+
+@every_board
+def test_guard_lines_follow_the_sheets(board):
+    skin = Skin(rows=3, columns=4, guard=True)
+    assert board.pins(skin)["rows"] == board.row_side[:4]
+    assert board.pins(skin)["columns"] == board.column_side[:5]
+
+
+@every_board
 def test_crystal_is_the_clock_of_the_platform(board):
     plan = plan_for(board, board.skin)
     suffix = board.constraints.partition(".")[2]
@@ -165,6 +188,12 @@ def test_an_external_bridge_has_two_pins_and_a_line_that_rests_high_where_none_i
             ICEBREAKER,
             {"row_chains": 16, "column_read": "74hc165", "column_chains": 8},
             "16 rows and 16 columns take 19 + 10 wires, iCEBreaker has 23 free pins beside `contact`; use fewer chains",
+        ),
+        (
+            ICEBREAKER,
+            {"row_drive": "direct", "rows": 11, "columns": 11, "guard": True, "alive": True},
+            "11 rows and 11 columns with guard lines take 12 + 12 wires, iCEBreaker has 22 free pins beside `contact` "
+            "and `alive`; set row_drive",
         ),
         (ULX3S, {"rows": 21, "columns": 21}, "21 rows and 21 columns take 21 + 21 wires, ULX3S 85F has 41 free pins"),
         (

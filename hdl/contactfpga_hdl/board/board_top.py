@@ -35,7 +35,7 @@ class BoardTop(Elaboratable):
     def __init__(self, board: BoardSpec, skin: Skin):
         self.board = board
         self.skin = skin
-        self._sheet = row_pins(skin) | column_pins(skin)
+        self._sheet = row_pins(skin) | column_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
 
     def elaborate(self, platform):
         m = Module()

@@ -34,7 +34,10 @@ def constraints(board: BoardSpec) -> str:
 def pin_tables(board: BoardSpec) -> str:
     """Which wire goes where, as Markdown: one pin per line, and shift registers."""
     rows = [(str(row), pin) for row, pin in enumerate(board.row_side)]
-    columns = [(str(column), pin) for column, pin in enumerate(board.column_side)]
+    columns = [
+        (f"{column} or `alive`" if pin == board.alive else str(column), pin)
+        for column, pin in enumerate(board.column_side)
+    ]
     direct = _table(board, {"row": rows, "column": [*columns, ("`contact`", board.contact)]})
     most = Skin(row_drive="74hc595", column_read="74hc165", row_chains=CHAINS, column_chains=CHAINS)
     registers = {"74HC595": row_wires(most), "74HC165": column_wires(most)}

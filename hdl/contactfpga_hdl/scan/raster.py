@@ -144,8 +144,8 @@ class Scanner(wiring.Component):
         ]
 
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
-        """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as the
-        frame ended; it is there with the number of stuck columns."""
+        """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as
+        the frame ended; it is there with the number of stuck columns."""
         skin = self.skin
         m.submodules.told = told = Told(skin)
         ended, at_end = Signal(), Signal()

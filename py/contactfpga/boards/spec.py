@@ -89,11 +89,17 @@ class BoardSpec:
         """How many wires to the sheet can be on pins."""
         return len(self.row_side) + len(self.column_side)
 
+    @property
+    def alive(self) -> str:
+        """The pin of ``alive``, for a Skin that has it; for others it is one of the sheet's."""
+        return self.column_side[-1]
+
     def pins(self, skin: Skin) -> dict[str, tuple[str, ...]]:
-        """Pins of each port that the gateware has at the sheet, lowest bit first."""
-        return self._dealt(row_wires(skin), self.row_side + self.column_side[::-1]) | self._dealt(
-            column_wires(skin), self.column_side + self.row_side[::-1]
-        )
+        """Pins of each port that the gateware has at the sheet, lowest bit first, and of ``alive``."""
+        columns = self.column_side[:-1] if skin.alive else self.column_side
+        dealt = self._dealt(row_wires(skin), self.row_side + columns[::-1])
+        dealt |= self._dealt(column_wires(skin), columns + self.row_side[::-1])
+        return dealt | ({"alive": (self.alive,)} if skin.alive else {})
 
     @staticmethod
     def _dealt(wires: Mapping[str, int], side: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -124,18 +130,21 @@ class BoardSpec:
 
     def _check_wires(self, skin: Skin) -> None:
         rows, columns = sum(row_wires(skin).values()), sum(column_wires(skin).values())
-        if rows + columns <= self.lines:
+        free = self.lines - skin.alive
+        if rows + columns <= free:
             return
         direct_rows, direct_columns = skin.row_drive == "direct", skin.column_read == "direct"
-        if direct_rows and (4 + columns <= self.lines or not direct_columns):
+        if direct_rows and (4 + columns <= free or not direct_columns):
             remedy = 'set row_drive = "74hc595"'
         elif direct_columns:
             remedy = 'set column_read = "74hc165"'
         else:
             remedy = "use fewer chains"
+        guarded = " with guard lines" if skin.guard else ""
+        outputs = "`contact` and `alive`" if skin.alive else "`contact`"
         raise SkinError(
-            f"{skin.rows} rows and {skin.columns} columns take {rows} + {columns} wires, {self.title} has {self.lines} "
-            f"free pins beside `contact`; {remedy}"
+            f"{skin.rows} rows and {skin.columns} columns{guarded} take {rows} + {columns} wires, {self.title} has "
+            f"{free} free pins beside {outputs}; {remedy}"
         )
 
 

@@ -17,10 +17,10 @@ from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
 
-CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "driven", "charged", "received")
+CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
-the transmit and of the contact pin, of the rows that are driven to the selecting level and of the columns that are
-driven, and bytes decoded from the line. The order is that of the driver."""
+the transmit, the contact and the alive pin, of the rows that are driven to the selecting level and of the columns that
+are driven, and bytes decoded from the line. The order is that of the driver."""
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
@@ -184,6 +184,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "PRECHARGE": int(skin.precharge_us > 0),
             "REVERSAL": int(skin.reads_rows),
             "PROBES": int(netlist is None),
+            "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),
         },
     )

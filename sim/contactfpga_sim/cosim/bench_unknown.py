@@ -63,7 +63,8 @@ def available() -> bool:
 def run(
     skin: Skin, timeline: Timeline, cycles: int, known_words: Sequence[str] | None = None, limit_s: float = 200.0
 ) -> Trace:
-    """What the transmit and the contact pin do in cycles 0 to ``cycles`` - 1, counted from the end of the reset.
+    """What the transmit, the contact and the alive pin do in cycles 0 to ``cycles`` - 1, counted from the end of the
+    reset.
 
     ``known_words``: patterns of what is known at power-up, :func:`initialized` if left out. Raises :class:`Unknown`
     when a row, a line's output enable, the transmit or the contact pin is not known, :class:`Contention`, and
@@ -108,19 +109,22 @@ def forget(gates: str, initialized: Sequence[str]) -> tuple[str, dict[str, str]]
 
 def _trace(output: str, cycles: int) -> Trace:
     trace = Trace(cycles)
-    tx, contact = 1, 0
+    tx, contact, alive = 1, 0, 0
     for line in output.splitlines():
         what, cycle, *levels = line.split()
         if what == "contention":
             raise Contention(f"cycle {cycle}: columns {levels[0]} are driven against rows {levels[1]}")
         if what != "pins":
-            raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}")
+            raise Unknown(f"cycle {cycle}: rows {levels[0]}, tx {levels[1]}, contact {levels[2]}, alive {levels[3]}")
         if int(levels[0]) != tx:
             tx = int(levels[0])
             trace.line.append((int(cycle), tx))
         if int(levels[1]) != contact:
             contact = int(levels[1])
             trace.contact.append((int(cycle), contact))
+        if int(levels[2]) != alive:
+            alive = int(levels[2])
+            trace.alive.append((int(cycle), alive))
     return trace
 
 
@@ -135,25 +139,25 @@ def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -
 module bench;
 reg clk = 0, rst = 1, rx = 1;
 reg [{skin.column_lines - 1}:0] stuck = 0, {cells};
-{sheet}wire tx, contact;
-reg [1:0] seen = 2'bxx;
+{sheet}wire tx, contact, alive{"" if skin.alive else " = 0"};
+reg [2:0] seen = 3'bxxx;
 integer cycle;
-top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins});
+top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins}{", .alive(alive)" if skin.alive else ""});
 initial for (cycle = -{RESET_CLOCKS}; cycle < {cycles}; cycle = cycle + 1) begin
     if (cycle == 0) rst = 0;
     case (cycle)
 {steps}    endcase
     #5;
-    if (cycle > -{RESET_CLOCKS} && ^{{rows, rows_drive, columns_drive, tx, contact}} === 1'bx) begin
-        $display("unknown %0d %b %b %b", cycle, rows, tx, contact);
+    if (cycle > -{RESET_CLOCKS} && ^{{rows, rows_drive, columns_drive, tx, contact, alive}} === 1'bx) begin
+        $display("unknown %0d %b %b %b %b", cycle, rows, tx, contact, alive);
         $finish;
     end
     if (cycle > -{RESET_CLOCKS} && |(pulled & columns_drive)) begin
         $display("contention %0d %b %b", cycle, pulled & columns_drive, selected);
         $finish;
     end
-    if (cycle >= 0 && seen !== {{tx, contact}}) $display("pins %0d %b %b", cycle, tx, contact);
-    seen = {{tx, contact}};
+    if (cycle >= 0 && seen !== {{tx, contact, alive}}) $display("pins %0d %b %b %b", cycle, tx, contact, alive);
+    seen = {{tx, contact, alive}};
     clk = 1;
     #5 clk = 0;
 end

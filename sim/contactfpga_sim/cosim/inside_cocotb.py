@@ -21,7 +21,7 @@ async def record(dut: Any) -> None:
     job = pickle.loads(Path(os.environ["CONTACTFPGA_JOB"]).read_bytes())
     recorder = TraceRecorder(job["cycles"])
     stimulus = Stimulus(job["skin"], job["timeline"])
-    levels = [getattr(dut, name) for name in ports(LEVELS, job["skin"])]
+    levels = {LEVELS.index(name): getattr(dut, name) for name in ports(LEVELS, job["skin"])}
     payloads = {name: getattr(dut, name) for name in ports(PAYLOADS, job["skin"])}
     deadline = time.monotonic() + job["limit_s"]
     reads = {name: getattr(dut, name) for name in stimulus.reads}
@@ -44,7 +44,7 @@ async def record(dut: Any) -> None:
             driven = pins
             for handle, value in zip(drives, pins, strict=True):
                 handle.value = value
-        level = sum(int(handle.value) << place for place, handle in enumerate(levels))
+        level = sum(int(handle.value) << place for place, handle in levels.items())
         recorder.note(cycle, level, lambda name: int(payloads[name].value))
         if cycle % 256 == 0 and time.monotonic() > deadline:
             raise TimeoutError(f"{cycle} of {job['cycles']} cycles simulated in {job['limit_s']:g} s")

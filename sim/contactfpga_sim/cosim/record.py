@@ -12,8 +12,8 @@ from contactfpga_sim.sheet.shift import Sheet
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer")
-"""Ports of the top that are looked at in every cycle."""
+LEVELS = ("row_transfer", "record_transfer", "byte_transfer", "tx", "contact", "item_transfer", "alive")
+"""Ports of the top that are looked at in every cycle; one that it does not have is low."""
 
 PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "item_end", "byte_data")
 """Ports of the top that are read when something is transferred."""
@@ -21,10 +21,11 @@ PAYLOADS = ("row_cells", "row_last", "record_data", "record_end", "item_data", "
 
 def ports(names: tuple[str, ...], skin: Skin) -> tuple[str, ...]:
     """Those of the names that the top of a Skin has."""
-    return tuple(name for name in names if not name.startswith("item_") or skin.report == "barycenter")
+    has = {"item": skin.report == "barycenter", "alive": skin.alive}
+    return tuple(name for name in names if has.get(name.split("_")[0], True))
 
 
-_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM = (1 << place for place in range(len(LEVELS)))
+_ROW, _RECORD, _BYTE, _TX, _CONTACT, _ITEM, _ALIVE = (1 << place for place in range(len(LEVELS)))
 
 
 class OutOfTime(RuntimeError):
@@ -88,4 +89,6 @@ class TraceRecorder:
             self.trace.line.append((cycle, int(bool(levels & _TX))))
         if changed & _CONTACT:
             self.trace.contact.append((cycle, int(bool(levels & _CONTACT))))
+        if changed & _ALIVE:
+            self.trace.alive.append((cycle, int(bool(levels & _ALIVE))))
         self._levels = levels

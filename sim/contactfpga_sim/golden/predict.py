@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import divide, label, request, scan, uart
+from contactfpga_sim.golden import divide, label, request, safe, scan, uart
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
-    trace, link, scanned = _play(skin, timeline, cycles)
-    trace.contact = scanned.contact
+    trace, link, _ = _play(skin, timeline, cycles)
     trace.bytes = link.bytes
     trace.line = uart.line(link.bytes, facts(skin).bit_clocks)
     return trace.until(cycles)
@@ -52,6 +51,9 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
     stages = Stages(known, trace, packer, frames)
     scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
+    faulty = safe.fault(frames, stages.told)
+    trace.contact = safe.contact(scanned.contact, faulty) if skin.fail_safe else scanned.contact
+    trace.alive = safe.alive(known, sorted(stages.well), faulty, cycles) if skin.alive else []
     return trace, link, scanned
 
 
@@ -65,6 +67,8 @@ class Stages:
         self._scanned = scanned
         self.told: scan.Changes = []
         """(cycle, faults) of every change of what is told of faulty lines."""
+        self.well: list[int] = []
+        """Cycles in which a whole frame was packed, or an untouched sheet was looked at."""
         self._free = 0
         self._handed = -1
         self._late = facts.columns + 3 if facts.debounced else 0  # a row driven alone; the others pass
@@ -73,6 +77,10 @@ class Stages:
         """Note what is told of faulty lines, from a cycle on."""
         if faults != (self.told[-1][1] if self.told else 0):
             self.told.append((cycle, faults))
+
+    def watch(self, cycle: int) -> None:
+        """An untouched sheet was looked at."""
+        self.well.append(cycle)
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
         """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
@@ -121,7 +129,9 @@ class Stages:
             end = handed[-1] + 3
         self._trace.records += [(cycle, data, False) for cycle, data in records] + [(end, 0, True)]
         self._scanned.append(one)
-        return self._packer.take(Items(one, cells, records, end))
+        free = self._packer.take(Items(one, cells, records, end))
+        self.well.append(free - 1)
+        return free
 
     def _record(self, zone: Departure, sum_y: int) -> int:
         facts = self._facts

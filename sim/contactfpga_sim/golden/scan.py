@@ -86,6 +86,9 @@ class Stages(Protocol):
     def tell(self, cycle: int, faults: int) -> None:
         """From a cycle on, no earlier than any before, this is told of faulty lines."""
 
+    def watch(self, cycle: int) -> None:
+        """In a cycle an untouched sheet was looked at, for a scan that waits."""
+
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
 

@@ -15,13 +15,14 @@ from contactfpga_sim.golden.facts import facts
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact")
+BOUNDARIES = ("rows", "records", "items", "bytes", "line", "contact", "alive")
 """Where model and gateware are compared, in the order the data takes; see :func:`boundaries`."""
 
 
 def boundaries(skin: Skin) -> tuple[str, ...]:
     """Those of :data:`BOUNDARIES` that the board of a Skin has: items are apart from records where they are divided."""
-    return tuple(name for name in BOUNDARIES if name != "items" or skin.report == "barycenter")
+    has = {"items": skin.report == "barycenter", "alive": skin.alive}
+    return tuple(name for name in BOUNDARIES if has.get(name, True))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +110,8 @@ class Trace:
     """(cycle, level): a change of the transmit pin, which is high before cycle 0."""
     contact: list[tuple[int, int]] = dataclasses.field(default_factory=list)
     """(cycle, level): a change of the contact pin, which is low before cycle 0."""
+    alive: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    """(cycle, level): a change of the alive pin, which is low before cycle 0."""
 
     def events(self, boundary: str) -> list[tuple[Any, ...]]:
         """The events of one of :data:`BOUNDARIES`."""
@@ -121,7 +124,7 @@ class Trace:
 
     def at_the_pins(self) -> Trace:
         """The same trace without what only probes see."""
-        return Trace(self.cycles, line=self.line, contact=self.contact)
+        return Trace(self.cycles, line=self.line, contact=self.contact, alive=self.alive)
 
     def since(self, cycle: int) -> Trace:
         """The same trace, ``cycle`` counted as 0."""

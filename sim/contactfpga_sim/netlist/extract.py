@@ -93,7 +93,7 @@ def _pins(board: BoardSpec, skin: Skin) -> str:
     wires |= {f"{name}_0__io": name for name in ("contact", *board.pins(skin))}
     parted, text = both_ways.wrapper(skin)
     wires |= parted
-    ports = ["input clk", "input rx", "output tx", "output contact"]
+    ports = ["input clk", "input rx", "output tx", "output contact", *(["output alive"] if skin.alive else [])]
     for name, member in sheet.items():
         ports.append(f"{'output' if member.flow == Out else 'input'} [{member.shape - 1}:0] {name}")
     return (

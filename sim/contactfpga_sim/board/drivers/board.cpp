@@ -1,6 +1,6 @@
 // A board in its sheet: the gateware, the switch matrix at its pins, and a UART at the other end of its line.
 // Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and COLUMN_CHAINS, 0 for direct lines; PROBES is
-// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records; PRECHARGE is 1 where columns
+// 0 for a netlist, which has the pins only; DIVIDED is 1 where items are apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns
 // can be driven, REVERSAL where rows can be let go and are read. With MUTANTS the gateware
 // has an input that picks a mutant.
 #include <algorithm>
@@ -12,7 +12,7 @@
 #include "clocked.h"
 #include "shift.h"
 
-enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, DRIVEN, CHARGED, RECEIVED, BOUNDARIES };
+enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, ALIVE_PIN, DRIVEN, CHARGED, RECEIVED, BOUNDARIES };
 
 struct Event {
     uint64_t cycle, data, mark;
@@ -252,7 +252,7 @@ public:
 private:
     Clocked model_;
     Word levels_ = 0, driven_ = 0, charged_ = 0;
-    bool line_ = true, contact_ = false;
+    bool line_ = true, contact_ = false, alive_ = false;
 
     void watch(Word driven) {
         auto &top = model_.top;
@@ -265,6 +265,11 @@ private:
         const bool contact = get(top.p_contact);
         if (contact != contact_)
             note(CONTACT, contact_ = contact, 0, cycle);
+#if ALIVE
+        const bool alive = get(top.p_alive);
+        if (alive != alive_)
+            note(ALIVE_PIN, alive_ = alive, 0, cycle);
+#endif
         if (driven != driven_)
             note_lines(DRIVEN, driven_ = driven);
         if (columns_driven() != charged_)

@@ -1,0 +1,84 @@
+"""What a fault does to the pins: ``contact`` with ``fail_safe``, and ``alive``."""
+
+import numpy as np
+import pytest
+from sample import sample
+
+from contactfpga import Skin
+from contactfpga_hdl.scan import raster
+from contactfpga_sim.cosim import bench_amaranth, bench_native
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.golden import Timeline, guard, predict
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Cuts
+
+FIELDS = {
+    "rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000,
+    "send": "on_change", "keep_alive_ms": 20, "alive": True, "fail_safe": True,
+}  # fmt: skip
+GUARDED = Skin(**FIELDS, guard=True)
+SKINS = {
+    "guarded": GUARDED,
+    "no guard lines": Skin(**FIELDS),
+    "adaptive": Skin(**FIELDS | {"scan": "adaptive", "release_us": 8}),
+    "slow frames": Skin(**FIELDS | {"settle_us": 700, "fail_safe": False}, guard=True),
+}
+NOTHING = np.zeros((2, 2), bool)
+
+
+def events(skin: Skin, cycles: int, pause: int = 1_500) -> Timeline:
+    """Now and then a touch, a stuck column or a cut line, for a time around a tick of the alive pin."""
+    rng = np.random.default_rng(skin.guard + 2 * (skin.scan == "raster"))
+    pieces, cuts, start = [(0, NOTHING, None)], [(0, Cuts())], 50
+    while start < cycles:
+        end = start + int(rng.integers(1, 900))
+        kind = rng.choice(["touch", "stuck", "cut"] if skin.guard else ["touch", "stuck"])
+        if kind == "cut":
+            cuts += [(start, Cuts({int(rng.integers(3)): 0})), (end, Cuts())]
+        else:
+            stuck = rng.random(2) < 0.7 if kind == "stuck" else None
+            pieces += [(start, rng.random((2, 2)) < 0.5, stuck), (end, NOTHING, None)]
+        start = end + int(rng.integers(1, pause))
+    return Timeline(pieces, cuts=cuts)
+
+
+def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
+    cycles = 600_000
+    timeline = events(GUARDED, cycles, 80_000)
+    expected = predict(GUARDED, timeline, cycles)
+    assert compare(expected, bench_native.run(GUARDED, timeline, cycles)) > 500
+    assert 50 < len(expected.alive) < 500  # some ticks, and not all
+    assert len(expected.contact) > 10
+
+
+@pytest.mark.parametrize("name", sample(SKINS, quick=["adaptive"]))
+def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
+    """What is told of lines is renewed every 512 us."""
+    monkeypatch.setattr(raster, "RETRY_BIT", 9)
+    monkeypatch.setattr(guard, "RETRY_US", 2**9)
+    skin, cycles = SKINS[name], 5_000
+    expected = predict(skin, events(skin, cycles), cycles)
+    assert compare(expected, bench_amaranth.run(skin, events(skin, cycles), cycles)) > 20
+    assert 1 <= len(expected.alive) < 5
+
+
+def test_alive_turns_every_ms_while_all_is_well_and_whatever_is_pressed():
+    touches = Timeline([(100, ~NOTHING, None), (2_500, NOTHING, None)])
+    trace = bench_native.run(GUARDED, touches, 5_002)
+    assert trace.alive == [(1000, 1), (2000, 0), (3000, 1), (4000, 0), (5000, 1)]
+
+
+def test_alive_rests_and_contact_is_high_until_what_was_told_is_renewed():
+    scan, renewed, end = facts(GUARDED).scan_clocks, 2**16, 70_002
+    trace = bench_native.run(GUARDED, Timeline([], cuts=[(1_200, Cuts({1: 2})), (3_100, Cuts())]), end)
+    (rises, _), (falls, _) = trace.contact
+    assert 1_200 < rises <= 1_200 + scan + 4
+    assert renewed < falls <= renewed + 2 * scan + 4
+    ticks = [cycle for cycle, _ in trace.alive]
+    assert ticks == [1000, *range((falls + scan) // 1000 * 1000 + 1000, end, 1000)]
+
+
+def test_without_fail_safe_a_fault_leaves_contact_low():
+    skin, cut = GUARDED.replace(fail_safe=False), Timeline([], cuts=[(100, Cuts({}, {0: 0}))])
+    trace = bench_amaranth.run(skin, cut, 1_500)
+    assert (trace.contact, trace.alive) == ([], [])
