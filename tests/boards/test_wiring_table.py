@@ -11,7 +11,6 @@ from contactfpga import cli
 from contactfpga.boards import BOARDS, wiring
 from contactfpga.circuit import Circuit
 from contactfpga.console.wiring import Table, ohms
-from contactfpga.skin import SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
@@ -33,18 +32,20 @@ CHANGES = {
         "column_order": (3, 1, 0, 2),
     },
     "guard and alive": {"rows": 4, "columns": 4, "row_drive": "direct", "guard": True, "alive": True},
+    "guard and orders": {
+        "rows": 3,
+        "columns": 4,
+        "row_drive": "direct",
+        "guard": True,
+        "row_order": (2, 0, 1),
+        "column_order": (3, 1, 0, 2),
+    },
     "guard, chained": CHAINED | {"guard": True, "alive": True, "row_chains": 2},
 }
 
 
 def skin_of(board, name):
-    try:
-        skin = board.skin.replace(**CHANGES[name])
-    except SkinError as error:
-        pytest.skip(f"not yet: {error}")
-    if skin.alive and "alive" not in board.pins(skin):
-        pytest.skip("not yet: the boards have no pin for `alive`")
-    return skin
+    return board.skin.replace(**CHANGES[name])
 
 
 def constrained(board, skin):
@@ -122,6 +123,13 @@ def test_chains_are_as_long_as_the_gateware_shifts(name):
     for chip, lines in (("74HC595", Derived(skin).row_chain_lines), ("74HC165", Derived(skin).column_chain_lines)):
         chained = [one for one in wiring.outputs(skin) if one.chip == chip]
         assert max(sum(one.chain == chain for one in chained) for chain in {one.chain for one in chained}) == lines
+
+
+def test_guard_lines_are_the_last_whatever_the_order():
+    for name in ("guard and alive", "guard and orders"):
+        skin = skin_of(BOARDS["icebreaker"], name)
+        assert wiring.row_lines(skin)[-1].leads_to == "guard row"
+        assert wiring.column_lines(skin)[-1].leads_to == "guard column"
 
 
 def test_guard_lines_are_the_last_of_their_chains():

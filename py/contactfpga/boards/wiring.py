@@ -100,20 +100,17 @@ def outputs(skin: Skin) -> list[Output]:
 def row_lines(skin: Skin) -> list[Line]:
     """What is soldered to each row's line; the guard row's is the last one."""
     pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
-    return _sheet_lines("row", skin.row_order or range(skin.rows), skin.guard, pull)
+    return _sheet_lines("row", skin.line_of_row, skin.rows, pull)
 
 
 def column_lines(skin: Skin) -> list[Line]:
     """The same for columns."""
-    return _sheet_lines(
-        "column", skin.column_order or range(skin.columns), skin.guard, "up" if skin.selects_low else "down"
-    )
+    return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
 
 
-def _sheet_lines(kind: str, order: Sequence[int], guard: bool, pull: str) -> list[Line]:
-    numbers = {line: number for number, line in enumerate(order)}
-    found = [Line(f"{kind} {numbers[line]}", kind, pull) for line in range(len(order))]
-    return [*found, Line(f"guard {kind}", kind, pull)] if guard else found
+def _sheet_lines(kind: str, line_of: Sequence[int], count: int, pull: str) -> list[Line]:
+    names = [f"{kind} {number}" for number in range(count)] + [f"guard {kind}"] * (len(line_of) - count)
+    return [Line(names[line_of.index(line)], kind, pull) for line in range(len(line_of))]
 
 
 def _lines(skin: Skin, port: str, count: int) -> Sequence[Line]:
