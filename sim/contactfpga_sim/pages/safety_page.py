@@ -18,6 +18,7 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "a deadline for each read": ("plain", ("flags", "deadline")),
     "`guard`": ("guarded", ("flags",)),
     "`guard` and a deadline": ("guarded", ("flags", "deadline")),
+    "`guard` and `alive`": ("guarded", ("flags", "alive")),
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
 }
 """Options with the Skin and with what tells a fault."""
@@ -74,11 +75,11 @@ def _told_by(places: list[Place], host: str) -> str:
     """What tells it, at all places or at some."""
     if not any(_channels(place) for place in places):
         return f"**not told**; meant for `{host}`" if host else "**not told**"
-    said = [NAMES[channel] for channel in NAMES if any(channel in _channels(place) for place in places)]
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
-    names = f" ({', '.join(words)})" if words else ""
+    names = NAMES | {"flags": f"{NAMES['flags']} ({', '.join(words)})"}
+    said = [names[channel] for channel in NAMES if any(channel in _channels(place) for place in places)]
     some = "" if _is_told(places) else f", at {_count(places, tuple(NAMES))} places"
-    return f"{', '.join(said)}{names}{some}"
+    return f"{', '.join(said)}{some}"
 
 
 def _general(word: str) -> str:

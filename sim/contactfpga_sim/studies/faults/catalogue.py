@@ -28,7 +28,7 @@ class Fault:
     left: str
     """What a user can still do; where nothing tells it, why not."""
     host: str = ""
-    """The host's means that is meant for it, which this study does not run: ``self_test`` or ``watch``."""
+    """The host's means that is meant for it, which this study does not run: ``self_test`` or ``Watch``."""
 
 
 def _ends(length: int) -> tuple[int, ...]:
@@ -176,13 +176,13 @@ FAULTS: Mapping[str, Fault] = {
         "a zone that nobody makes; touches beside it are joined to it",
         _closed,
         "list it in `mask`",
-        "watch",
+        "Watch",
     ),
     "dead switch": Fault(
         "A switch does not close, or its diode is open or missing",
         "touches of it alone are not seen",
         _dead,
-        "press every switch once (`contactfpga wire`); only a press can tell it from one that nobody presses",
+        "press every switch once (`contactfpga doctor --watch`); only a press can tell it from one that nobody presses",
     ),
     "shorted diode": Fault(
         "A diode is shorted", "pressed cells of its column are undefined", _bare, METER, "self_test"
