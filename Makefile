@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -107,6 +107,12 @@ settle-page: $(VENV)/.stamp-sim ## turn the knobs of the sheet's circuit, and wr
 
 c-page: $(VENV)/.stamp-sim ## measure what the C header takes on microcontrollers (needs gcc-arm-none-eabi)
 	$(PY) -m contactfpga_sim.pages.c_page docs/c.md
+
+maker-page: $(VENV)/.stamp-sim ## write the tables of docs/maker.md and its schematic
+	$(PY) -m contactfpga_sim.pages.maker_page docs/maker.md docs/images
+
+safety-page: $(VENV)/.stamp-sim | compiler ## put every electrical fault into the sheet, and write docs/safety.md (some minutes)
+	$(PY) -m contactfpga_sim.pages.safety_page docs/safety.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

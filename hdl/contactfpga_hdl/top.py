@@ -9,8 +9,8 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.dual import Dual
+from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
@@ -20,7 +20,7 @@ from contactfpga_hdl.payloads import moments_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
-from contactfpga_hdl.scan.pins import column_pins, connect_lines, row_pins
+from contactfpga_hdl.scan.pins import column_pins, connect_lines, connect_pins, row_pins
 
 
 class Top(wiring.Component):

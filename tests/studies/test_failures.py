@@ -46,12 +46,16 @@ BREAKS = {
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): (1468, 2154),
     ("settle", "40 kΩ pull-up, the same"): (68, 100),
     ("settle", "40 kΩ, lines of 2 kΩ, `release_us = 40`"): (316, 464),
+    ("settle", "the same with guard lines"): (215, 316),
     ("diodes", "three fingers at corners"): (0, 1),
+    ("diodes", "the same with guard lines"): (0, 1),
     ("ghost", "zones"): (2, 3),
     ("ghosts", "zones, random places"): (1, 2),
     ("ghosts", "cells, random places"): (1, 2),
     ("broken", "row"): (0, 1),
     ("broken", "column"): (0, 1),
+    ("broken", "row, with guard lines"): (0, 1),
+    ("broken", "column, with guard lines"): (0, 1),
     ("stuck", "no mask"): (0, 1),
     ("stuck", "three in the mask"): (3, 4),
     ("stuck", "columns shorted to the rows' level"): (0, 1),
@@ -70,6 +74,9 @@ TOLD = {
     ("moving", "`adaptive`"): {"motion"},
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
     ("settle", "40 kΩ pull-up, the same"): {"stuck"},
+    ("settle", "the same with guard lines"): {"stuck"},
+    ("broken", "row, with guard lines"): {"stuck"},
+    ("broken", "column, with guard lines"): {"stuck"},
     ("ghost", "zones"): {"ghost"},
     ("ghosts", "cells, random places"): {"ghost"},
     ("stuck", "columns shorted to the rows' level"): {"stuck"},
@@ -83,6 +90,7 @@ TOLD = {
 """What is wrong here is reported at every value, by nothing but these."""
 
 NOT_NOTICED = {
+    ("diodes", "the same with guard lines"): (1, 2),
     ("ghosts", "zones, random places"): (8, 8),
     ("clock", "board with `clock_hz` off"): (0.3, 1),
 }
@@ -96,6 +104,7 @@ QUICK = [
     if method in REFERENCE_BOARD.get(name, [method])
     and name not in ("capacity", "moving", "bounce", "ghost", "ghosts")
     and method not in ("40 kΩ, lines of 2 kΩ, `release_us = 40`", "three in the mask")
+    and (name, method) != ("settle", "the same with guard lines")
 ]
 """What `make test` turns: it needs few boards beside the reference Skin's, as each has to be compiled."""
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import NAME, BoardSpec, column_wires, row_wires
 from contactfpga.skin import Skin
-from contactfpga_hdl.board.board_top import platform_for
 from contactfpga_hdl.board.build import plan_for
+from contactfpga_hdl.board.sites import connector_sites
 
 PAGE = Path("docs/boards.md")
 FOLDER = Path("constraints")
@@ -60,12 +60,6 @@ def _table(board: BoardSpec, sides: Mapping[str, list[tuple[str, str]]]) -> str:
         cells = [[wire[0], board.label(wire[1]), sites[wire[1]]] if wire else ["", "", ""] for wire in wires]
         lines.append("| " + " | ".join(itertools.chain(*cells)) + " |")
     return "\n".join(lines)
-
-
-def connector_sites(board: BoardSpec) -> dict[str, str]:
-    """FPGA pin of every connector pin that the platform knows."""
-    platform = platform_for(board)
-    return {name: pin for connector in platform.connectors.values() for name, pin in connector}
 
 
 def page_with_tables(page: str) -> str:

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import TIME_BITS, Derived
-from contactfpga_hdl.scan.pins import DirectColumns, released_levels
+from contactfpga_hdl.scan.pins import DirectColumns
 from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import watch_epoch

@@ -1,18 +1,22 @@
-"""`contactfpga build`: a bitstream for a board, and what it takes of the FPGA."""
+"""`contactfpga build`: a bitstream for a board, what it takes of the FPGA, and how the sheet is wired to it."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 from pathlib import Path
+from typing import Any
 
-from contactfpga.boards import BOARDS, find
+from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.circuit import load_checked
 from contactfpga.console import numbers, outputs
+from contactfpga.console.wiring import Table
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 
-HELP = "Build a bitstream for a board."
+HELP = "Build a bitstream for a board; print its wiring."
 EXTRA = "boards"
 
 BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec."
@@ -25,24 +29,41 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
+    parser.add_argument("--wiring", action="store_true", help="Only print the wiring table; build nothing.")
+    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_hdl.board import build
+    from contactfpga_hdl.board import sites
 
     board = find(args.board)
     skin = Skin.load(args.skin) if args.skin else board.skin
-    if args.skin:
-        load_checked(args.skin, skin)
+    circuit = load_checked(args.skin, skin) if args.skin else None
+    board.check(skin)
+    table = Table(board, skin, circuit, sites.wire_sites(board, wiring.wires(board, skin)))
+    built = {} if args.wiring else _built(args, board, skin)
+    if args.json:
+        print(json.dumps({"board": board.name, "skin": skin.changed, **built, **table.to_dict()}))
+    else:
+        table.show()
+    return 0
+
+
+def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin) -> dict[str, Any]:
+    """Build the bitstream and print what it takes; the same for JSON."""
+    from contactfpga_hdl.board import build
+
     folder = outputs.folder(args.output or default_folder(board))
     try:
         report = build.build(skin, board, folder, args.seed)
     except build.BitstreamFailed as error:
         raise ContactFPGAError(str(error)) from None
-    print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
-    print(f"{'bitstream':12} {bitstream_path(board, folder).resolve()}")
-    return 0
+    bitstream = str(bitstream_path(board, folder).resolve())
+    if not args.json:
+        print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
+        print(f"{'bitstream':12} {bitstream}")
+    return {"bitstream": bitstream, "report": dataclasses.asdict(report)}
 
 
 def default_folder(board: BoardSpec) -> Path:

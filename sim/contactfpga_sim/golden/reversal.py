@@ -6,11 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.golden import debounce
+from contactfpga_sim.golden import debounce, reversal_guard
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden import reversal_guard
 from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
 

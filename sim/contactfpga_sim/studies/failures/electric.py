@@ -10,11 +10,13 @@ from contactfpga.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
+from contactfpga_sim.sheet import guards
 from contactfpga_sim.sheet.levels import at_rest
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.wiring import Wiring
 from contactfpga_sim.studies.failures.knob import Outcome, Study
 from contactfpga_sim.studies.failures.rig import (
+    GUARDED,
     REFERENCE,
     Rig,
     faults,
@@ -47,13 +49,17 @@ def _judged(zones: Zones, cells: np.ndarray, contacts: list[np.ndarray], unit: s
 # ---- settle time
 
 LAZY = REFERENCE.replace(release_us=40.0)
+LAZY_GUARDED = GUARDED.replace(release_us=40.0)
+LAZY_CIRCUIT = Circuit(column_pull_ohm=40_000.0, line_ohm=2000.0)
 
 
 def _slow(skin: Skin, circuit: Circuit, picofarad: float) -> Outcome:
     spots = [(3, 4), (9, 10)]
     cells = finger(skin, *spots)
     with Rig(skin) as rig:
-        line = Line.of(circuit.replace(line_pf=picofarad), skin.rows, skin.columns, skin.diodes, most=2)
+        slow = circuit.replace(line_pf=picofarad)
+        most = skin.column_lines if skin.guard else 2  # a guard row presses all columns
+        line = Line.of(slow, skin.row_lines, skin.column_lines, skin.diodes, most)
         rig.board.settle(line)
         rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
         zones = rig.frames()[-1]
@@ -69,9 +75,8 @@ SETTLE = Study(
     runs={
         "4.7 kΩ pull-up, `release_us = 1`": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=4700.0)),
         "40 kΩ pull-up, the same": functools.partial(_slow, REFERENCE, Circuit(column_pull_ohm=40_000.0)),
-        "40 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(
-            _slow, LAZY, Circuit(column_pull_ohm=40_000.0, line_ohm=2000.0)
-        ),
+        "40 kΩ, lines of 2 kΩ, `release_us = 40`": functools.partial(_slow, LAZY, LAZY_CIRCUIT),
+        "the same with guard lines": functools.partial(_slow, LAZY_GUARDED, LAZY_CIRCUIT),
     },
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances, precharge",
 )
@@ -88,8 +93,13 @@ def _bare(skin: Skin, count: float) -> Outcome:
     bare = np.zeros_like(cells)
     for row, column in [(3, 4), (3, 5), (4, 4), (4, 5)][: int(count)]:
         bare[row, column] = True
-    read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells, bare)
-    frames = [still(skin, each) for each in (read, read | undefined)]
+    if skin.guard:
+        cells_, bare_ = guards.extended(cells), guards.extended(bare, guard=False)
+    else:
+        cells_, bare_ = cells, bare
+    read, undefined, amperes = at_rest(Circuit(column_pull_ohm=4700.0), cells_, bare_)
+    frames = [_still(skin, each) for each in (read, read | undefined)]
+    undefined = undefined[: skin.rows, : skin.columns]
     worst = min(frames, key=lambda zones: zones.pressed)
     contacts = [finger(skin, spot) for spot in spots]
     right = all(reported(zones) == sorted(map(moments, contacts)) for zones in frames)
@@ -99,13 +109,23 @@ def _bare(skin: Skin, count: float) -> Outcome:
     return Outcome(right, told, what, worst.pressed, cells, places(worst))
 
 
+def _still(skin: Skin, read: np.ndarray) -> Zones:
+    """The frame of a sheet that reads so, with its guard lines if it has some."""
+    if not skin.guard:
+        return still(skin, read)
+    return still(skin, read[:-1, :-1], guards.missed(read))
+
+
 DIODES = Study(
     name="diodes",
     title="Switches without a sound diode on a sheet that should have them",
     knob="such switches under one of three fingers",
     amount="cells that surely read pressed",
     values=(0, 1, 2, 3, 4),
-    runs={"three fingers at corners": functools.partial(_bare, REFERENCE)},
+    runs={
+        "three fingers at corners": functools.partial(_bare, REFERENCE),
+        "the same with guard lines": functools.partial(_bare, GUARDED),
+    },
     helps='test each diode before fitting; a board for `diodes = "none"` lets rows float and flags ghosts',
 )
 
@@ -209,14 +229,14 @@ GHOST = Study(
 # ---- broken lines, stuck switches
 
 
-def _broken(line: str, count: float) -> Outcome:
+def _broken(skin: Skin, line: str, count: float) -> Outcome:
     """``line``: row or column."""
-    skin = REFERENCE
     cells = np.zeros((skin.rows, skin.columns), bool)
     cells[4:11, 5:12] = True
     lines = tuple(range(7, 7 + int(count)))
-    circuit = Wiring(broken_rows=lines) if line == "row" else Wiring(broken_columns=lines)
-    return _judged(still(skin, circuit.read(cells)[0]), cells, [cells])
+    cut = dict.fromkeys(lines, 0)
+    cuts = guards.Cuts(cut, {}) if line == "row" else guards.Cuts({}, cut)
+    return _judged(still(skin, cells, cuts), cells, [cells])
 
 
 BROKEN = Study(
@@ -225,8 +245,13 @@ BROKEN = Study(
     knob="broken lines side by side",
     amount="cells that read pressed",
     values=(0, 1, 2, 3),
-    runs={"row": functools.partial(_broken, "row"), "column": functools.partial(_broken, "column")},
-    helps="`contactfpga wire` shows lines that never read pressed",
+    runs={
+        "row": functools.partial(_broken, REFERENCE, "row"),
+        "column": functools.partial(_broken, REFERENCE, "column"),
+        "row, with guard lines": functools.partial(_broken, GUARDED, "row"),
+        "column, with guard lines": functools.partial(_broken, GUARDED, "column"),
+    },
+    helps="guard lines; `contactfpga wire` shows lines that never read pressed",
 )
 
 STUCK_SPOTS = [(2, 3), (12, 2), (5, 12), (13, 13), (1, 9), (9, 14)]

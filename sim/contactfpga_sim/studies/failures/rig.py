@@ -12,9 +12,12 @@ from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.sheet.guards import Cuts
 from contactfpga_sim.studies.failures.knob import Place
 
 REFERENCE = Skin()
+GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
+"""The same sheet with guard lines, and the pins that go with them."""
 
 HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
 """The most that a hello takes on the wire."""
@@ -50,15 +53,17 @@ def hello_clocks(skin: Skin) -> int:
     return scan * (math.ceil(HELLO_BYTES * 10 * Derived(skin).bit_clocks / scan) + 2)
 
 
-def still(skin: Skin, cells: np.ndarray) -> Zones:
-    """The frame of a sheet that is pressed so."""
-    return seen(skin, cells[None])[0]
+def still(skin: Skin, cells: np.ndarray, cuts: Cuts | None = None) -> Zones:
+    """The frame of a sheet that is pressed so, with its lines cut."""
+    return seen(skin, cells[None], cuts)[0]
 
 
-def seen(skin: Skin, frames: np.ndarray) -> list[Zones]:
+def seen(skin: Skin, frames: np.ndarray, cuts: Cuts | None = None) -> list[Zones]:
     """What the host gets of each of (n, rows, columns) bool frames of few zones that are pressed one after the other,
     for some whole scans each: the last frame of each."""
     with Rig(skin) as rig:
+        if cuts is not None:
+            rig.board.cut(cuts.rows, cuts.columns)
         start = hello_clocks(skin)
         held = rig.scan * HELD_SCANS
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)

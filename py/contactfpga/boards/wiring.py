@@ -1,0 +1,132 @@
+"""Which pin of a board, or output of a shift register, leads to which line of a Skin's sheet. Loads no Amaranth."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.skin import Skin
+
+OWN = "(on the board)"
+"""Where a wire leads that nobody has to solder."""
+
+ROW_OUTPUTS = ("QA", 15), ("QB", 1), ("QC", 2), ("QD", 3), ("QE", 4), ("QF", 5), ("QG", 6), ("QH", 7)
+"""Outputs of a 74HC595 with their pins, the one that line 0 is on first."""
+COLUMN_INPUTS = ("H", 6), ("G", 5), ("F", 4), ("E", 3), ("D", 14), ("C", 13), ("B", 12), ("A", 11)
+"""Inputs of a 74HC165, likewise."""
+
+_CHIP_PINS = {
+    "row_clock": "SRCLK 11 of every 74HC595",
+    "row_latch": "RCLK 12 of every 74HC595",
+    "row_enable_n": "OE 13 of every 74HC595, 10 kΩ to 3.3 V",
+    "row_data": "SER 14 of chip 0, chain {}, 74HC595",
+    "column_clock": "CLK 2 of every 74HC165",
+    "column_load_n": "SH/LD 1 of every 74HC165",
+    "column_data": "QH 9 of chip 0, chain {}, 74HC165",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Line:
+    """What is soldered to a line, and what hangs on it."""
+
+    leads_to: str
+    """Such as ``row 3``, ``guard column``, ``nothing``."""
+    kind: str = ""
+    """``row`` or ``column`` of the sheet; nothing for other wires."""
+    pull: str = ""
+    """``up``, ``down``, or nothing: where a resistor on a line of the sheet leads."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Wire:
+    """A pin of the FPGA that the gateware uses."""
+
+    port: str
+    """As in the constraints, with its bit where it has several: ``rows[3]``, ``uart rx``."""
+    pin: str
+    """``connector:pin``, as the platform names it; nothing where the board wires it by itself."""
+    line: Line
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """An output of a 74HC595, or an input of a 74HC165."""
+
+    chip: str
+    chain: int
+    number: int
+    """Of the chip in its chain; 0 is next to the board."""
+    name: str
+    pin: int
+    line: Line
+
+    @property
+    def place(self) -> tuple[str, str, str, str]:
+        """The same in words."""
+        return self.chip, str(self.chain), str(self.number), f"{self.name} {self.pin}"
+
+
+def wires(board: BoardSpec, skin: Skin) -> list[Wire]:
+    """Every pin of the FPGA that the gateware of ``skin`` uses, in the order of its ports."""
+    found = []
+    for port, pins in board.pins(skin).items():
+        lines = _lines(skin, port, len(pins))
+        names = [port] if len(pins) == 1 else [f"{port}[{bit}]" for bit in range(len(pins))]
+        found += [Wire(name, pin, line) for name, pin, line in zip(names, pins, lines, strict=True)]
+    found.append(Wire("contact", board.contact, Line("stop input of the robot: high while touched")))
+    for name, pin, other in zip(("rx", "tx"), board.uart or ("", ""), ("TXD", "RXD"), strict=True):
+        place = f"{other} of the {board.bridge.chip}" + ("" if board.uart else f" {OWN}")
+        found.append(Wire(f"uart {name}", pin, Line(place)))
+    found.append(Wire("clock", "", Line(f"crystal {OWN}")))
+    many = len(board.held_high) > 1
+    for bit, _ in enumerate(board.held_high):
+        name = f"held_high[{bit}]" if many else "held_high"
+        found.append(Wire(name, "", Line(f"another chip, held high {OWN}")))
+    return found
+
+
+def outputs(skin: Skin) -> list[Output]:
+    """Every used output of the shift registers, rows first."""
+    found: list[Output] = []
+    if skin.row_drive != "direct":
+        found += _chained("74HC595", ROW_OUTPUTS, skin.row_chains, row_lines(skin))
+    if skin.column_read != "direct":
+        found += _chained("74HC165", COLUMN_INPUTS, skin.column_chains, column_lines(skin))
+    return found
+
+
+def row_lines(skin: Skin) -> list[Line]:
+    """What is soldered to each row's line; the guard row's is the last one."""
+    pull = ("down" if skin.selects_low else "up") if skin.reads_rows else ""
+    return _sheet_lines("row", skin.line_of_row, skin.rows, pull)
+
+
+def column_lines(skin: Skin) -> list[Line]:
+    """The same for columns."""
+    return _sheet_lines("column", skin.line_of_column, skin.columns, "up" if skin.selects_low else "down")
+
+
+def _sheet_lines(kind: str, line_of: Sequence[int], count: int, pull: str) -> list[Line]:
+    names = [f"{kind} {number}" for number in range(count)] + [f"guard {kind}"] * (len(line_of) - count)
+    return [Line(names[line_of.index(line)], kind, pull) for line in range(len(line_of))]
+
+
+def _lines(skin: Skin, port: str, count: int) -> Sequence[Line]:
+    if port == "rows":
+        return row_lines(skin)
+    if port == "columns":
+        return column_lines(skin)
+    if port == "alive":
+        return [Line("watchdog: turns each ms while all is well")]
+    return [Line(_CHIP_PINS[port].format(chain)) for chain in range(count)]
+
+
+def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Line]) -> Iterator[Output]:
+    """Chain j has lines j n to j n + n - 1, n to a chain; its first line is on the chip next to the board."""
+    length = -(-len(lines) // chains)
+    for index, line in enumerate(lines):
+        chain, place = divmod(index, length)
+        name, pin = names[place % len(names)]
+        yield Output(chip, chain, place // len(names), name, pin, line)

@@ -1,0 +1,105 @@
+"""The wiring table of a sheet on a board: what `contactfpga build` prints."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+from contactfpga.boards import wiring
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.boards.wiring import Line, Output, Wire
+from contactfpga.circuit import Circuit
+from contactfpga.console import terminal
+from contactfpga.skin import Skin
+
+DIODES = {
+    "col2row": "each diode's cathode toward the row",
+    "row2col": "each diode's cathode toward the column",
+    "none": "no diodes",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """All wires of a sheet, with what its circuit states."""
+
+    board: BoardSpec
+    skin: Skin
+    circuit: Circuit | None
+    """None: the Skin's file has no table ``[circuit]``, so resistors have no values here."""
+    sites: Sequence[str]
+    """FPGA pins of the wires."""
+
+    def show(self) -> None:
+        """Print it."""
+        skin = self.skin
+        terminal.say(
+            f"{self.board.title}, {skin.rows}x{skin.columns}, rows {skin.row_drive}, columns {skin.column_read}, "
+            f"{skin.diodes}: {DIODES[skin.diodes]}"
+        )
+        head = ("wire", "pin", "FPGA", "leads to", "series", "pull")
+        rows = [
+            (wire.port, self.board.label(wire.pin) if wire.pin else "", site, *self._end(wire.line))
+            for wire, site in zip(wiring.wires(self.board, skin), self.sites, strict=True)
+        ]
+        _show([head, *rows])
+        chips = ("chip", "chain", "number", "output", "leads to", "series", "pull")
+        _show([chips, *((*one.place, *self._end(one.line)) for one in wiring.outputs(skin))])
+        if self.circuit is None:
+            terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
+        terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON; ohms are null where nothing is fitted or stated."""
+        return {
+            "wires": [
+                {"wire": wire.port, "pin": self.board.label(wire.pin) if wire.pin else None, "fpga": site}
+                | self._dict(wire)
+                for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
+            ],
+            "outputs": [
+                {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
+                | self._dict(one)
+                for one in wiring.outputs(self.skin)
+            ],
+        }
+
+    def _dict(self, one: Wire | Output) -> dict[str, Any]:
+        line = one.line
+        pull = {"to": line.pull, "ohm": self._pull_ohm(line)} if line.pull else None
+        return {"leads_to": line.leads_to, "series_ohm": self._series_ohm(line), "pull": pull}
+
+    def _end(self, line: Line) -> tuple[str, str, str]:
+        series, pull = self._series_ohm(line), self._pull_ohm(line)
+        to = {"up": "to 3.3 V", "down": "to ground", "": ""}[line.pull]
+        return (
+            line.leads_to,
+            "" if series is None else ohms(series),
+            to if pull is None else f"{ohms(pull)} {to}",
+        )
+
+    def _series_ohm(self, line: Line) -> float | None:
+        return self.circuit.series_ohm or None if self.circuit and line.kind else None
+
+    def _pull_ohm(self, line: Line) -> float | None:
+        if self.circuit is None or not line.pull:
+            return None
+        return self.circuit.row_pull_ohm if line.kind == "row" else self.circuit.column_pull_ohm
+
+
+def _show(rows: Sequence[Sequence[str]]) -> None:
+    """Print the columns that have something in them, where there are lines."""
+    from contactfpga.console import tables  # JSON needs no display
+
+    if len(rows) > 1:
+        filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
+        tables.show(list(zip(*filled, strict=True)), texts=range(len(filled)))
+
+
+def ohms(value: float) -> str:
+    """A resistance as it is printed on a resistor's bag."""
+    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
+        if value >= limit:
+            return f"{value / limit:g} {unit}"
+    return f"{value:g} Ω"

@@ -1,0 +1,210 @@
+"""The wiring table of `contactfpga build`: every pin of the constraints once, and lines where they are soldered."""
+
+import itertools
+import json
+import re
+
+import pytest
+from sample import sample
+
+from contactfpga import cli
+from contactfpga.boards import BOARDS, wiring
+from contactfpga.circuit import Circuit
+from contactfpga.console.wiring import Table, ohms
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.board import placed, sites
+from contactfpga_hdl.board.build import plan_for
+
+CHAINED = {"rows": 20, "columns": 12, "row_drive": "74hc595", "column_read": "74hc165", "release_us": 4.0}
+CHANGES = {
+    "as shipped": {},
+    "direct": {"rows": 4, "columns": 7, "row_drive": "direct"},
+    "one line each": {"rows": 1, "columns": 1, "row_drive": "direct", "settle_us": 20.0},
+    "chained": CHAINED,
+    "two and three chains": CHAINED | {"row_chains": 2, "column_chains": 3},
+    "row2col": {"rows": 4, "columns": 4, "row_drive": "direct", "diodes": "row2col"},
+    "reversal": {"rows": 4, "columns": 4, "row_drive": "direct", "scan": "reversal", "precharge_us": 0.5},
+    "orders": {
+        "rows": 3,
+        "columns": 4,
+        "row_drive": "direct",
+        "row_order": (2, 0, 1),
+        "column_order": (3, 1, 0, 2),
+    },
+    "guard and alive": {"rows": 4, "columns": 4, "row_drive": "direct", "guard": True, "alive": True},
+    "guard and orders": {
+        "rows": 3,
+        "columns": 4,
+        "row_drive": "direct",
+        "guard": True,
+        "row_order": (2, 0, 1),
+        "column_order": (3, 1, 0, 2),
+    },
+    "guard, chained": CHAINED | {"guard": True, "alive": True, "row_chains": 2},
+}
+
+
+def skin_of(board, name):
+    return board.skin.replace(**CHANGES[name])
+
+
+def constrained(board, skin):
+    """FPGA pin of each port in the constraints that place and route gets, by the port's name in the table."""
+    suffix = board.constraints.partition(".")[2]
+    text = plan_for(board, skin).files[f"contactfpga.{suffix}"]
+    text = text if isinstance(text, str) else text.decode()
+    located = re.findall(r"^set_io (\S+) (\S+)$" if suffix == "pcf" else r'COMP "(\S+)" SITE "(\S+)"', text, re.M)
+    assert located
+    return {_port(name): site for name, site in located}
+
+
+def _port(name):
+    if name.startswith("clk"):
+        return "clock"
+    port, part, bit = re.fullmatch(r"(\w+?)_\d+__(?:(\w+)__)?io(\[\d+\])?", name).groups()
+    return port + (f" {part}" if part else "") + (bit or "")
+
+
+CASES = list(itertools.product(BOARDS, CHANGES))
+QUICK = [(board, "as shipped") for board in ("icebreaker", "icestick", "ulx3s-12f-ft232h")] + [
+    *(("icebreaker", name) for name in ("two and three chains", "guard, chained")),
+    *(("ulx3s-12f-ft232h", name) for name in ("one line each", "reversal", "guard and alive")),
+]
+
+
+@pytest.mark.parametrize(("board", "name"), sample(CASES, quick=QUICK))
+def test_each_pin_of_the_constraints_is_in_the_table_once(board, name):
+    board = BOARDS[board]
+    skin = skin_of(board, name)
+    wires = wiring.wires(board, skin)
+    assert len({wire.port for wire in wires}) == len(wires)
+    found = {wire.port: site for wire, site in zip(wires, sites.wire_sites(board, wires), strict=True)}
+    assert found == constrained(board, skin)
+    assert len(set(found.values())) == len(found)
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_each_line_of_the_sheet_is_led_to_once(name):
+    board = BOARDS["ulx3s-85f"]
+    skin = skin_of(board, name)
+    lines = [wire.line for wire in wiring.wires(board, skin)] + [one.line for one in wiring.outputs(skin)]
+    wanted = [f"row {row}" for row in range(skin.rows)] + [f"column {column}" for column in range(skin.columns)]
+    wanted += ["guard row", "guard column"] if skin.guard else []
+    assert sorted(line.leads_to for line in lines if line.kind) == sorted(wanted)
+    assert ("alive" in {wire.port for wire in wiring.wires(board, skin)}) == skin.alive
+
+
+def test_an_order_says_which_pin_a_row_is_soldered_to():
+    board = BOARDS["icebreaker"]
+    skin = board.skin.replace(**CHANGES["orders"])
+    by_port = {wire.port: wire.line.leads_to for wire in wiring.wires(board, skin)}
+    for row, line in enumerate(skin.row_order):
+        assert by_port[f"rows[{line}]"] == f"row {row}"
+    for column, line in enumerate(skin.column_order):
+        assert by_port[f"columns[{line}]"] == f"column {column}"
+
+
+def test_chips_and_outputs_are_those_of_the_data_sheets():
+    skin = BOARDS["icebreaker"].skin.replace(**CHAINED, row_chains=2)
+    found = {one.line.leads_to: one.place for one in wiring.outputs(skin)}
+    assert found["row 0"] == ("74HC595", "0", "0", "QA 15")
+    assert found["row 9"] == ("74HC595", "0", "1", "QB 1")
+    assert found["row 10"] == ("74HC595", "1", "0", "QA 15")
+    assert found["column 0"] == ("74HC165", "0", "0", "H 6")
+    assert found["column 7"] == ("74HC165", "0", "0", "A 11")
+    assert found["column 8"] == ("74HC165", "0", "1", "H 6")
+    places = [(one.chip, one.chain, one.number, one.pin) for one in wiring.outputs(skin)]
+    assert len({*places}) == len(places)
+
+
+@pytest.mark.parametrize("name", ["chained", "two and three chains", "guard, chained"])
+def test_chains_are_as_long_as_the_gateware_shifts(name):
+    skin = skin_of(BOARDS["ulx3s-85f"], name)
+    for chip, lines in (("74HC595", Derived(skin).row_chain_lines), ("74HC165", Derived(skin).column_chain_lines)):
+        chained = [one for one in wiring.outputs(skin) if one.chip == chip]
+        assert max(sum(one.chain == chain for one in chained) for chain in {one.chain for one in chained}) == lines
+
+
+def test_guard_lines_are_the_last_whatever_the_order():
+    for name in ("guard and alive", "guard and orders"):
+        skin = skin_of(BOARDS["icebreaker"], name)
+        assert wiring.row_lines(skin)[-1].leads_to == "guard row"
+        assert wiring.column_lines(skin)[-1].leads_to == "guard column"
+
+
+def test_guard_lines_are_the_last_of_their_chains():
+    skin = skin_of(BOARDS["ulx3s-85f"], "guard, chained")
+    for chip, kind in (("74HC595", "row"), ("74HC165", "column")):
+        assert [one.line.leads_to for one in wiring.outputs(skin) if one.chip == chip][-1] == f"guard {kind}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "rows", "columns"),
+    [({}, "", "up"), ({"diodes": "row2col"}, "", "down"), (CHANGES["reversal"], "down", "up")],
+)
+def test_lines_are_pulled_to_the_level_that_they_have_untouched(changes, rows, columns):
+    skin = BOARDS["ulx3s-85f"].skin.replace(**changes)
+    assert {line.pull for line in wiring.row_lines(skin)} == {rows}
+    assert {line.pull for line in wiring.column_lines(skin)} == {columns}
+
+
+def printed(capsys, *arguments):
+    assert cli.main(["build", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_resistors_are_those_of_the_files_circuit(tmp_path, capsys):
+    file = tmp_path / "skin.toml"
+    skin = BOARDS["ulx3s-12f"].skin.replace(**CHANGES["reversal"])
+    file.write_text(f"{skin.to_toml()}[circuit]\nseries_ohm = 33\nrow_pull_ohm = 5600\ncolumn_pull_ohm = 47_000\n")
+    out = printed(capsys, "ulx3s-12f", "--wiring", "--skin", str(file))
+    assert re.search(r"^rows\[3\] +GPIO 1- +A11 +row 3 +33 Ω +5\.6 kΩ to ground *$", out, re.M)
+    assert re.search(r"^columns\[0\] +GPIO 18\+ +H18 +column 0 +33 Ω +47 kΩ to 3\.3 V *$", out, re.M)
+    assert re.search(r"^contact +GPIO 27- +E13 +stop input[^Ω]*$", out, re.M)
+    wires = json.loads(printed(capsys, "ulx3s-12f", "--wiring", "--json", "--skin", str(file)))["wires"]
+    assert {one["wire"]: one for one in wires}["rows[3]"] == {
+        "wire": "rows[3]",
+        "pin": "GPIO 1-",
+        "fpga": "A11",
+        "leads_to": "row 3",
+        "series_ohm": 33,
+        "pull": {"to": "down", "ohm": 5600},
+    }
+
+
+def test_without_a_circuit_no_value_is_made_up(capsys):
+    out = printed(capsys, "ulx3s-12f", "--wiring")
+    assert "Ω" not in out
+    assert re.search(r"^columns\[0\] .*column 0 +to 3\.3 V *$", out, re.M)
+    assert "its table [circuit]" in out
+
+
+def test_a_sheet_that_does_not_fit_has_no_table(tmp_path, capsys):
+    file = tmp_path / "skin.toml"
+    file.write_text(BOARDS["icebreaker"].skin.replace(row_drive="direct").to_toml())
+    assert cli.main(["build", "icebreaker", "--wiring", "--skin", str(file)]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "take 16 + 16 wires" in said.err
+
+
+def test_one_object_holds_what_was_built(tmp_path, monkeypatch, capsys):
+    report = placed.Report((562, 1280), 482, (1, 16), (791, 1280), 119.14, 12.0)
+    monkeypatch.setattr("contactfpga_hdl.board.build.build", lambda *_: report)
+    answer = json.loads(printed(capsys, "icestick", "--json", "--output", str(tmp_path)))
+    assert answer["bitstream"] == str(tmp_path / "contactfpga.bin")
+    assert answer["report"]["luts"] == [562, 1280]
+    assert len(answer["wires"]) == 8 + 8 + 4
+    assert answer["outputs"] == []
+
+
+@pytest.mark.parametrize(("value", "text"), [(33.0, "33 Ω"), (4700.0, "4.7 kΩ"), (100_000.0, "100 kΩ"), (1e6, "1 MΩ")])
+def test_resistances_read_as_on_a_bag(value, text):
+    assert ohms(value) == text
+
+
+def test_a_circuit_without_series_resistors_names_none():
+    board = BOARDS["icestick"]
+    wires = wiring.wires(board, board.skin)
+    table = Table(board, board.skin, Circuit(), sites.wire_sites(board, wires))
+    assert {one["series_ohm"] for one in table.to_dict()["wires"]} == {None}

@@ -1,0 +1,156 @@
+"""Electrical faults: what the guard lines of the compiled gateware tell, and how fast; the tables of docs/safety.md."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.pages import safety_page, writer
+from contactfpga_sim.sheet import guards
+from contactfpga_sim.studies.failures.rig import GUARDED, REFERENCE
+from contactfpga_sim.studies.faults import study, trial
+from contactfpga_sim.studies.faults.catalogue import FAULTS
+from contactfpga_sim.studies.faults.hurt import Hurt
+from contactfpga_sim.studies.faults.study import Place
+from contactfpga_sim.studies.faults.trial import Told
+
+pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
+
+LIMIT_US = 2 * Derived(GUARDED).frame_clocks // Derived(GUARDED).clocks_per_us + 1000
+"""Two frames and a millisecond: what guard lines promise."""
+
+GUARDED_TELLS = {"broken row", "broken column", "row connector", "column connector", "selected row", "stuck column"}
+FLAGGED_ANYHOW = {"selected row", "stuck column"}
+"""Columns that read pressed while no row is driven."""
+NEVER = {"closed switch", "dead switch", "shorted columns", "broken contact"}
+
+
+def one(skin, fault, number=-1):
+    """A fault at its last place: a line at the far end."""
+    name, hurt = list(study.places(skin, fault))[number]
+    return study.at(skin, hurt, name)
+
+
+@pytest.mark.parametrize("fault", sorted(GUARDED_TELLS))
+def test_guard_lines_tell_a_dead_line_in_time(fault):
+    place = one(GUARDED, fault)
+    assert place.harmful
+    assert place.us("flags") <= LIMIT_US
+    assert place.us("alive") <= LIMIT_US + trial.QUIET_US
+    assert place.us("contact") <= LIMIT_US
+
+
+@pytest.mark.parametrize("fault", ["broken row", "broken column", "column connector"])
+def test_without_guard_lines_a_dead_line_is_not_told(fault):
+    place = one(REFERENCE, fault)
+    assert place.harmful
+    assert place.us("flags") is None
+    assert place.wrong > 20
+
+
+@pytest.mark.parametrize("fault", sorted(NEVER))
+def test_what_no_line_can_show_is_not_told(fault):
+    place = one(GUARDED, fault, 0)
+    assert place.harmful
+    assert [place.us(by) for by in ("flags", "deadline", "alive")] == [None] * 3
+
+
+def test_a_whole_sheet_is_right_and_tells_nothing():
+    place = study.at(GUARDED, Hurt())
+    assert not place.harmful
+    assert [place.us(by) for by in ("flags", "deadline", "alive", "contact")] == [None] * 4
+    assert place.wrong == 0
+
+
+def test_a_dead_board_stops_frames_and_alive():
+    place = one(GUARDED, "dead board")
+    assert place.us("deadline") == pytest.approx(trial.DEADLINE_US, abs=trial.STEP_US)
+    assert place.us("alive") == pytest.approx(trial.QUIET_US, abs=trial.STEP_US)
+    assert one(GUARDED, "broken link").us("alive") is None
+
+
+def test_two_pins_that_fight_are_told_where_the_column_reads_released():
+    pressed, released = (one(GUARDED, "shorted rows", number) for number in (0, 1))
+    assert pressed.us("flags") is None
+    assert released.us("flags") <= LIMIT_US
+
+
+# ---- the catalogue
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_has_places_that_differ(fault):
+    hurts = FAULTS[fault].places(GUARDED)
+    assert hurts
+    assert all(hurt != Hurt() for hurt in hurts.values())
+    assert len({repr(hurt) for hurt in hurts.values()}) == len(hurts)
+
+
+def test_every_line_is_cut_at_both_ends():
+    for fault, lines, ends in (("broken row", 16, "column"), ("broken column", 16, "row")):
+        names = set(FAULTS[fault].places(Skin()))
+        kind = fault.split()[1]
+        assert {f"{kind} {line} at {ends} {end}" for line in range(lines) for end in (0, 15)} <= names
+
+
+def test_guard_switches_surround_the_cells_and_their_corner_is_open():
+    cells = np.eye(2, 3, dtype=bool)
+    sheet = guards.extended(cells)
+    assert sheet.tolist() == [
+        [True, False, False, True],
+        [False, True, False, True],
+        [True, True, True, False],
+    ]
+    sheet[1, 3] = sheet[2, 0] = False
+    assert guards.missed(sheet) == ({1: 3}, {0: 2})
+
+
+# ---- what is made of it
+
+
+def told(by, wrong=0, harmful=True, words=()):
+    return Told(by, words, wrong, harmful)
+
+
+def test_a_fault_that_rest_does_not_tell_has_to_be_told_wherever_it_does_harm():
+    place = Place(
+        "here", {"rest": told({}, harmful=False), "finger": told({"flags": 80}), "all": told({"flags": 96}, 1)}
+    )
+    assert (place.us("flags"), place.wrong) == (96, 1)
+    half = Place("here", place.scenes | {"all": told({}, 50)})
+    assert (half.us("flags"), half.wrong) == (None, 50)
+    assert Place("here", half.scenes | {"rest": told({"flags": 144}, harmful=False)}).us("flags") == 144
+
+
+def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
+    tells, says_nothing = (
+        Place("here", dict.fromkeys(("rest", "finger", "all"), told(by))) for by in ({"flags": 100, "deadline": 90}, {})
+    )
+    halves = {"broken row": (tells, tells), "broken column": (tells, says_nothing)}
+    monkeypatch.setattr(study, "found", lambda skin, fault: halves.get(fault, (says_nothing,)))
+    lines = safety_page.coverage_table().splitlines()[2:]
+    listed, places = len(FAULTS), len(FAULTS) + 2
+    assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
+
+
+def test_the_page_lists_every_fault_and_every_option():
+    text = PAGE.read_text(encoding="utf-8")
+    table = re.search(r"<!-- figures: faults -->\n(.*?)<!-- end -->", text, re.DOTALL)[1]
+    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == [
+        fault.title for fault in FAULTS.values()
+    ]
+    table = re.search(r"<!-- figures: coverage -->\n(.*?)<!-- end -->", text, re.DOTALL)[1]
+    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == list(safety_page.OPTIONS)
+    assert writer.update(text, {"times": safety_page.times_table}) == text
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_the_page_is_up_to_date():
+    text = PAGE.read_text(encoding="utf-8")
+    assert writer.update(text, safety_page.TABLES) == text
