@@ -7,11 +7,12 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
-from contactfpga_hdl.link.faults import report_of
-from contactfpga_hdl.link.link import Link, stored_hello
+from contactfpga_hdl.link.faults import Reporter, report_of
+from contactfpga_hdl.link.link import Link
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.streams import drain
 
 _SKIN = Skin(rows=2, columns=3, guard=True, settle_us=40)
 _DIGITS = 2  # of 2 + 3 + 4 bits
@@ -35,7 +36,6 @@ def reports_are_true(proof: Proof) -> None:
     with mock.patch.object(protocol, "encode_hello", return_value=_HELLO):
         dut = Link(_SKIN)
         inside = proof.put(dut)
-        stored = stored_hello(_SKIN)
     _free_inputs(proof, dut)
     place = proof.chosen(range(_LENGTH), "place")
     digits = Value.cast(dut.faults)
@@ -62,7 +62,7 @@ def reports_are_true(proof: Proof) -> None:
     proof.claim(~(reports & taken))
     _untold(proof, dut, inside, reports, take, last, right[place])
     _turns(proof, inside, take)
-    _lemmas(proof, dut, inside, reports, index, place, expected, last, len(stored))
+    _lemmas(proof, dut, inside, reports, index, place, expected, last)
 
 
 def _digit(word: Value, index: int) -> Value:
@@ -79,7 +79,7 @@ def _free_inputs(proof: Proof, dut: Link) -> None:
     ones |= {"write_offset": frames.write.offset, "write_data": frames.write.data}
     for name, port in ones.items():
         m.d.comb += port.eq(proof.free(port.shape(), name))
-    drain(proof, dut.bytes, "bytes")
+    m.d.comb += dut.bytes.ready.eq(proof.free(1, "bytes_ready"))
 
 
 def _untold(proof: Proof, dut: Link, inside: Inside, reports, take, last, right) -> None:
@@ -106,7 +106,7 @@ def _turns(proof: Proof, inside: Inside, take) -> None:
     proof.lemma(~held | inside["is_report"])
 
 
-def _lemmas(proof: Proof, dut: Link, inside: Inside, reports, index, place, expected, last, hello_length: int) -> None:
+def _lemmas(proof: Proof, dut: Link, inside: Inside, reports, index, place, expected, last) -> None:
     m, state, offset = proof.m, inside["wire_state"], inside["offset"]
     fetch, byte, tail = (state == one for one in (_FETCH, _BYTE, _TAIL))
     proof.lemma((inside["is_report"] & (state != _IDLE)) == reports)
@@ -121,3 +121,13 @@ def _lemmas(proof: Proof, dut: Link, inside: Inside, reports, index, place, expe
     offered = reports & byte & (index == place)
     proof.lemma(~offered | (inside["reporter.byte"] == expected))
     proof.lemma(Mux(writes, inside["reporter.byte"], kept) == Mux(offered, expected, last))
+
+
+_BUGS = (
+    Bug("a change is missed", Reporter, "watched", lambda _, inside: Const(0)),
+    Bug("a digit is taken too late", Reporter, "byte", lambda byte, inside: byte ^ inside["offers"]),
+    Bug("reports go first", Link, "is_report", lambda _, inside: Const(0)),
+    Bug("no report after a hello", Reporter, "report_due", lambda due, inside: due & ~inside["greeted"]),
+    Bug("the last digit is left out", Link, "end", lambda end, inside: end - inside["take_report"]),
+)
+CASES = (Case("reports are true", "2x3, guard lines", reports_are_true, 8, _BUGS, bug_clocks=24),)
