@@ -82,7 +82,7 @@ class Top(wiring.Component):
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         receiver = PulseReceiver(bit_clocks) if self.derived.pulsed else Receiver(bit_clocks)
         m.submodules.receiver = receiver
-        m.submodules.request = request = RequestReader()
+        m.submodules.request = request = RequestReader(commands=bool(self.derived.commands))
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
         wiring.connect(m, link.bytes, transmitter.bytes)

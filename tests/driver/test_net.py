@@ -18,12 +18,13 @@ from world import Witness, World
 
 import contactfpga
 import contactfpga.driver.requests
+from contactfpga.driver.lines import Lines
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.timeline import Timeline
 
 SKINS = [
     contactfpga.Skin(),
-    contactfpga.Skin(pitch_x_mm=20.0),
+    contactfpga.Skin(pitch_x_mm=20.0, guard=True),
     contactfpga.Skin(pitch_x_mm=5.0, rows=20, columns=12, settle_us=20.0),
 ]
 NAMED = (contactfpga.ReadTimeout, contactfpga.SkinMismatch, contactfpga.PortLost)
@@ -88,6 +89,22 @@ class History(RuleBasedStateMachine):
         for _ in range(calls):
             with contextlib.suppress(*NAMED):
                 self.witness.check(self.board.next(timeout))
+
+    @precondition(lambda self: self.board)
+    @rule(word=st.sampled_from([0, 1, 8, 9]), good=st.booleans(), calls=st.integers(1, 30))
+    def lines_break(self, word, good, calls):
+        """Or are mended. On a good line a second later at most it is known."""
+        if good:
+            self.world.lose = self.world.corrupt = self.world.lose_requests = 0.0
+        self.world.break_lines(word)
+        for _ in range(calls):
+            with contextlib.suppress(*NAMED):
+                self.witness.check(self.board.next(0.01))
+        if good and self.world.skin.guard:
+            self.read_on_a_good_line()
+            self.world.pause(1_200_000)
+            self.read_on_a_good_line()
+            self.witness.check_told(self.board.faults)
 
     @precondition(lambda self: self.board)
     @rule()
@@ -234,7 +251,14 @@ def packets_are_too_long(monkeypatch):
     monkeypatch.setattr("contactfpga.driver.conversation.LONGEST_PACKET", 12)
 
 
+def reports_are_for_good(monkeypatch):
+    """A restart leaves the names of before."""
+    monkeypatch.setattr(Lines, "forget", lambda self: None)
+    monkeypatch.setattr(Lines, "take_report", lambda self, plain, hello: None)
+
+
 DEFECTS = {
+    reports_are_for_good: AssertionError,
     packets_are_too_long: (contactfpga.ReadTimeout, AssertionError),  # whichever history comes first
     asked_by_a_flag: AssertionError,
     restart_by_the_sequence: AssertionError,
@@ -252,5 +276,5 @@ RARE = {restart_by_the_sequence, packets_are_too_long}
 )
 def test_a_defect_that_is_put_back_is_found(monkeypatch, defect):
     defect(monkeypatch)
-    with pytest.raises(DEFECTS[defect], match=r"never sent|asked for|no frame within"):
+    with pytest.raises(DEFECTS[defect], match=r"never sent|asked for|no frame within|never told"):
         run_state_machine_as_test(History, settings=settings(BUDGET, max_examples=5000))

@@ -6,6 +6,8 @@ import pytest
 from model_board import ModelBoard
 
 import contactfpga
+from contactfpga.console import live
+from contactfpga.driver import health
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.wire.faults import Faults
 
@@ -207,3 +209,31 @@ def test_a_recording_has_no_deadline(tmp_path):
         assert [board.latest(max_age_s=0.01).sequence for _ in range(2)] == [0, 1]
         with pytest.raises(contactfpga.ReplayEnded):
             board.latest(max_age_s=0.01)
+
+
+def test_a_display_shows_silence_in_the_place_of_a_table_that_stands_still(board, port):
+    shown = live._paced(board, 1.0, tell_silence=True)
+    assert isinstance(next(shown), contactfpga.Zones)
+    port.dead = True
+    silence = next(one for one in shown if isinstance(one, contactfpga.Silence))
+    assert 0.2 <= silence.seconds < 0.3
+    assert "no data for 0.2" in str(silence)
+    port.dead = False
+    assert isinstance(next(shown), contactfpga.Zones)
+    port.dead = True
+    with pytest.raises(contactfpga.ReadTimeout):
+        list(shown)
+    assert board.silence.seconds >= 1.0
+
+
+def test_doctor_names_lines_and_the_age_of_the_last_frame(board, port):
+    port.word = 1 << 3 | 1 << 34
+    port.out += port.report() + port.frame(flags=["fault"])
+    zones = next(zones for zones in board if zones.faults)
+    port.dead = True
+    port.seconds += 0.5
+    found = [(one.verdict, one.sentence) for one in health.lines(board, zones)]
+    assert found[0][0] == "ok"
+    assert found[0][1].endswith(" ms ago")
+    assert [one[1].split(":")[0] for one in found[1:]] == ["column 2 stuck", "row 3 open"]
+    assert {one[0] for one in found[1:]} == {"fault"}

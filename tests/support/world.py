@@ -51,6 +51,9 @@ class World:
         self.truth = []
         self.board = ModelBoard(skin)
         self.life = 0
+        self.words = [[0]]
+        """Of each life, what the board knew of its lines, one after the other."""
+        self._report_due = False
         self._cut = b""  # has arrived and was not read yet
         self._to_board = []  # (time, bytes)
         self._to_host = []  # (time, bytes)
@@ -77,6 +80,7 @@ class World:
             self.skin = skin
             self.board = ModelBoard(skin)
         self.life += 1
+        self.words.append([0])
         self.board.power_up()
         self._to_board = []
         self._power_up(self.now_us + BOOT_US)
@@ -88,8 +92,16 @@ class World:
         self._hello_due = when  # the time from which a hello is due
         self._next_hello = when + HELLO_US
         self._waiting = None
+        self._report_due = False
         self._free_us = when
         self._heard_at_sample = 0
+
+    def break_lines(self, word):
+        """The board finds lines faulty, or whole again; it tells so."""
+        if self.skin.guard and word != self.board.word:
+            self.board.word = word
+            self.words[-1].append(word)
+            self._report_due = True
 
     def pause(self, us):
         """The world goes on while the host does not read; what came waits."""
@@ -138,7 +150,7 @@ class World:
         """On to the next thing that happens, at most to ``end``."""
         times = [end, self._sample_us + self.scan_us, self._next_hello]
         times += [when for when, _ in self._to_board[:1] + self._to_host[:1]]
-        if self._waiting is not None or self._hello_due is not None:
+        if self._waiting is not None or self._hello_due is not None or self._report_due:
             times.append(self._free_us)
         self.now_us = max(self.now_us, min(when for when in times if when > self.now_us))
         self._hear()
@@ -168,6 +180,10 @@ class World:
                 self._hello_due = None
                 self.board.time_us = self.now_us - self._on_us
                 self._send(self.board.hello())
+                self._report_due = self.skin.guard
+            elif self._report_due:
+                self._report_due = False
+                self._send(self.board.report())
             elif self._waiting is not None:
                 (begun, heard), self._waiting = self._waiting, None
                 self._send_frame(begun, heard)
@@ -181,7 +197,8 @@ class World:
         self.board.moments = [zone]
         since = begun - self._on_us
         self.truth.append(Truth(begun, since, self.life, index, zone, self.skin.pitch_x_mm))
-        self._send(self.board.frame(time=since, heard=heard))
+        flags = ["fault"] if self.board.word else []
+        self._send(self.board.frame(time=since, heard=heard, flags=flags))
 
     def _send(self, data, whole=True):
         self._free_us = max(self._free_us, self.now_us) + round(len(data) * BYTE_US)
@@ -212,8 +229,25 @@ class Witness:
             same = (zone.area_cells, zone.sum_x, zone.sum_y) == sent.zone and zones.time_us == sent.time_us
             if same and zones.sequence == sent.index % 256 and zones.sheet.pitch_x_mm == sent.pitch_mm:
                 self.place = place
+                self._check_faults(zones, sent)
                 if since_us is not None:
                     assert sent.begun_us >= since_us, f"scanned {since_us - sent.begun_us} us before it was asked for"
                 return sent
         last = truth[self.place] if self.place >= 0 else None
         raise AssertionError(f"never sent, or sent before the last one, {last}: {zones}")
+
+    def _check_faults(self, zones, sent):
+        """Faults of a flagged frame are some that the board had in this life, or have no name; others have none."""
+        known = [names(word) for word in self.world.words[sent.life]] + [("unnamed fault",)]
+        right = zones.faults in known if "fault" in zones.flags else zones.faults == ()
+        assert right, f"never told of this board: {zones.faults}"
+
+    def check_told(self, faults):
+        """What a board said of its lines last, on a good line."""
+        wanted = names(self.world.board.word)
+        assert (faults.names if faults else ()) == wanted, f"never told, though lines are {wanted}"
+
+
+def names(word):
+    """Of broken rows of a sheet, not all of them."""
+    return tuple(sorted(f"row {row} open" for row in range(16) if word >> row & 1))

@@ -5,11 +5,13 @@ import random
 import numpy as np
 import pytest
 from sample import sample
-from wire import Wire, crc16, request, requests_in
+from wire import Wire, crc16, request, taken_in
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import protocol
+from contactfpga.wire.command import Command, encode_command
+from contactfpga_sim.golden.request import command
 
 SKINS = {
     "reference": contactfpga.Skin(),
@@ -18,6 +20,7 @@ SKINS = {
     "32x32": contactfpga.Skin(rows=32, columns=32, settle_us=40.0),
     "64x64": contactfpga.Skin(rows=64, columns=64, settle_us=40.0),
     "cells": contactfpga.Skin(rows=8, columns=11, report="cells", settle_us=10.0),
+    "guard": contactfpga.Skin(guard=True),
 }
 
 GENERATOR = 1 | 1 << 4 | 1 << 11 | 1 << 16
@@ -54,14 +57,15 @@ def _packets():
     chosen += [(name, _frame(name, rng, 1)) for name in SKINS if name != "reference"]
     chosen.append(("reference", Wire(SKINS["reference"]).zones([])))  # hardly a byte that is not zero
     chosen.append(("reference", Wire(SKINS["reference"]).hello()))
+    chosen.append(("guard", Wire(SKINS["guard"]).report(1 << 3 | 1 << 40)))
     return chosen
 
 
 PACKETS = _packets()
 BEHIND = [_frame(name, random.Random(str(index)), 1) for index, (name, _) in enumerate(PACKETS)]
 VARIANTS = [(*packet, behind) for packet, behind in zip(PACKETS, BEHIND)]
-QUICK = [VARIANTS[index] for index in (0, 4, 6, 10, len(PACKETS) - 1)]
-"""An empty frame, one of two zones, one of the smallest sheet, bitmap rows, a hello."""
+QUICK = [VARIANTS[index] for index in (0, 4, 6, 10, len(PACKETS) - 2, len(PACKETS) - 1)]
+"""An empty frame, one of two zones, one of the smallest sheet, bitmap rows, a hello, a report of faults."""
 CASES = pytest.mark.parametrize(
     ("name", "packet", "behind"),
     sample(VARIANTS, QUICK),
@@ -255,19 +259,22 @@ def test_the_hunt_sees_the_shortest_error_that_the_crc_cannot(name, packet, behi
 
 
 REQUESTS = [request(number, hello) for number, hello in ((0x15A2D1, False), (0x4081, True), (0x1FFFFF, False))]
+REQUESTS.append(command(0x15A2D1, 1, 0x54321, True))
 
 
-@pytest.mark.parametrize("packet", sample(REQUESTS, quick=REQUESTS[:1]))
+@pytest.mark.parametrize("packet", sample(REQUESTS, quick=[REQUESTS[0], REQUESTS[-1]]))
 def test_no_burst_makes_a_request_that_was_not_sent(packet, record_property):
     """All bursts of up to 16 bits; what a board takes is written from docs/protocol.md in tests/support."""
     stream = packet + request(0x123456 | 1)[1:]
-    sent = requests_in(stream.split(b"\0"))
+    sent = taken_in(stream.split(b"\0"))
     assert len(sent) == 2
-    assert packet == protocol.encode_request(*sent[0])
+    number, hello, what = sent[0]
+    as_host = encode_command(number, Command(*what), hello) if what else protocol.encode_request(number, hello)
+    assert packet == as_host
     hunt, hits = Hunt(stream), 0
     for bit in range(8 * len(packet)):
         for error in ALL_BURSTS[hunt.survivors(ALL_BURSTS, bit)]:
-            taken = requests_in(flipped(stream, int(error), bit).split(b"\0"))
+            taken = taken_in(flipped(stream, int(error), bit).split(b"\0"))
             assert set(taken) <= set(sent), f"burst {error:#x} from bit {bit}"
             hits += 1
     record_property("cases", 8 * len(packet) * len(ALL_BURSTS))

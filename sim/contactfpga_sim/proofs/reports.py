@@ -1,5 +1,6 @@
 """Reports of faults: what is sent is what the scan knows, nothing stays untold, and frames get their turn."""
 
+from functools import partial
 from unittest import mock
 
 from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
@@ -7,22 +8,18 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES
 from contactfpga.wire import protocol
-from contactfpga_hdl.link.faults import report_of
-from contactfpga_hdl.link.link import Link, stored_hello
+from contactfpga_hdl.link.faults import Reporter, report_of
+from contactfpga_hdl.link.link import Link
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.streams import drain
 
-_SKIN = Skin(rows=2, columns=3, guard=True, settle_us=40)
-_DIGITS = 2  # of 2 + 3 + 4 bits
-_LENGTH = 1 + _DIGITS + 1
 _ROUND = 4
 _IDLE, _FETCH, _BYTE, _TAIL = range(4)
-_WHOLE_HELLO = protocol.encode_hello(_SKIN)
-_HELLO = _WHOLE_HELLO[:1] + _WHOLE_HELLO[-CHECK_BYTES - 1 :]  # so that a search soon comes to what follows it
 
 
-def reports_are_true(proof: Proof) -> None:
+def reports_are_true(proof: Proof, skin: Skin) -> None:
     """Free: the word in each clock, frames, wishes for a hello, when bytes are taken, one place of a report.
 
     Claimed: the byte at that place is what the word made it in the clock after the byte before was taken, and stays
@@ -32,14 +29,18 @@ def reports_are_true(proof: Proof) -> None:
     before a frame that waited while the first was taken.
     """
     m = proof.m
-    with mock.patch.object(protocol, "encode_hello", return_value=_HELLO):
-        dut = Link(_SKIN)
+    hello = protocol.encode_hello(skin)
+    short = hello[:1] + hello[-CHECK_BYTES - 1 :]  # so that a search soon comes to what follows it
+    with mock.patch.object(protocol, "encode_hello", return_value=short):
+        dut = Link(skin)
         inside = proof.put(dut)
-        stored = stored_hello(_SKIN)
     _free_inputs(proof, dut)
-    place = proof.chosen(range(_LENGTH), "place")
-    digits = Value.cast(dut.faults)
-    right = Array([Const(_LENGTH, 8), *(_digit(digits, index) for index in range(_DIGITS)), Const(0x90, 8)])
+    word = Value.cast(dut.faults)
+    empty = report_of(len(word), 0)
+    length = len(empty)
+    place = proof.chosen(range(length), "place")
+    proof.given(place < length)
+    right = Array([Const(length, 8), *(_digit(word, index) for index in range(length - 2)), Const(0x90, 8)])
     take = {name: inside[f"take_{name}"] for name in ("frame", "hello", "report")}
     taken = take["frame"] | take["hello"] | take["report"]
     reports, index = Signal(name="on_wire"), Signal(4, name="index")
@@ -47,22 +48,22 @@ def reports_are_true(proof: Proof) -> None:
     with m.If(taken):
         m.d.sync += [reports.eq(take["report"]), index.eq(0)]
     with m.Elif(reports & transfer):
-        m.d.sync += [index.eq(index + 1), reports.eq(index != _LENGTH + CHECK_BYTES)]
+        m.d.sync += [index.eq(index + 1), reports.eq(index != length + CHECK_BYTES)]
     expected = Signal(8, name="expected")
     sent, ever = Signal(8, name="sent"), Signal(name="ever")
-    last = Mux(ever, sent, Array(report_of(9, 0))[place])
+    last = Mux(ever, sent, Array(empty)[place])
     fetched = proof.before(taken | transfer)
     with m.If(fetched):
         m.d.sync += expected.eq(right[place])
     with m.If(reports & dut.bytes.valid & (index == place)):
         proof.claim(dut.bytes.payload == expected)
         m.d.sync += [sent.eq(dut.bytes.payload), ever.eq(1)]
-    with m.If(reports & dut.bytes.valid & (index == _LENGTH + CHECK_BYTES)):
+    with m.If(reports & dut.bytes.valid & (index == length + CHECK_BYTES)):
         proof.claim(dut.bytes.payload == protocol.DELIMITER)
     proof.claim(~(reports & taken))
     _untold(proof, dut, inside, reports, take, last, right[place])
     _turns(proof, inside, take)
-    _lemmas(proof, dut, inside, reports, index, place, expected, last, len(stored))
+    _lemmas(proof, inside, reports, index, place, expected, last, empty)
 
 
 def _digit(word: Value, index: int) -> Value:
@@ -79,7 +80,7 @@ def _free_inputs(proof: Proof, dut: Link) -> None:
     ones |= {"write_offset": frames.write.offset, "write_data": frames.write.data}
     for name, port in ones.items():
         m.d.comb += port.eq(proof.free(port.shape(), name))
-    drain(proof, dut.bytes, "bytes")
+    m.d.comb += dut.bytes.ready.eq(proof.free(1, "bytes_ready"))
 
 
 def _untold(proof: Proof, dut: Link, inside: Inside, reports, take, last, right) -> None:
@@ -106,18 +107,39 @@ def _turns(proof: Proof, inside: Inside, take) -> None:
     proof.lemma(~held | inside["is_report"])
 
 
-def _lemmas(proof: Proof, dut: Link, inside: Inside, reports, index, place, expected, last, hello_length: int) -> None:
+def _lemmas(proof: Proof, inside: Inside, reports, index, place, expected, last, empty: bytes) -> None:
+    length = len(empty)
     m, state, offset = proof.m, inside["wire_state"], inside["offset"]
     fetch, byte, tail = (state == one for one in (_FETCH, _BYTE, _TAIL))
     proof.lemma((inside["is_report"] & (state != _IDLE)) == reports)
     with m.If(reports):
-        proof.lemma(inside["end"] == _LENGTH)
+        proof.lemma(inside["end"] == length)
         with m.If(fetch | byte):
-            proof.lemma((offset == index) & ((index < _LENGTH) | fetch & (index == _LENGTH) & (inside["tail"] == 0)))
+            proof.lemma((offset == index) & ((index < length) | fetch & (index == length) & (inside["tail"] == 0)))
         with m.If(tail):
-            proof.lemma((inside["tail"] <= CHECK_BYTES) & (index == _LENGTH + inside["tail"]))
+            proof.lemma((inside["tail"] <= CHECK_BYTES) & (index == length + inside["tail"]))
     kept = inside.word("reporter.sent", place)
     writes = inside["reporter.offers"] & (inside["reporter.at"] == place)
+    for constant in (0, length - 1):
+        with m.If(place == constant):
+            proof.lemma(last == empty[constant])
     offered = reports & byte & (index == place)
     proof.lemma(~offered | (inside["reporter.byte"] == expected))
     proof.lemma(Mux(writes, inside["reporter.byte"], kept) == Mux(offered, expected, last))
+
+
+def _sheet(rows: int, columns: int) -> Skin:
+    return Skin(rows=rows, columns=columns, guard=True, settle_us=40)
+
+
+_BUGS = (
+    Bug("no report after a hello", Reporter, "report_due", lambda due, inside: due & ~inside["greeted"]),
+    Bug("a change is missed", Reporter, "watched", lambda _, inside: Const(0)),
+    Bug("a digit is taken too late", Reporter, "byte", lambda byte, inside: byte ^ inside["offers"]),
+    Bug("reports go first", Link, "is_report", lambda _, inside: Const(0)),
+    Bug("the last digit is left out", Link, "end", lambda end, inside: end - inside["take_report"]),
+)
+CASES = (
+    Case("reports are true", "1x1, guard lines", partial(reports_are_true, skin=_sheet(1, 1)), 8, _BUGS, bug_clocks=36),
+    Case("reports are true", "2x3, guard lines", partial(reports_are_true, skin=_sheet(2, 3)), 8, campaign=True),
+)
