@@ -1,4 +1,4 @@
-"""Line reversal with guard lines: each break is told and nothing else, what a check costs, and what moved in a frame."""
+"""Line reversal with guard lines: each break is told and nothing else, when touches are seen, and motion in a frame."""
 
 import itertools
 from dataclasses import dataclass
