@@ -83,6 +83,8 @@ class Top(wiring.Component):
         wiring.connect(m, receiver.bits, request.bits)
         connect_lines(m, self.skin, scan.pins, self)
         self._watch_faults(m, scan, packer)
+        if "faults" in link.signature.members:
+            m.d.comb += link.faults.eq(scan.faults)
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),

@@ -2,14 +2,17 @@
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.driver import open, read_zones
+from contactfpga.driver.silence import Silence
 from contactfpga.driver.stats import Stats
-from contactfpga.driver.subscription import Subscription
+from contactfpga.driver.subscription import Events, Subscription
 from contactfpga.errors import (
     BoardClosed,
     BoardSilent,
     ContactFPGAError,
     MissingExtra,
     MissingTool,
+    NoData,
+    NoSuchCommand,
     OnlyNoise,
     PortLost,
     PortNotFound,
@@ -21,6 +24,7 @@ from contactfpga.errors import (
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zone, Zones
@@ -35,15 +39,21 @@ __all__ = [
     "BoardClosed",
     "BoardSilent",
     "ContactFPGAError",
+    "Events",
+    "Faults",
     "Hello",
     "MissingExtra",
     "MissingTool",
+    "NoData",
+    "NoSuchCommand",
     "OnlyNoise",
     "PortLost",
     "PortNotFound",
     "ReadTimeout",
     "ReplayEnded",
+    "SelfTestSlot",
     "Sheet",
+    "Silence",
     "Skin",
     "SkinError",
     "SkinMismatch",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 UNSOLVED = 3
 """Exit status of a command whose answer is that there is no solution."""
 
@@ -30,12 +32,25 @@ class ReadTimeout(ContactFPGAError, TimeoutError):
     """The board answered, but no complete frame came in time."""
 
 
+class NoData(ReadTimeout):
+    """No frame came for longer than the reader allows; ``silence`` tells how long, and what came last."""
+
+    def __init__(self, message: str, silence: Any):
+        super().__init__(message)
+        self.silence = silence
+        """A :class:`~contactfpga.Silence`."""
+
+
 class BoardSilent(ReadTimeout):
     """Not one byte came in time."""
 
 
 class OnlyNoise(ReadTimeout):
     """Bytes came, and not one valid packet among them."""
+
+
+class NoSuchCommand(ContactFPGAError):
+    """The board does not take this command."""
 
 
 class ReplayEnded(ContactFPGAError, EOFError):

@@ -85,8 +85,8 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
 
 
-def faults(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[tuple[int, int]]:
-    """(cycle, word) of every change of what the scanner tells of its lines."""
+def told_words(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[int]:
+    """What the scanner tells of its lines in each cycle."""
     dut = Scanner(skin)
     sim, sheet = bench(dut), Stimulus(skin, timeline)
     watched = sim.watch(dut.faults)
@@ -100,7 +100,7 @@ def faults(skin: Skin, timeline: Timeline, cycles: int, bench) -> list[tuple[int
 
     sim.drive(getattr(dut.pins, sheet.drives[0]), levels, Cat(*ports))
     sim.run(cycles)
-    return changes(enumerate(watched.values))
+    return watched.values
 
 
 def changes(words) -> list[tuple[int, int]]:
@@ -131,7 +131,54 @@ def test_what_is_told_of_lines_is_the_golden_models_in_every_clock(bench, soon, 
     skin = SKINS[name]
     timeline, cycles = events(skin, 3 + len(name), 80), max(60 * facts(skin).scan_clocks, 4_000)
     expected = golden(skin, timeline, cycles)
-    assert faults(skin, timeline, cycles, bench) == expected
+    assert changes(enumerate(told_words(skin, timeline, cycles, bench))) == expected
     assert len(expected) > 8
     ended = [word & ~later for (_, word), (_, later) in itertools.pairwise(expected)]
     assert any(ended), "nothing was told no more"
+
+
+TURN_BIT = 7
+BREAKS = Skin(rows=3, columns=4, report="cells", settle_us=10, release_us=2, **TINY)
+
+
+def breaks() -> list[tuple[Cuts, int]]:
+    """Each line, guard lines too, cut at each place, and the word that tells it: rows in bits 0 to 2, columns in bits 3
+    to 6. After the last guard switch there is nothing to lose."""
+    found = []
+    for end in range(5):
+        found += [(Cuts({row: end}), 1 << row) for row in range(3)]
+        found.append((Cuts({3: end}), (0b1111 << end & 0b1111) << 3))
+    for end in range(4):
+        found += [(Cuts({}, {column: end}), 1 << 3 + column) for column in range(4)]
+        found.append((Cuts({}, {4: end}), 0b111 << end & 0b111))
+    return found
+
+
+@pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
+def test_each_single_break_at_each_place_is_told_within_two_frames_and_nothing_else(bench, monkeypatch, diodes):
+    """Whatever is pressed. Cut in any clock of a frame; mended, and told no more after the clock's next turn."""
+    monkeypatch.setattr(raster, "RETRY_BIT", TURN_BIT)
+    skin, rng = BREAKS.replace(diodes=diodes), np.random.default_rng(7)
+    frame, turn = facts(skin).scan_clocks, 1 << TURN_BIT
+    spacing = 5 * frame + 2 * turn
+    at = [number * spacing + int(rng.integers(frame)) for number in range(len(breaks()))]
+    cuts = [(start, cut) for start, (cut, _) in zip(at, breaks(), strict=True)]
+    cuts += [(start + 2 * frame, Cuts()) for start in at]
+    cycles = len(at) * spacing
+    pieces = [(start, rng.random((3, 4)) < rng.random(), None) for start in range(0, cycles, frame // 2)]
+    words = told_words(skin, Timeline(pieces, cuts=sorted(cuts, key=lambda cut: cut[0])), cycles, bench)
+    for start, (cut, wanted) in zip(at, breaks(), strict=True):
+        meanwhile = words[start : start + spacing - frame]
+        assert {word | wanted for word in meanwhile} == {wanted}, cut
+        assert words[start + 2 * frame + 3] == wanted, cut
+        assert words[start + 4 * frame + turn + 3] == 0, cut
+
+
+def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, rng):
+    skin = Skin(rows=2, columns=3, report="cells", settle_us=10, release_us=2, **TINY)
+    frame = facts(skin).scan_clocks
+    every = [np.array([number >> bit & 1 for bit in range(6)], bool).reshape(2, 3) for number in range(64)]
+    pieces = [(number * frame, cells, None) for number, cells in enumerate(every)]
+    start = len(every) * frame
+    pieces += [(clock, every[rng.randrange(64)], None) for clock in range(start, start + 20 * frame, 5)]
+    assert set(told_words(skin, Timeline(pieces), start + 20 * frame, bench)) == {0}

@@ -16,7 +16,7 @@ KINDS = {
     "direct": {"settle_us": 12},
     "precharged": {"settle_us": 12, "precharge_us": 2, "release_us": 4},
     "chains": {"row_drive": "74hc595", "column_read": "74hc165", "row_chains": 2, "column_chains": 2},
-    "adaptive": {"settle_us": 12, "release_us": 8, "scan": "adaptive"},
+    "adaptive": {"settle_us": 17, "release_us": 8, "scan": "adaptive"},
     "reversal": {"settle_us": 2, "precharge_us": 1, "release_us": 3, "scan": "reversal"},
 }
 

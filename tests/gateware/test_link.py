@@ -1,21 +1,28 @@
 """The link: which packet goes out when, and what is in it, against a replay of the rules of docs/timing.md."""
 
-import dataclasses
 import struct
 import zlib
 from unittest import mock
 
 import pytest
-from amaranth.hdl import Module
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In
+from link_bench import (
+    ITEM_BYTES,
+    SUMMARY,
+    TAG,
+    TRAILER_BYTES,
+    Frame,
+    PackerAndLink,
+    decisions,
+    frame_of,
+    packets_of,
+    random_frames,
+    sealed,
+    varying_stalls,
+)
 
 from contactfpga import Skin
 from contactfpga_hdl.link import link as link_module
 from contactfpga_hdl.link import odometer
-from contactfpga_hdl.link.link import Link, offset_bits
-from contactfpga_hdl.link.pack import Packer
-from contactfpga_hdl.report.backlog import Backlog
 
 SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000}  # a scan takes 20.004 ms
 SKINS = {
@@ -27,61 +34,10 @@ SKINS = {
 }
 KEEP_ALIVE = {"on change": 4, "every scan": 1, "cells on change": 4}  # scans
 HELLO_EVERY = 24
-ITEM_BYTES = {"moments": 2, "cells": 1}  # 5 + 5 + 5 bits, 4 bits
-TRAILER_BYTES = 7  # 24 + 8 + 3 + 5 + 4 + 4 bits and the last byte
-TAG = {"time": 24, "stuck": 3, "fault": 1, "heard": 3, "requested": 1}
-SUMMARY = {"cells": 5, "zones": 4, "overflow": 1, "mismatch": 1, "changed": 1}
-
-
-@dataclasses.dataclass
-class Frame:
-    items: list
-    facts: dict
-    not_before: list = dataclasses.field(default_factory=list)  # of the items and the end mark
-
-
-class PackerAndLink(wiring.Component):
-    """Backlog, packer and link as the top joins them."""
-
-    def __init__(self, skin):
-        self.skin = skin
-        self.backlog, self.packer, self.link = Backlog(skin), Packer(skin, offset_bits(skin)), Link(skin)
-        members = self.link.signature.members
-        outside = {name: members[name] for name in ("tag", "summary", "asked", "epoch", "number", "bytes")}
-        super().__init__({"items": In(self.backlog.passed.signature.flip()), **outside})
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules += [self.backlog, self.packer, self.link]
-        wiring.connect(m, wiring.flipped(self.items), self.backlog.passed)
-        wiring.connect(m, self.backlog.waiting, self.packer.items)
-        wiring.connect(m, self.packer.frames, self.link.frames)
-        wiring.connect(m, self.link.bytes, wiring.flipped(self.bytes))
-        for part in (self.packer, self.link):
-            m.d.comb += [part.tag.eq(self.tag), part.summary.eq(self.summary)]
-        m.d.comb += [getattr(self.link, name).eq(getattr(self, name)) for name in ("asked", "epoch", "number")]
-        return m
 
 
 def skin_of(name):
     return Skin(**SHEET, **SKINS[name])
-
-
-def sealed(plain, before=b""):
-    """COBS, check bytes and delimiter for a packet without long blocks; the check covers ``before`` as well."""
-    stuffed = b"".join(bytes([len(block) + 1]) + block for block in plain.split(b"\0"))
-    crc = crc16(before + stuffed)
-    return stuffed + bytes([128 + crc % 128, 128 + crc // 128 % 128, 128 + crc // 128**2]) + b"\0"
-
-
-def crc16(data):
-    """CRC-16/MCRF4XX, bit by bit in the order of the line."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
-    return crc
 
 
 def hello_of(skin, digits=(0,) * 16):
@@ -97,39 +53,6 @@ def hello_of(skin, digits=(0,) * 16):
     rest += field(6, struct.pack("<II", skin.clock_hz, skin.baud))
     check = field(255, struct.pack("<I", zlib.crc32(first + rest)))
     return b"\0" + sealed(first + field(2, bytes(128 + digit for digit in digits)) + rest + check + b"\x40")
-
-
-def frame_of(skin, frame, sequence, overwritten):
-    facts = frame.facts | {"sequence": sequence, "overwritten": overwritten}
-    widths = {"time": 24, "sequence": 8, "heard": 3, "cells": 5, "zones": 4, "overwritten": 4}
-    word = offset = 0
-    for name, width in (widths | {"overflow": 1, "mismatch": 1, "fault": 1}).items():
-        word |= facts[name] % (1 << width) << offset
-        offset += width
-    size = ITEM_BYTES[skin.report]
-    items = b"".join(item.to_bytes(size, "little") for item in frame.items)
-    word |= (5 if skin.report == "moments" else 6) << offset + 1
-    return sealed(items + word.to_bytes(7, "little"), skin.fingerprint[:2])
-
-
-def random_frames(rng, skin, count, spacing=1):
-    """Frames at least as far apart as the Skin allows, their items somewhere in that time."""
-    size = ITEM_BYTES[skin.report]
-    most = skin.zone_capacity if skin.report == "moments" else 4
-    frames, start = [], 1
-    for index in range(count):
-        items = [rng.randrange(1 << 8 * size - 1) for _ in range(rng.randrange(most + 1))]
-        widths = TAG | SUMMARY
-        facts = {name: rng.randrange(1 << width) for name, width in widths.items()} | {"time": index}
-        facts["requested"] = int(rng.random() < 0.15)
-        if index in (0, 1):  # the first one goes out all the same, the second one waits for the keep-alive
-            facts |= {"changed": 0, "requested": 0}
-        length = rng.choice((1, 1, spacing, 3 * spacing)) * (most * size + 32)
-        end = start + length - 1
-        times = sorted(rng.sample(range(start, end), len(items)))
-        frames.append(Frame(items, facts, [*times, end]))
-        start += length
-    return frames
 
 
 def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, after=400):
@@ -157,23 +80,6 @@ def run(bench_of_skin, skin, frames, ready, asked=(), number=lambda cycle: 0, af
     sim.run(frames[-1].not_before[-1] + after)
     assert source.transfers == [at for frame in frames for at in frame.not_before], "the link never stalls"
     return sink
-
-
-def decisions(skin, frames, keep_alive):
-    """(cycle of the decision, whether sent) for each frame: none of it depends on the wire."""
-    size, free, idle, out = ITEM_BYTES[skin.report], 0, None, []
-    for frame in frames:
-        for put in frame.not_before[:-1]:
-            free = max(put + 2, free) + size
-        taken = max(frame.not_before[-1] + 2, free)
-        idle = None if idle is None else idle + 1
-        facts = frame.facts
-        sent = skin.send == "always" or bool(facts["changed"] or facts["requested"])
-        sent = sent or idle is None or idle == keep_alive
-        idle = 0 if sent else idle
-        free = taken + (TRAILER_BYTES + 2 if sent else 1)
-        out.append((taken, sent))
-    return out
 
 
 def replay(skin, frames, delimiters, cycles, asked=(), keep_alive=None):
@@ -218,31 +124,6 @@ def hello_sent(skin, sink, begun, sent, number=lambda cycle: 0, stuck=lambda cyc
     digits = [sent >> 7 * place & 127 for place in range(7)] + [0] * 4
     digits += [number(taken[11 + place]) >> 7 * place & 127 for place in range(3)] + [stuck(taken[14]), 0]
     return hello_of(skin, digits)
-
-
-def packets_of(sink):
-    """(cycle in which the first byte was offered, bytes) of every packet, and when its delimiter was taken."""
-    packets, ends, current, begun, before = [], [], b"", 0, 0
-    for offered, (cycle, byte) in zip(sink.offered, sink.transfers):
-        if not current:
-            begun = offered
-        else:
-            assert offered - before <= 2, "bytes follow without a gap"
-        current, before = current + bytes([byte]), cycle
-        if not byte and len(current) > 1:
-            packets.append((begun, current))
-            ends.append(cycle)
-            current = b""
-    return packets, ends
-
-
-def varying_stalls(rng, cycles):
-    """Whether the wire is ready in each cycle: now fast, now hardly ever."""
-    levels = []
-    while len(levels) < cycles:
-        rate = rng.choice((1.0, 0.5, 0.15, 0.05, 0.02))
-        levels += [rng.random() < rate for _ in range(rng.choice((100, 400, 1200)))]
-    return levels
 
 
 @pytest.mark.parametrize("name", SKINS)

@@ -9,7 +9,7 @@ from amaranth.lib import wiring
 from contactfpga.wire import framing, protocol
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
-from contactfpga_sim.golden.request import heard, pulses, request
+from contactfpga_sim.golden.request import command, heard, pulses, request
 
 BITS = (2, 3)
 IDLE = 5
@@ -183,3 +183,25 @@ def test_a_request_in_the_other_form_is_none(listen, rng):
         assert [got[1:] for got in listen(line(both, listen.bit))[0]] == [(number, True)]
         assert [one.number for one in heard([(0, both)], 4).requests] == [number]
         assert heard([(0, both)], 4).numbers[-1][1] == number
+
+
+def test_commands_come_as_pulses_too(bench, rng):
+    dut = RequestReader(commands=True)
+    for clocks in BITS:
+        sent = [(rng.randrange(1, 1 << 21), rng.randrange(128), rng.randrange(1 << 21)) for _ in range(3)]
+        data = b"".join(command(*one, hello=True, bit_clocks=clocks) for one in sent)
+        assert [(one.number, *one.command) for one in heard([(0, data)], clocks, commands=True).requests] == sent
+        assert heard([(0, data)], clocks).requests == []
+    whole = Module()
+    receiver = PulseReceiver(BITS[0])
+    whole.submodules += [receiver, dut]
+    wiring.connect(whole, receiver.bits, dut.bits)
+    sim = bench(whole)
+    data = b"".join(command(*one, hello=True, bit_clocks=BITS[0]) for one in sent)
+    levels = [1] * IDLE + line(data, BITS[0])
+    sim.drive(receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    command_, what, value, number = (sim.watch(port) for port in (dut.command, dut.what, dut.value, dut.number))
+    sim.run(len(levels) + 12)
+    cycles = [cycle for cycle, high in enumerate(command_.values) if high]
+    assert [(number[cycle + 1], what[cycle], value[cycle]) for cycle in cycles] == sent
+    assert cycles == [one.cycle for one in heard([(IDLE, data)], BITS[0], commands=True).requests]

@@ -1,4 +1,4 @@
-"""What the board takes for a request among the bytes it receives."""
+"""What the board takes for a request or a command among the bytes it receives."""
 
 import pytest
 from amaranth.hdl import Elaboratable, Module
@@ -8,6 +8,7 @@ from wire import check
 
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver
+from contactfpga_sim.golden.request import heard
 
 BIT = 3
 BYTE = 10 * BIT
@@ -16,8 +17,8 @@ BYTE = 10 * BIT
 class Listener(Elaboratable):
     """A receive pin and what is read from it."""
 
-    def __init__(self):
-        self.receiver, self.reader = Receiver(BIT), RequestReader()
+    def __init__(self, bit_clocks=BIT, commands=False):
+        self.receiver, self.reader = Receiver(bit_clocks), RequestReader(commands)
 
     def elaborate(self, platform):
         m = Module()
@@ -54,8 +55,52 @@ def listen(bench):
     return listen
 
 
+@pytest.fixture(scope="module")
+def obey(bench):
+    """(number, hello, command) of all that a board takes that obeys, in bytes whose bits come one per clock; command:
+    (what, value) or None."""
+    dut = RequestReader(commands=True)
+    sim = bench(dut)
+
+    def obey(data):
+        events = []  # level, bit, index, good
+        for byte in data:
+            events += [(byte >> index & 1, 1, index, 0) for index in range(8)] + [(1, 0, 0, 1)]
+        events += [(1, 0, 0, 0)] * 2
+        for place, name in enumerate(("level", "bit", "index", "good")):
+            sim.drive(getattr(dut.bits, name), lambda cycle, place=place: events[min(cycle, len(events) - 1)][place])
+        seen = {name: sim.watch(getattr(dut, name)) for name in OUTPUTS}
+        sim.run(len(events))
+        return [one[1:] for one in taken(seen)]
+
+    return obey
+
+
+OUTPUTS = ("received", "hello", "number", "heard", "command", "what", "value")
+
+
+def taken(seen):
+    """(cycle, number, hello, command) of what was taken."""
+    found = []
+    for cycle, received in enumerate(seen["received"].values):
+        assert received or not seen["command"][cycle]
+        if received:
+            assert seen["heard"][cycle + 1] == seen["number"][cycle + 1] % 8
+            command = (seen["what"][cycle], seen["value"][cycle]) if seen["command"][cycle] else None
+            found.append((cycle, seen["number"][cycle + 1], bool(seen["hello"][cycle]), command))
+    return found
+
+
 def plain(number, hello=False, kind=5):
     return bytes(0x80 | number >> 7 * place & 0x7F for place in range(3)) + bytes([kind << 4 | hello])
+
+
+def order(number, what, value=0, hello=False, kind=10):
+    """A command's plain bytes."""
+    fields = ((number, 3), (what, 1), (value, 3))
+    return bytes(0x80 | one >> 7 * place & 0x7F for one, count in fields for place in range(count)) + bytes(
+        [kind << 4 | hello]
+    )
 
 
 def sealed(plain):
@@ -158,3 +203,93 @@ def test_any_bytes_hold_the_requests_that_a_reader_of_whole_packets_finds(listen
 def agrees(packet):
     """In the bits of the CRC."""
     return all((a ^ b) & mask == 0 for a, b, mask in zip(check(packet[:5]), packet[5:], (0x7F, 0x7F, 3)))
+
+
+# ---- commands
+
+
+@pytest.mark.parametrize(("what", "value"), [(1, 0), (2, 77), (127, (1 << 21) - 1), (0, 0x155555)])
+@pytest.mark.parametrize("hello", [False, True])
+def test_a_command_is_taken_with_its_closing_delimiter(obey, what, value, hello):
+    assert obey(b"\0" + sealed(order(0x15A2D1, what, value, hello))) == [(0x15A2D1, hello, (what, value))]
+
+
+def test_a_board_without_commands_ignores_them(bench):
+    dut = Listener()
+    assert not hasattr(dut.reader, "command")
+    sim = bench(dut)
+    data = b"\0" + sealed(order(9, 1)) + sealed(plain(10))
+    levels = [1] * 5
+    for byte in data:
+        levels += [bit for bit in [0, *(byte >> index & 1 for index in range(8)), 1] for _ in range(BIT)]
+    sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    received, number = sim.watch(dut.reader.received), sim.watch(dut.reader.number)
+    sim.run(len(levels) + 12)
+    assert [number[cycle + 1] for cycle, taken in enumerate(received.values) if taken] == [10]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        sealed(order(9, 1, kind=5)),
+        sealed(order(9, 1, kind=11)),
+        sealed(order(9, 1)[1:]),
+        sealed(b"\x81" + order(9, 1)),
+        sealed(order(9, 1) + b"\xa1"),
+        sealed(plain(9, kind=10)),
+        sealed(order(9, 1))[:-2] + b"\0",
+    ],
+)
+def test_what_is_no_command_is_passed_over_and_the_next_one_taken(obey, data):
+    found = obey(b"\0" + data + b"\0" + sealed(order(10, 1)) + sealed(plain(11)))
+    assert found == [(10, False, (1, 0)), (11, False, None)]
+
+
+def test_no_flip_of_a_bit_makes_another_command(obey):
+    """Every one. Five bits of the last check byte and one of each other say nothing: these commands are taken."""
+    whole = sealed(order(0x12345 | 1, 1, 0x54321, True))
+    bits = 8 * (len(whole) - 1)
+    word = int.from_bytes(whole, "little")
+    data = b"".join(b"\0" + (word ^ 1 << bit).to_bytes(len(whole), "little") for bit in range(bits))
+    found = obey(data + b"\0")
+    assert set(found) == {(0x12345 | 1, True, (1, 0x54321))}
+    assert len(found) == 1 + 1 + 6
+
+
+def test_no_burst_of_up_to_sixteen_bits_makes_another_command(obey, rng):
+    """Of every third start and each length one."""
+    sent = (0x12345 | 1, True, (1, 0x54321))
+    whole = sealed(order(0x12345 | 1, 1, 0x54321, True))
+    bits = 8 * (len(whole) - 1)
+    word = int.from_bytes(whole, "little")
+    data = b""
+    for start in range(rng.randrange(3), bits, 3):
+        for length in rng.sample(range(1, min(16, bits - start) + 1), min(4, bits - start)):
+            inner = rng.randrange(1 << max(0, length - 2)) << 1 if length > 2 else 0
+            data += b"\0" + (word ^ (1 | inner | 1 << length - 1) << start).to_bytes(len(whole), "little")
+    assert set(obey(data + b"\0")) <= {sent}
+
+
+def test_any_bytes_hold_what_the_model_finds(bench, rng):
+    """Requests, commands, parts of some, anything: in each clock, the number too."""
+    bit_clocks = 4
+    dut = Listener(bit_clocks, commands=True)
+    data = b"\0"
+    for _ in range(40):
+        asks = rng.random() < 0.5
+        number = rng.randrange(1 << 21)
+        command = order(number, rng.randrange(128), rng.randrange(1 << 21), asks, rng.choice([10, 10, 5]))
+        part = rng.choice([sealed(plain(number, asks)), sealed(command), sealed(command), b"\0", rng.randbytes(3)])
+        data += part[: rng.randrange(len(part) + 1)] if rng.random() < 0.2 else part
+    levels = [1] * 5
+    for byte in data:
+        levels += [bit for bit in (0, *(byte >> index & 1 for index in range(8)), 1) for _ in range(bit_clocks)]
+    sim = bench(dut)
+    sim.drive(dut.receiver.pin, lambda cycle: levels[cycle] if cycle < len(levels) else 1)
+    seen = {name: sim.watch(getattr(dut.reader, name)) for name in OUTPUTS}
+    sim.run(len(levels) + 12)
+    told = heard([(5, data)], bit_clocks, commands=True)
+    assert taken(seen) == [(one.cycle, one.number, one.hello, one.command) for one in told.requests]
+    assert seen["number"].values == [told.number(cycle) for cycle in range(len(levels) + 12)]
+    assert sum(one.command is not None for one in told.requests) > 4
+    assert sum(one.command is None for one in told.requests) > 2

@@ -1,6 +1,6 @@
 """A board as docs/protocol.md has it, without a line: it counts, keeps time and hears requests."""
 
-from wire import EPOCH_US, Wire, requests_in
+from wire import EPOCH_US, Wire, taken_in
 
 from contactfpga_sim.golden.request import heard
 from contactfpga_sim.golden.uart import pulsed
@@ -20,6 +20,7 @@ class ModelBoard:
     def __init__(self, skin):
         self.wire = Wire(skin)
         self.moments = [ZONE]
+        self.commanded = []  # (what, value) of each command taken
         self.power_up()
 
     def power_up(self):
@@ -28,6 +29,7 @@ class ModelBoard:
         self.heard = 0
         self.overwritten = 0
         self.stuck = 0
+        self.word = 0  # what it knows of its lines
         self.told = None  # the number that a hello repeats, where what follows a request may hide it
         self._taken = 0
         self._heard_bytes = b""
@@ -52,19 +54,25 @@ class ModelBoard:
         state = {"sent": self.sent, "epoch": self.time_us // EPOCH_US, "heard": told, "stuck": self.stuck}
         return self.wire.hello(**state | options)
 
+    def report(self) -> bytes:
+        return self.wire.report(self.word)
+
     def hear(self, data) -> list:
         """(number, whether a hello is asked for) of the requests that these bytes complete."""
         if pulsed(self.wire.known.bit_clocks):
             return self._hear_pulses(data)
         *packets, self._heard_bytes = (self._heard_bytes + data).split(b"\0")
-        found = requests_in(packets)
-        for number, _ in found:
-            self.heard = number
-        return found
+        found = taken_in(packets)
+        for number, _, command in found:
+            if command is None or self.wire.skin.self_test:
+                self.heard = number
+                self.commanded += [] if command is None else [command]
+        return [one[:2] for one in found]
 
     def _hear_pulses(self, data) -> list:
         self._heard_bytes += data
-        found = heard([(0, self._heard_bytes)], self.wire.known.bit_clocks)
+        found = heard([(0, self._heard_bytes)], self.wire.known.bit_clocks, self.wire.skin.self_test)
+        self.commanded = [one.command for one in found.requests if one.command is not None]
         new = [(one.number, one.hello) for one in found.requests][self._taken :]
         self._taken += len(new)
         for number, _ in new:

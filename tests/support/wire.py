@@ -12,7 +12,7 @@ from contactfpga_sim.golden.request import request
 
 __all__ = ["check", "crc16", "request"]  # some tests take apart what others take whole
 
-HELLO, ZONES, CELLS, BARYCENTERS, REQUEST = 4, 5, 6, 7, 5
+HELLO, ZONES, CELLS, BARYCENTERS, REQUEST, FAULTS, COMMAND = 4, 5, 6, 7, 5, 9, 10
 FLAGS = {"overflow": 1, "mismatch": 2, "fault": 4}
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
 EPOCH_US = 2**22
@@ -47,16 +47,22 @@ def undigits(data) -> int:
 
 def requests_in(packets) -> list:
     """(number, whether a hello is asked for) of each packet of a host that a board takes."""
+    return [taken[:2] for taken in taken_in(packets)]
+
+
+def taken_in(packets) -> list:
+    """The same with (what, value) of a command, or None."""
     found = []
     for packet in packets:
-        if len(packet) != 8 or check(packet[:-3]) != packet[-3:]:
+        if len(packet) not in (8, 12) or check(packet[:-3]) != packet[-3:]:
             continue
         plain = cobs.decode(packet[:-3])
-        assert plain[3] in (0x50, 0x51)
+        command = (undigits(plain[3:4]), undigits(plain[4:7])) if len(packet) == 12 else None
+        assert plain[-1] >> 1 == (REQUEST if command is None else COMMAND) << 3
         number = undigits(plain[:3])
         assert all(byte > 0x80 for byte in plain[:3])
         assert number % 8
-        found.append((number, plain[3] == 0x51))
+        found.append((number, bool(plain[-1] & 1), command))
     return found
 
 
@@ -116,6 +122,16 @@ class Wire:
         """A frame with ``report = "cells"``."""
         return self.seal(self.plain_cells(bitmap, **options))
 
+    def report(self, word) -> bytes:
+        """What the board knows of its lines."""
+        return self.seal(digits(word, -(-self.known.fault_bits // 7)) + last_byte(FAULTS))
+
+    def slot(self, number, rows, columns) -> bytes:
+        """A slot of the self-test."""
+        word = rows | columns << self.skin.rows
+        size = -(-(self.skin.rows + self.skin.columns) // 7)
+        return self.seal(digits(number, 2) + digits(word, size) + bytes([FAULTS << 4 | 1]))
+
     def facts(self) -> dict:
         """Fields of a hello by type, in order, but for state and check."""
         skin = self.skin
@@ -123,7 +139,7 @@ class Wire:
         bits = skin.barycenter_bits if skin.report == "barycenter" else 0
         sizes = (skin.rows, skin.columns, skin.connectivity, report, bits, skin.send == "on_change")
         facts = {
-            SHEET: struct.pack("<BBBBBBHBB", *sizes, skin.zone_capacity, skin.diodes == "none", 0),
+            SHEET: struct.pack("<BBBBBBHBB", *sizes, skin.zone_capacity, skin.diodes == "none", skin.guard),
             PITCH: struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm),
         }
         if skin.radius_mm is not None:
@@ -132,6 +148,8 @@ class Wire:
         facts[RATES] = struct.pack("<II", skin.clock_hz, skin.baud)
         if skin.name:
             facts[NAME] = skin.name.encode()
+        if skin.self_test:
+            facts[COMMANDS] = b"\x01"
         return facts
 
     def hello_fields(self, *, sent=0, epoch=0, heard=0, stuck=0, facts=None) -> list:

@@ -1,4 +1,4 @@
-"""Whole frames from the packer to the wire, newest first, and hellos between them."""
+"""Whole frames from the packer to the wire, newest first, and hellos and reports of faults between them."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import crc, memory, stream, wiring
@@ -7,9 +7,10 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, HELLO_BIT, KEEP_ALIVE_BIT, TIME_BITS, Derived
 from contactfpga.wire import protocol
+from contactfpga_hdl.link.faults import Reporter, slots_layout
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
-from contactfpga_hdl.payloads import summary_layout, tag_layout
+from contactfpga_hdl.payloads import faults_layout, summary_layout, tag_layout
 
 HELLO_REGION = 3
 """The others hold frames."""
@@ -25,6 +26,8 @@ class _Wire:
         self.take_frame = Signal()  # the frame that waits is next
         self.take_hello = Signal()
         self.is_hello = Signal()
+        self.take_report = Signal()
+        self.is_report = Signal()
         self.offset = Signal(offset_bits(skin))  # of the byte on offer, in its region
         self.fetches = Signal()  # that byte is read
 
@@ -49,6 +52,9 @@ class Link(wiring.Component):
 
     The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
 
+    A hello goes first, then a report of faults, then a frame; but a frame that waits is next after a report, so that
+    it waits for one at most, and one more per hello.
+
     frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
     asked (in): high for a clock when a hello is wanted.
@@ -56,12 +62,14 @@ class Link(wiring.Component):
     time (in): of a scan that waits, its clock in us.
     due (out): a frame is to be sent though nothing has changed.
     number (in): of the last request.
+    faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
+        faults = faults_layout(self.derived)
         super().__init__(
             {
                 "frames": In(frames_signature(self.derived, offset_bits(skin))),
@@ -72,6 +80,8 @@ class Link(wiring.Component):
                 "time": In(TIME_BITS),
                 "due": Out(1),
                 "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
+                **({"faults": In(faults)} if faults.size else {}),
+                **({"slots": In(stream.Signature(slots_layout(self.derived)))} if skin.self_test else {}),
                 "bytes": Out(stream.Signature(8)),
             }
         )
@@ -84,8 +94,36 @@ class Link(wiring.Component):
         frames_sent = self._decide(m, wire, regions)
         self._time_hello(m, wire, hello_due)
         byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
-        self._send(m, wire, regions, hello_due, byte)
+        reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
+        if reporter is not None:
+            byte = Mux(wire.is_report, reporter.byte, byte)
+        self._send(m, wire, regions, hello_due, byte, reporter)
         return m
+
+    def _reporter(self, m: Module, wire: _Wire) -> Reporter:
+        m.submodules.reporter = reporter = Reporter(self.skin)
+        m.d.comb += [
+            reporter.word.eq(self.faults),
+            reporter.greeted.eq(wire.take_hello),
+            reporter.taken.eq(wire.take_report),
+            reporter.sends.eq(wire.is_report & ~wire.idle),
+            reporter.place.eq(wire.offset),
+            reporter.fetches.eq(wire.fetches),
+        ]
+        if self.skin.self_test:
+            wiring.connect(m, wiring.flipped(self.slots), reporter.slots)
+        return reporter
+
+    def _take_report(
+        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value, reporter: Reporter
+    ) -> None:
+        """Before a frame, but not after another report."""
+        m.d.comb += wire.take_report.eq(reporter.due & ~hello_due & ~(wire.is_report & regions.waits))
+        m.d.sync += wire.is_report.eq(wire.take_report)
+        with m.If(wire.take_report):
+            m.d.comb += wire.take_frame.eq(0)
+            m.d.sync += end.eq(reporter.length)
+            m.next = "FETCH"
 
     def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
         with m.If(wire.take_frame):
@@ -186,15 +224,18 @@ class Link(wiring.Component):
         in_state = wire.is_hello & (wire.offset >> STATE_PLACE_BITS == protocol.STATE_OFFSET >> STATE_PLACE_BITS)
         return Mux(in_state, Cat(digit, Const(1, 1)), read.data)
 
-    def _send(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value) -> None:
+    def _send(
+        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value, reporter: Reporter | None
+    ) -> None:
         end = Signal.like(wire.offset)
-        seeds = Signal()  # one clock after a frame was taken
+        seeded = wire.take_frame if reporter is None else wire.take_frame | wire.take_report
+        seeds = Signal()  # one clock after a frame or a report was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
         tail = Signal(range(CHECK_BYTES + 1))
-        m.d.sync += seeds.eq(wire.take_frame)
-        m.d.comb += [check.data.eq(byte), check.start.eq(wire.take_hello | wire.take_frame)]
-        with m.If(wire.take_frame):
+        m.d.sync += seeds.eq(seeded)
+        m.d.comb += [check.data.eq(byte), check.start.eq(wire.take_hello | seeded)]
+        with m.If(seeded):
             m.d.comb += [check.data.eq(first), check.valid.eq(1)]
         with m.Elif(seeds):
             m.d.comb += [check.data.eq(second), check.valid.eq(1)]
@@ -212,6 +253,8 @@ class Link(wiring.Component):
                 ]
                 with m.If(hello_due | regions.waits):
                     m.next = "FETCH"
+                if reporter is not None:
+                    self._take_report(m, wire, regions, hello_due, end, reporter)
             with m.State("FETCH"):
                 m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"

@@ -1,64 +1,101 @@
-"""What the host asks for: requests among the bytes at the receive pin (docs/protocol.md)."""
+"""What the host asks for: requests and commands among the bytes at the receive pin (docs/protocol.md)."""
 
-from amaranth.hdl import Const, Module, Signal, Value
+from typing import Any
+
+from amaranth.hdl import Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import CHECK_BYTES, HEARD_BITS
 from contactfpga.wire import protocol
+from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
-_CODE, _NUMBER, _KIND, _CHECK, _WHOLE = 0, 1, 1 + protocol.HEARD_DIGITS, 2 + protocol.HEARD_DIGITS, 8
-"""Places in a packet: the stuffing's code, the first digit, the last byte, the first check byte; and its length."""
+_NUMBER, _WHAT = 1, 1 + protocol.HEARD_DIGITS
+"""Places in a packet, counted from the stuffing's code on: the number's first digit, and in a command what it is."""
+_VALUE = _WHAT + WHAT_DIGITS
+_ARGUMENTS = WHAT_DIGITS + VALUE_DIGITS
+_LONG_BIT = 3
+"""Of the code, which is 5 for a request and 9 for a command."""
 
 
 class RequestReader(wiring.Component):
-    """Finds requests bit by bit; nothing but the number and what the check needs is kept.
+    """Finds requests bit by bit; nothing but the number and what the check needs is kept. With ``commands`` it finds
+    these as well, in which what to do and a value come after the number; in requests their places are left out.
 
     ``received`` is high with ``good`` of a request's closing delimiter, which has no bits where it comes as a pulse;
     ``hello`` then says if the request asks for one. From the next clock on ``heard`` holds the lowest bits of its
     number, and ``number`` all of it.
-    ``number`` is 0 again from the clock after the first digit's first bit of any later packet.
+    ``number`` is 0 again from the clock after the first digit's first bit of any later packet. Where it was a command
+    ``command`` is high with ``received``, and ``what`` and ``value`` are its own until the next packet's come.
     """
 
-    def __init__(self):
+    def __init__(self, commands: bool = False):
+        self.commands = commands
+        self._kind = _WHAT + _ARGUMENTS * commands  # the last byte's place
+        self._whole = self._kind + CHECK_BYTES + 1  # bytes up to the delimiter
+        digit = protocol.DIGIT_BITS
+        orders = {"command": Out(1), "what": Out(digit * WHAT_DIGITS), "value": Out(digit * VALUE_DIGITS)}
         super().__init__(
             {
                 "bits": In(LINE_BITS),
                 "received": Out(1),
                 "hello": Out(1),
                 "heard": Out(HEARD_BITS),
-                "number": Out(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
+                "number": Out(digit * protocol.HEARD_DIGITS),
+                **(orders if commands else {}),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        place = Signal(range(_WHOLE + 2), init=_WHOLE + 1)  # bytes since the last delimiter; stays after the last
+        beyond = self._whole + 1
+        place = Signal(range(beyond + 1), init=beyond)  # bytes since the last delimiter; stays after the last
         bit = self.bits.index
         zero = Signal(init=1)  # all bits of this byte so far
+        is_command = self._read_code(m, place, bit)
         with m.If(self.bits.bit):
             m.d.sync += zero.eq(zero & ~self.bits.level)
         with m.If(self.bits.good | self.bits.bad):
             m.d.sync += zero.eq(1)
             with m.If(self.bits.good & zero):
                 m.d.sync += place.eq(0)
-            with m.Elif(self.bits.bad | (place > _WHOLE)):
-                m.d.sync += place.eq(_WHOLE + 1)
+            with m.Elif(self.bits.bad | (place > self._whole)):
+                m.d.sync += place.eq(beyond)
             with m.Else():
                 m.d.sync += place.eq(place + 1)
+                self._leave_out_arguments(m, place, is_command)
         checked = self._check(m, place, bit, restart=self.bits.good & zero)
-        kind_fits = self._read_kind(m, place, bit)
-        m.d.comb += self.received.eq(self.bits.good & zero & (place == _WHOLE) & checked & kind_fits)
+        kind_fits = self._read_kind(m, place, bit, is_command)
+        m.d.comb += self.received.eq(self.bits.good & zero & (place == self._whole) & checked & kind_fits)
         self._keep_number(m, place, bit)
+        if self.commands:
+            m.d.comb += self.command.eq(self.received & is_command)
+            self._keep(m, self.what, _WHAT, _VALUE, place, bit)
+            self._keep(m, self.value, _VALUE, self._kind, place, bit)
         return m
+
+    def _read_code(self, m: Module, place: Value, bit: Value) -> Value:
+        """Whether the packet is as long as a command."""
+        if not self.commands:
+            return Const(0, 1)
+        is_command = Signal()
+        with m.If(self.bits.bit & (place == 0) & (bit == _LONG_BIT)):
+            m.d.sync += is_command.eq(self.bits.level)
+        return is_command
+
+    def _leave_out_arguments(self, m: Module, place: Value, is_command: Value) -> None:
+        if self.commands:
+            with m.If((place == _WHAT - 1) & ~is_command):
+                m.d.sync += place.eq(self._kind)
 
     def _check(self, m: Module, place: Value, bit: Value, restart: Value) -> Value:
         """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these, which leaves all zeros."""
         crc = Signal(16, init=0xFFFF)
-        own = (place == _CHECK) | (place == _CHECK + 1)
-        last = place == _CHECK + CHECK_BYTES - 1
-        counts = (place < _CHECK) | own & (bit != 7) | last & (bit < 2)
+        first = self._kind + 1
+        own = (place == first) | (place == first + 1)
+        last = place == first + CHECK_BYTES - 1
+        counts = (place < first) | own & (bit != 7) | last & (bit < 2)
         feedback = crc[0] ^ self.bits.level
         with m.If(self.bits.bit & counts):
             m.d.sync += crc.eq((crc >> 1) ^ (feedback.replicate(16) & 0x8408))
@@ -66,10 +103,12 @@ class RequestReader(wiring.Component):
             m.d.sync += crc.eq(0xFFFF)
         return crc == 0
 
-    def _read_kind(self, m: Module, place: Value, bit: Value) -> Value:
+    def _read_kind(self, m: Module, place: Value, bit: Value, is_command: Value) -> Value:
         fits = Signal()
         wanted = Const(protocol.last_byte(protocol.KIND_REQUEST), 8).bit_select(bit, 1)
-        with m.If(self.bits.bit & (place == _KIND)):
+        if self.commands:
+            wanted = Mux(is_command, Const(protocol.last_byte(KIND_COMMAND), 8).bit_select(bit, 1), wanted)
+        with m.If(self.bits.bit & (place == self._kind)):
             with m.If(bit == 0):
                 m.d.sync += [self.hello.eq(self.bits.level), fits.eq(1)]
             with m.If(bit >= protocol.FLAG_BITS):
@@ -79,8 +118,12 @@ class RequestReader(wiring.Component):
     def _keep_number(self, m: Module, place: Value, bit: Value) -> None:
         number = Signal.like(self.number)
         whole = Signal()
-        with m.If(self.bits.bit & (place >= _NUMBER) & (place < _KIND) & (bit != 7)):
-            m.d.sync += [number.eq(number >> 1), number[-1].eq(self.bits.level), whole.eq(0)]
+        self._keep(m, number, _NUMBER, _WHAT, place, bit, whole.eq(0))
         with m.If(self.received):
             m.d.sync += [whole.eq(1), self.heard.eq(number)]
         m.d.comb += self.number.eq(number & whole.replicate(len(number)))
+
+    def _keep(self, m: Module, kept: Value, first: int, end: int, place: Value, bit: Value, *also: Any) -> None:
+        """Shift the bits of digits at these places into a register."""
+        with m.If(self.bits.bit & (place >= first) & (place < end) & (bit != 7)):
+            m.d.sync += [kept.eq(kept >> 1), kept[-1].eq(self.bits.level), *also]

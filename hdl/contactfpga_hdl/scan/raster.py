@@ -148,7 +148,8 @@ class Scanner(wiring.Component):
         the frame ended; it is there with the number of stuck columns."""
         skin = self.skin
         m.submodules.told = told = Told(skin)
-        ended, at_end = Signal(), Signal()
+        ended = Signal()
+        at_end = Signal()
         m.d.comb += [
             told.rows.eq((~sample.read[-1]).replicate(skin.rows)),
             told.columns.eq(~sample.read),

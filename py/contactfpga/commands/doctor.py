@@ -38,6 +38,8 @@ class _Report:
 
     def __init__(self, silent: bool):
         self.stats: Stats | None = None
+        self.lines: list[str] | None = None
+        """Names of the faults that the board told last; None: it tells none."""
         self._silent = silent
         self._findings: list[Finding] = []
 
@@ -55,6 +57,7 @@ class _Report:
         return {
             "faults": self.faults,
             "findings": [finding._asdict() for finding in self._findings],
+            "lines": self.lines,
             "stats": self.stats and self.stats.to_dict(),
         }
 
@@ -74,5 +77,6 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
             report.stats = board.stats
             report.add(health.hello(board))
             report.add(health.count(board, args.seconds, args.timeout))
+            report.lines = None if board.faults is None else list(board.faults.names)
     except (ContactFPGAError, ValueError) as error:
         report.add([Finding("fault", str(error))])

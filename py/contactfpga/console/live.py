@@ -13,10 +13,14 @@ from rich.live import Live
 
 from contactfpga.console import terminal
 from contactfpga.driver.board import Board
-from contactfpga.errors import ReplayEnded
+from contactfpga.driver.silence import Silence, longest_pause_s
+from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.zones.zone import Zones
 
 REFRESH_US = 66_667
+
+SILENT_S = 0.2
+"""Without a frame for this long, and what a board may need besides, a display says so."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,8 +53,9 @@ def show(board: Board, args: argparse.Namespace, render: Render) -> int:
             terminal.say(what, sys.stderr, hang=2)
         return _last(board, args, console, render)
     with Live(console=console, auto_refresh=False) as live:
-        for zones in _paced(board, args.timeout):
-            live.update(render(zones, _room(console)), refresh=True)
+        for found in _paced(board, args.timeout, tell_silence=True):
+            shown = str(found) if isinstance(found, Silence) else render(found, _room(console))
+            live.update(shown, refresh=True)
     return 0
 
 
@@ -66,22 +71,29 @@ def _last(board: Board, args: argparse.Namespace, console: Console, render: Rend
         for zones in _paced(board, args.timeout):  # noqa: B007
             pass
     finally:
-        if zones is not None:
+        if isinstance(zones, Zones):
             console.print(render(zones, _room(console, endless=True)))
     return 0
 
 
-def _paced(board: Board, timeout: float) -> Iterator[Zones]:
+def _paced(board: Board, timeout: float, tell_silence: bool = False) -> Iterator[Zones | Silence]:
     """One frame every REFRESH_US of device time, not faster than that in real time.
 
-    A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.
+    A board on a port keeps that pace by itself; the simulated one and a recording would run ahead. With
+    ``tell_silence`` no table stands still: where no frame comes what is yielded says so, until the timeout.
     """
+    wait_s = min(timeout, SILENT_S + longest_pause_s(board.hello, None)) if tell_silence else timeout
     shown_us = -REFRESH_US
     due = time.monotonic()
     skipped = None
     while True:
         try:
-            zones = board.next(timeout)
+            zones = board.next(wait_s)
+        except ReadTimeout:
+            if board.silence.seconds >= timeout:
+                raise
+            yield board.silence
+            continue
         except ReplayEnded:
             if skipped is not None:
                 yield skipped  # the last frame is shown in any case

@@ -7,12 +7,15 @@ from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
 
 from contactfpga.driver.link import Link
+from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
-from contactfpga.driver.subscription import Subscription, checked, frame_of
+from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.command import Command
+from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
@@ -97,6 +100,20 @@ class Board:
         )
 
     @property
+    def faults(self) -> Faults | None:
+        """Faults of its lines as the board last told them, which it does within 1 ms of a change and after each hello;
+        also where it sends no frame. None: none were told, or its Skin has neither ``guard`` nor ``self_test``."""
+        self._link.check_open()
+        return self._link.conversation.lines.told
+
+    @property
+    def silence(self) -> Silence:
+        """How long no frame has come, and which one came last; of a board that is opened, since then."""
+        self._link.check_open()
+        with self._link.changed:
+            return self._link.silence(-math.inf)
+
+    @property
     def stats(self) -> Stats:
         """Counters since the port was opened."""
         stats = self._link.conversation.stats
@@ -129,16 +146,19 @@ class Board:
         """
         return self._frames.next(timeout)
 
-    def latest(self, timeout: float = 1.0) -> Zones:
+    def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
         """The newest frame: the last of all that wait, or the next one when none does. Older ones are dropped.
 
-        Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
+        With ``max_age_s`` no frame that came longer ago, in seconds; as soon as there can be none it raises
+        :class:`NoData`. Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
         """
+        if max_age_s is not None:
+            max_age_s = self._checked("max_age_s", max_age_s)
         if self._live:
             if not self._threaded:
                 self._link.take_what_came()
             self._frames.keep_last()
-        return self._frames.next(timeout)
+        return self._frames.next(timeout) if max_age_s is None else self._frames.newest(max_age_s, checked(timeout))
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds, as numpy arrays (:class:`Batch`).
@@ -147,10 +167,41 @@ class Board:
         """
         return self._frames.batch(max_s, timeout)
 
-    def subscribe(self, maxsize: int = 1024) -> Subscription:
-        """A queue of its own for every frame from now on; see :class:`Subscription`."""
+    def subscribe(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Subscription:
+        """A queue of its own for every frame from now on; see :class:`Subscription`.
+
+        With ``deadline_s`` :class:`NoData` is raised where no frame comes for longer. It must be at least what a
+        board that works may need: a scan and a frame on the wire; with ``send = "on_change"`` its keep-alive and
+        a frame. In a recording, which has no times of arrival, it has no effect.
+        """
         self._link.check_open()
-        return Subscription(self._link, maxsize, self)
+        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
+        return Subscription(self._link, maxsize, self, deadline_s)
+
+    def events(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Events:
+        """The same for all that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s`` as for
+        :meth:`subscribe`, but silence is an event like the others."""
+        self._link.check_open()
+        deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
+        return Events(self._link, maxsize, self, deadline_s)
+
+    def _checked(self, name: str, deadline_s: float) -> float:
+        try:
+            skin: Skin | None = self.skin
+        except ContactFPGAError:
+            skin = None
+        return checked_deadline(name, deadline_s, self.hello, skin)
+
+    # ---- commands
+
+    def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
+        """Have the board do something: 1, test its lines. Returns the first complete frame scanned after it took the
+        command; where answers were lost it may have taken it twice.
+
+        ``value`` is the command's, ``timeout`` in seconds. Raises :class:`NoSuchCommand` where the board does not take
+        it, ValueError for numbers that no command has, and as :meth:`read` does.
+        """
+        return frame_of(self._link.command(Command(what, value), checked(timeout)))
 
     def __iter__(self) -> Iterator[Zones]:
         """Every frame, forever; a recording ends."""

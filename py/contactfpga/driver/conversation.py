@@ -12,6 +12,7 @@ import random
 
 import numpy as np
 
+from contactfpga.driver.lines import Lines
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.timeline import MOST_S, Timeline, continues
@@ -20,6 +21,8 @@ from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
 from contactfpga.wire import framing, many, protocol
+from contactfpga.wire.command import Command
+from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
@@ -38,7 +41,7 @@ class Arrival:
     """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
 
 
-Event = Arrival | Hello | SkinMismatch | VersionMismatch
+Event = Arrival | Hello | Faults | SelfTestSlot | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
 """Fewer packets are decoded, and fewer frames taken, faster one by one."""
@@ -60,6 +63,8 @@ class Conversation:
         """The last hello."""
         self.sheet: Sheet | None = None
         """What frames are read with; None until a hello has come, or where it is of another Skin than expected."""
+        self.lines = Lines(expected.mask if expected is not None else ())
+        """What the board says of its lines."""
         self._expected = expected
         self._live = live
         self._requests = Requests(rng)
@@ -79,6 +84,15 @@ class Conversation:
         """
         self._notice(now)
         return self._requests.ask(now, until, hello=not self._timeline.known)
+
+    def command(self, command: Command, now: float, until: float) -> int:
+        """A ticket likewise for a frame that is scanned after the board took this command; one at a time."""
+        self._notice(now)
+        return self._requests.command(command, now, until)
+
+    def end_command(self) -> None:
+        """Do not send the command again."""
+        self._requests.end_command()
 
     def data_to_send(self) -> bytes:
         """What has to be sent to the board now; look after each :meth:`ask` and each :meth:`receive`."""
@@ -127,7 +141,8 @@ class Conversation:
             ends, follows = self._stretches(table.packets, now)
         at = 0
         while at < len(packets) and self._widths is widths and self._before() == before:
-            if follows and table is not None and ends[at] - at >= FEW_IN_RUN:
+            in_run = follows and not self.lines.fading
+            if in_run and table is not None and ends[at] - at >= FEW_IN_RUN:
                 events.append(self._take_run(table, at, ends[at], now))
                 at, follows = ends[at], False
                 continue
@@ -155,7 +170,8 @@ class Conversation:
         times_us = self._timeline.take_run(packets, widths, last, now)
         self._requests.take_frame(last.heard, now)  # all of them carry the same
         self._passed()
-        return Run(widths.sheet, packets, starts, table.records, times_us, now if self._live else None)
+        arrived = now if self._live else None
+        return Run(widths.sheet, packets, starts, table.records, times_us, arrived, self.lines.names(flagged=True))
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
@@ -205,8 +221,11 @@ class Conversation:
         plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)
         if kind == framing.KIND_HELLO:
-            hello = self._reader.take(plain)
-            return None if hello is None else self._take_hello(hello, now)
+            told = self._reader.take(plain)
+            return None if told is None else self._take_hello(told, now)
+        hello = self.hello
+        if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
+            return self._take_lines(plain, hello)
         if kind not in _FRAME_KINDS:
             self.stats.unknown_kinds += 1
             return None
@@ -214,6 +233,14 @@ class Conversation:
             self.stats.foreign_skin += 1
             return None
         return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, now)
+
+    def _take_lines(self, plain: bytes, hello: Hello) -> Faults | SelfTestSlot | None:
+        if is_slot(plain):
+            slot = decode_slot(plain, hello.sheet.rows, hello.sheet.columns)
+            return slot if self._widths is not None else None
+        found = self.lines.take_report(plain, hello)
+        self.stats.fault_reports += 1
+        return found if self._widths is not None else None
 
     def _before(self) -> bytes:
         return protocol.check_prefix(self.hello) if self.hello else b""
@@ -224,7 +251,8 @@ class Conversation:
         if time_us is None:
             return None
         self._requests.take_frame(frame.heard, now)
-        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None)
+        faults = self.lines.names("fault" in frame.flags)
+        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None, faults)
         return Arrival(zones, self._requests.answered)
 
     def _take_hello(self, hello: Hello, now: float) -> Hello | SkinMismatch:
@@ -233,12 +261,17 @@ class Conversation:
         changed = before is not None and (before.fingerprint, before.sheet) != (hello.fingerprint, hello.sheet)
         if changed:
             self.stats.skin_changes += 1
+            self.lines.forget()
             self._timeline = Timeline(self.stats, self._live)
         expected = self._expected
         if expected is not None and hello.fingerprint != expected.fingerprint:
             self.sheet = self._widths = None
             return SkinMismatch(f"{self.port} was built from {difference(hello, expected)}")
+        restarts = self.stats.restarts
         self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
+        if self.stats.restarts > restarts:
+            self.lines.forget()
+        self.lines.take_hello(hello)
         self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud

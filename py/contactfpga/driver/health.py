@@ -11,7 +11,9 @@ from typing import Literal, NamedTuple
 from contactfpga.driver import ports
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
+from contactfpga.wire.faults import STUCK
 from contactfpga.wire.mismatch import report_of
+from contactfpga.zones.zone import Zones
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 RULE_FILE = "/etc/udev/rules.d/70-contactfpga.rules"
@@ -108,6 +110,29 @@ def clock(board_s: float, host_s: float) -> Iterator[Finding]:
         )
 
 
+NEXT_STEPS = {
+    "open": "look for a break in the line, its driver or its connector",
+    "stuck": "it reads pressed while no row is driven: look for a short circuit there",
+    "joined lines": "the self-test found a short circuit between lines",
+    "unnamed fault": "its name has not come yet; run this once more",
+}
+"""What to do about a fault, by the end of its name."""
+
+
+def lines(board: Board, zones: Zones) -> Iterator[Finding]:
+    """What the board says of its lines, and how old that is."""
+    if zones.host_time_s is not None:
+        yield Finding("ok", f"the last frame came {1000 * board.silence.seconds:.0f} ms ago")
+    if zones.faults == (STUCK,):
+        count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"
+        yield Finding("fault", f"{count} read pressed while no row is driven; look for a short circuit there")
+        return
+    told = board.faults.names if board.faults else ()
+    for name in sorted({*zones.faults, *told}):
+        step = next(step for end, step in NEXT_STEPS.items() if name.endswith(end))
+        yield Finding("fault", f"{name}: {step}")
+
+
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     """Frames and losses over some seconds of device time."""
     try:
@@ -139,9 +164,7 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     faults = {"lost": stats.lost, "damaged": stats.damaged.total(), "restarts of the board": stats.restarts}
     told = ", ".join(f"{number} {name}" for name, number in faults.items())
     yield Finding("fault" if any(faults.values()) else "ok", told)
-    if "stuck" in zones.faults:
-        count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"
-        yield Finding("fault", f"{count} read pressed while no row is driven; look for a short circuit there")
+    yield from lines(board, zones)
     for flag in sorted(zones.flags - {"fault"}):
         if flag == "ghost":
             yield Finding("note", "the last frame has zones that may be ghosts: the sheet has no diodes")

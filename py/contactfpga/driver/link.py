@@ -9,9 +9,12 @@ from collections.abc import Callable
 from typing import Protocol
 
 from contactfpga.driver.conversation import Arrival, Conversation, Event
+from contactfpga.driver.silence import Silence
+from contactfpga.driver.told import Told
 from contactfpga.driver.transport import Transport
-from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, OnlyNoise, ReadTimeout
+from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
+from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
@@ -22,14 +25,17 @@ TURN_S = 0.05
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
 
-Found = Zones | ContactFPGAError | Hello | bool
+Found = Zones | Told | ContactFPGAError | Hello | bool
 """What is waited for."""
 
 
 class Listener(Protocol):
     """Takes what comes over a port."""
 
-    def put(self, item: Zones | Run | ContactFPGAError) -> None:
+    all_events: bool
+    """Also what is told between frames."""
+
+    def put(self, item: Zones | Run | Told | ContactFPGAError) -> None:
         """Add what came; the lock :attr:`Link.changed` is held."""
 
 
@@ -58,7 +64,13 @@ class Link:
         self.changed = threading.Condition()
         """To be held while any state is looked at."""
         self.listeners: weakref.WeakSet[Listener] = weakref.WeakSet()
+        self.last: Zones | Run | None = None
+        """What came last."""
+        self.last_s = transport.clock()
+        """When it came."""
+        self._last_bytes = 0  # that had come by then
         self._sending = threading.Lock()
+        self._commanding = threading.Lock()
         self._waiters: list[_Waiter] = []
         self._failure: BaseException | None = None
         self._closing = False
@@ -84,6 +96,44 @@ class Link:
         finally:
             with self.changed:
                 self._waiters.remove(waiter)
+
+    def command(self, command: Command, timeout: float) -> Found:
+        """Have the board do something; the first frame scanned after it took the command, or the error that came in
+        its place. Raises :class:`NoSuchCommand`."""
+        deadline = self.clock() + timeout
+        if not self._commanding.acquire(timeout=timeout):
+            raise ReadTimeout(f"{self.transport.name}: another command was not answered within {timeout:g} s")
+        try:
+            with self.changed:
+                self.check_open()
+                self._check_command(command)
+                waiter = _Waiter(self.conversation.command(command, self.transport.clock(), deadline))
+                self._waiters.append(waiter)
+            try:
+                self._send()
+                return self.wait_for(waiter.look, deadline, timeout)
+            finally:
+                with self.changed:
+                    self._waiters.remove(waiter)
+                    self.conversation.end_command()
+        finally:
+            self._commanding.release()
+
+    def _check_command(self, command: Command) -> None:
+        name, hello = self.transport.name, self.conversation.hello
+        if not self.transport.live:
+            raise NoSuchCommand(f"{name} is a recording, which takes no {command}; open the board's port")
+        if hello is None or command.what in hello.commands:
+            return
+        known = COMMANDS.get(command.what)
+        step = f"build its Skin with {known[1]}" if known else f"it takes {sorted(hello.commands) or 'none'}"
+        raise NoSuchCommand(f"{name}: this board takes no {command}; {step}")
+
+    def silence(self, since: float) -> Silence:
+        """How long no frame has come, where someone waits since that moment; the lock is held."""
+        last = self.last[len(self.last) - 1] if isinstance(self.last, Run) else self.last
+        seconds = self.transport.clock() - max(since, self.last_s)
+        return Silence(self.transport.name, seconds, self.conversation.stats.bytes - self._last_bytes, last)
 
     def abandon(self) -> None:
         """Have the reader give the port back: nobody can wait for anything any more. Takes no lock."""
@@ -156,8 +206,14 @@ class Link:
         if isinstance(event, Hello):
             return
         item = event.zones if isinstance(event, Arrival) else event
+        between = isinstance(item, Told)
         for listener in self.listeners:
-            listener.put(item)
+            if listener.all_events or not between:
+                listener.put(item)
+        if between:
+            return
+        if isinstance(item, (Zones, Run)):
+            self.last, self.last_s, self._last_bytes = item, self.transport.clock(), self.conversation.stats.bytes
         if isinstance(event, Run):  # what it answers, the frame before it has answered
             return
         for waiter in self._waiters:
@@ -165,7 +221,8 @@ class Link:
                 continue
             if isinstance(event, Arrival):
                 waiter.found = event.zones if event.answers >= waiter.ticket else None
-            elif self.conversation.sheet is None:  # another Skin that can be read is no trouble for a new frame
+            elif isinstance(event, ContactFPGAError) and self.conversation.sheet is None:
+                # Another Skin that can be read is no trouble for a new frame.
                 waiter.found = event
 
     def _send(self) -> None:

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 import collections
 
+from contactfpga.driver.told import Told
 from contactfpga.errors import ContactFPGAError
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 
 class FrameQueue:
-    """At most ``maxsize`` frames and errors wait; beyond, the oldest are dropped. The board's lock is held."""
+    """At most ``maxsize`` frames, errors and what is told between frames wait; beyond, the oldest are dropped. The
+    board's lock is held."""
 
     def __init__(self, maxsize: int):
         self.maxsize = maxsize
         self.dropped = 0
         """Frames that were not taken in time."""
-        self._items: collections.deque[Zones | Run | ContactFPGAError] = collections.deque()
+        self._items: collections.deque[Zones | Run | Told | ContactFPGAError] = collections.deque()
         self._taken = 0  # frames of the run in front
         self._length = 0
 
     def __len__(self) -> int:
         return self._length
 
-    def put(self, item: Zones | Run | ContactFPGAError) -> None:
+    def put(self, item: Zones | Run | Told | ContactFPGAError) -> None:
         """Add what came."""
         self._items.append(item)
         self._length += _count(item)
@@ -36,7 +38,7 @@ class FrameQueue:
         self._items.appendleft(zones)
         self._length += 1
 
-    def pop(self) -> Zones | ContactFPGAError | None:
+    def pop(self) -> Zones | Told | ContactFPGAError | None:
         """What comes next; None where nothing waits."""
         if not self._items:
             return None
@@ -56,7 +58,7 @@ class FrameQueue:
         """All frames that wait, up to the first error."""
         self._unwrap()
         found: list[Zones | Run] = []
-        while self._items and not isinstance(item := self._items[0], ContactFPGAError):
+        while self._items and isinstance(item := self._items[0], (Zones, Run)):
             found.append(item)
             self._items.popleft()
             self._length -= _count(item)
@@ -83,6 +85,12 @@ class FrameQueue:
                 raise error
         self._unwrap()  # so that the others do not become Python's numbers with it
 
+    def drop_older(self, moment: float) -> None:
+        """Drop a frame that waits alone and came before that moment."""
+        item = self._items[0] if self._length == 1 else None
+        if isinstance(item, Zones) and item.host_time_s is not None and item.host_time_s < moment:
+            self.clear()
+
     def clear(self) -> None:
         """Drop everything."""
         self._items.clear()
@@ -97,7 +105,7 @@ class FrameQueue:
         if self._taken == _count(item):
             self._items.popleft()
             self._taken = 0
-        return 0 if isinstance(item, ContactFPGAError) else count
+        return count if isinstance(item, (Zones, Run)) else 0
 
     def _unwrap(self) -> None:
         """Take the frames out of the run in front that were taken from it."""
@@ -108,5 +116,5 @@ class FrameQueue:
             self._taken = 0
 
 
-def _count(item: Zones | Run | ContactFPGAError) -> int:
+def _count(item: Zones | Run | Told | ContactFPGAError) -> int:
     return len(item) if isinstance(item, Run) else 1

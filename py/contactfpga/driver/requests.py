@@ -8,6 +8,7 @@ import random
 
 from contactfpga.skin.widths import HEARD_BITS
 from contactfpga.wire import protocol
+from contactfpga.wire.command import Command, encode_command
 
 MOST_APART = 5
 """Steps between the last number that a frame repeated and the last one sent with which another one may be sent: frames
@@ -28,7 +29,8 @@ class _Stage(enum.Enum):
 class Requests:
     """Numbers requests, and tells which ones a frame answers.
 
-    Who asks gets a ticket; tickets are counted from 1. One request may stand for several tickets.
+    Who asks gets a ticket; tickets are counted from 1. One request may stand for several tickets. A command is a
+    request, too: while one is not answered, nothing else is sent, so that its ticket is answered by itself alone.
     """
 
     def __init__(self, rng: random.Random | None = None):
@@ -47,6 +49,10 @@ class Requests:
         self._number = 0
         self._step = self._seen = 0  # of the numbers last sent and last seen, counted
         self._stands_for: dict[int, int] = {}  # step: ticket
+        self._command: Command | None = None
+        self._commanding = 0  # its ticket
+        self._command_until = 0.0
+        self._in_flight = False  # the command was sent since the stage is known
         self._recent: collections.deque[int] = collections.deque(maxlen=MOST_APART + 1)
 
     def ask(self, now: float, until: float, hello: bool = False) -> int:
@@ -54,8 +60,23 @@ class Requests:
         as well."""
         self._tickets += 1
         self._until = max(self._until, until)
-        self._send(now, hello)
+        if not self._in_flight:
+            self._send(now, hello)
         return self._tickets
+
+    def command(self, command: Command, now: float, until: float) -> int:
+        """A ticket for a frame that is scanned after the board took this command. It may take it more than once, where
+        an answer was lost; there is one command at a time."""
+        assert self._command is None, "one command at a time"
+        self._tickets += 1
+        self._command, self._commanding, self._command_until = command, self._tickets, until
+        self._until = max(self._until, until)
+        self._send(now, hello=False)
+        return self._tickets
+
+    def end_command(self) -> None:
+        """Do not send the command again."""
+        self._command, self._in_flight = None, False
 
     def poll(self, now: float, hello: bool = False) -> None:
         """Ask again if an answer is overdue."""
@@ -93,17 +114,21 @@ class Requests:
         elif self._stage is _Stage.KNOWN and heard:
             step = self._step - (_low(self._number) - heard) % _LOWS
             if step < self._seen:  # no request of ours: someone else speaks to the board
-                self._stage = _Stage.UNKNOWN
+                self._stage, self._in_flight = _Stage.UNKNOWN, False
                 return
             for known in range(self._seen, step + 1):
                 self.answered = max(self.answered, self._stands_for.pop(known, 0))
             self._seen = step
+            if self._command is not None and self._commanding <= self.answered:
+                self.end_command()
+                if self._tickets > self.answered:
+                    self._send(now, hello=False)
 
     def _send(self, now: float, hello: bool) -> None:
         if self._stage is _Stage.KNOWN and self._step - self._seen <= MOST_APART:
             self._send_next(now, hello)
         elif self._stage in (_Stage.UNKNOWN, _Stage.KNOWN) or now >= self._sent_at + self.retry_s:
-            self._stage = _Stage.GREETING
+            self._stage, self._in_flight = _Stage.GREETING, False
             self._put(self._random(), now, hello=True)
 
     def _send_next(self, now: float, hello: bool) -> None:
@@ -112,14 +137,18 @@ class Requests:
             number += 1
         self._step += 1
         self._stands_for[self._step] = self._tickets
-        self._put(number % _NUMBERS, now, hello)
+        self._in_flight = self._command is not None and now < self._command_until
+        self._put(number % _NUMBERS, now, hello, self._command if self._in_flight else None)
 
-    def _put(self, number: int, now: float, hello: bool) -> None:
+    def _put(self, number: int, now: float, hello: bool, command: Command | None = None) -> None:
         self._number, self._sent_at = number, now
         self._recent.append(_low(number))
         for pulsed in (True, False):  # last what most boards read: whatever follows a request hides its number
             if self.pulsed in (None, pulsed):
-                self._out += protocol.encode_request(number, hello, pulsed)
+                if command is None:
+                    self._out += protocol.encode_request(number, hello, pulsed)
+                else:
+                    self._out += encode_command(number, command, hello, pulsed)
 
     def _random(self) -> int:
         """A number whose lowest bits, and the next ones, have not been sent in this order of late: a frame and the one

@@ -29,6 +29,8 @@ class Stats:
     """Valid packets that followed damaged ones."""
     hellos: int = 0
     """Hellos received."""
+    fault_reports: int = 0
+    """Reports of faults received, from a board that names them: one after each hello, and one when they change."""
     before_hello: int = 0
     """Packets that came before the first hello, without which they cannot be read."""
     unknown_kinds: int = 0

@@ -1,33 +1,40 @@
-"""A queue of frames, and what can be done with one."""
+"""A queue of frames, or of all that comes, and what can be done with one."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Iterator
+from typing import Generic, TypeVar, cast
 
 from contactfpga.driver.link import Link
 from contactfpga.driver.queue import FrameQueue
-from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
+from contactfpga.driver.silence import Silence
+from contactfpga.driver.told import Told
+from contactfpga.errors import BoardClosed, ContactFPGAError, NoData, PortLost, ReadTimeout, ReplayEnded
 from contactfpga.inputs.values import is_finite
+from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
+Item = TypeVar("Item")
 
-class Subscription:
-    """Every frame of a board from a moment on: in ``for``, in ``async for``, or one by one.
 
-    ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`.
-    """
+class Listening(Generic[Item]):
+    """What :class:`Subscription` and :class:`Events` have in common."""
 
-    def __init__(self, link: Link, maxsize: int, board: object = None):
+    all_events = False
+
+    def __init__(self, link: Link, maxsize: int, board: object = None, deadline_s: float | None = None):
         if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
             raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of frames, 1 or more")
         self._frames = FrameQueue(maxsize)
         self._link = link
         self._board = board  # stays open as long as someone may take frames here
         self._closed = False
+        self._deadline_s = deadline_s if link.transport.live else None
+        self._since = self._noticed = link.transport.clock()
         with link.changed:
             link.listeners.add(self)
 
@@ -41,10 +48,113 @@ class Subscription:
         """Frames that were not taken in time."""
         return self._frames.dropped
 
-    def next(self, timeout: float = 1.0) -> Zones:
-        """The next frame, in order; errors as for :meth:`Board.next`."""
+    def next(self, timeout: float = 1.0) -> Item:
+        """What comes next, in order; errors as for :meth:`Board.next`, and as the class says of silence."""
         timeout = checked(timeout)
-        return frame_of(self._link.wait_for(self._pop, self._link.clock() + timeout, timeout))
+        now = self._link.clock()
+        silent_at = self._silent_at()
+        try:
+            found = self._link.wait_for(self._pop, min(now + timeout, silent_at), timeout)
+        except ReadTimeout:
+            if now + timeout < silent_at:
+                raise
+            self._noticed = self._link.clock()
+            return self._silent(self._silence())
+        return cast(Item, checked_item(found))
+
+    def close(self) -> None:
+        """Take no more."""
+        with self._link.changed:
+            self._closed = True
+            self._link.listeners.discard(self)
+            self._frames.clear()
+            self._link.changed.notify_all()
+
+    def __enter__(self):  # type: ignore[no-untyped-def]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Item]:
+        while True:
+            try:
+                yield self.next()
+            except ReplayEnded:
+                return
+
+    async def __aiter__(self) -> AsyncIterator[Item]:
+        while True:
+            try:
+                if self._frames:
+                    await asyncio.sleep(0)  # others get their turn
+                else:
+                    await asyncio.to_thread(self._wait, 1.0)
+                yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
+            except ReplayEnded:
+                return
+
+    def _wait(self, timeout: float) -> None:
+        """Until something waits, or silence is to be told."""
+        timeout = checked(timeout)
+        until, silent_at = self._link.clock() + timeout, self._silent_at()
+        try:
+            self._link.wait_for(lambda: True if self._frames else None, min(until, silent_at), timeout)
+        except ReadTimeout:
+            if until < silent_at:
+                raise
+
+    def _silent_at(self) -> float:
+        """When it is too long since the last frame, or since silence was told last."""
+        if self._deadline_s is None:
+            return float("inf")
+        return max(self._noticed, self._link.last_s) + self._deadline_s
+
+    def _silence(self) -> Silence:
+        with self._link.changed:
+            return self._link.silence(self._since)
+
+    def _silent(self, silence: Silence) -> Item:
+        raise NoData(f"{silence} (allowed are {self._deadline_s:g} s)", silence)
+
+    def _pop(self) -> Zones | Told | ContactFPGAError | None:
+        if self._closed:
+            raise BoardClosed(f"{self._link.transport.name}: this subscription was closed; subscribe again")
+        return self._frames.pop()
+
+    # ---- for the board
+
+    def put(self, item: Zones | Run | Told | ContactFPGAError) -> None:
+        """Add what came; the board's lock is held."""
+        self._frames.put(item)
+
+
+class Events(Listening[Zones | Faults | SelfTestSlot | Silence]):
+    """All that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
+    :class:`Zones`; :class:`Faults`, first those that there are and then whenever they change, also where no frame is
+    sent; the slots of a self-test; and with a deadline :class:`Silence`, each time that it passes without a frame.
+
+    ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
+    """
+
+    all_events = True
+
+    def __init__(self, link: Link, maxsize: int, board: object = None, deadline_s: float | None = None):
+        super().__init__(link, maxsize, board, deadline_s)
+        with link.changed:
+            if link.conversation.lines.told:
+                self.put(link.conversation.lines.told)
+
+    def _silent(self, silence: Silence) -> Silence:
+        return silence
+
+
+class Subscription(Listening[Zones]):
+    """Every frame of a board from a moment on: in ``for``, in ``async for``, or one by one.
+
+    ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`. With a deadline
+    :class:`NoData` is raised each time that it passes without a frame.
+    """
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
@@ -57,52 +167,22 @@ class Subscription:
             frames = self._frames.pop_frames()
         return Batch.of(frames or [self.next(timeout)])
 
-    def close(self) -> None:
-        """Take no more frames."""
-        with self._link.changed:
-            self._closed = True
-            self._link.listeners.discard(self)
-            self._frames.clear()
-            self._link.changed.notify_all()
-
-    def __enter__(self) -> Subscription:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def __iter__(self) -> Iterator[Zones]:
-        while True:
-            try:
-                yield self.next()
-            except ReplayEnded:
-                return
-
-    async def __aiter__(self) -> AsyncIterator[Zones]:
-        while True:
-            try:
-                if self._frames:
-                    await asyncio.sleep(0)  # others get their turn
-                else:
-                    await asyncio.to_thread(self._wait, 1.0)
-                yield self.next()  # which waits for nothing now, and takes no frame if we were canceled above
-            except ReplayEnded:
-                return
-
-    def _wait(self, timeout: float) -> None:
-        timeout = checked(timeout)
-        self._link.wait_for(lambda: True if self._frames else None, self._link.clock() + timeout, timeout)
-
-    def _pop(self) -> Zones | ContactFPGAError | None:
-        if self._closed:
-            raise BoardClosed(f"{self._link.transport.name}: this subscription was closed; subscribe again")
-        return self._frames.pop()
-
     # ---- for the board
 
-    def put(self, item: Zones | Run | ContactFPGAError) -> None:
-        """Add what came; the board's lock is held."""
-        self._frames.put(item)
+    def newest(self, max_age_s: float, timeout: float) -> Zones:
+        """The next frame, none that came longer ago than this; raises :class:`NoData` as soon as there can be none."""
+        if not self._link.transport.live:
+            return self.next(timeout)
+        with self._link.changed:
+            self._frames.drop_older(self._link.transport.clock() - max_age_s)
+        now, silent_at = self._link.clock(), self._link.last_s + max_age_s
+        try:
+            return frame_of(self._link.wait_for(self._pop, min(now + timeout, silent_at), timeout))
+        except ReadTimeout:
+            if now + timeout < silent_at:
+                raise
+        silence = self._silence()
+        raise NoData(f"{silence} (allowed are {max_age_s:g} s)", silence)
 
     def put_back(self, zones: Zones) -> None:
         """Have this frame come next."""
@@ -128,9 +208,15 @@ class Subscription:
 
 def frame_of(found: object) -> Zones:
     """The frame that was waited for; raises the error that came in its place."""
+    found = checked_item(found)
+    assert isinstance(found, Zones)
+    return found
+
+
+def checked_item(found: object) -> object:
+    """What was waited for; raises the error that came in its place."""
     if isinstance(found, ContactFPGAError):
         raise found
-    assert isinstance(found, Zones)
     return found
 
 

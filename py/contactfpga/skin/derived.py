@@ -33,6 +33,9 @@ STUCK_BITS = 3
 STUCK_MAX = (1 << STUCK_BITS) - 1
 """The stuck-line counter stops here."""
 
+SELF_TEST = 1
+"""Number of a command: test all lines (docs/protocol.md)."""
+
 
 class Derived(Widths):
     """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
@@ -54,6 +57,11 @@ class Derived(Widths):
     @functools.cached_property
     def debounced(self) -> bool:
         return bool(debounces.find(self.skin.debounce).gateware)
+
+    @property
+    def commands(self) -> tuple[int, ...]:
+        """Numbers of the commands that the board takes."""
+        return (SELF_TEST,) if self.skin.self_test else ()
 
     # ---- times, in clocks unless named otherwise
 

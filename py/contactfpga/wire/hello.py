@@ -8,6 +8,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from contactfpga.choices.reports import REPORTS
+from contactfpga.skin.derived import SELF_TEST, Derived
 from contactfpga.skin.rates import pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
 
-_SHEET = struct.Struct("<BBBBBBHBx")
+_SHEET = struct.Struct("<BBBBBBHBB")
 _PITCH = struct.Struct("<dd")
 _RADIUS = struct.Struct("<d")
 _RATES = struct.Struct("<II")
@@ -59,8 +60,10 @@ class Hello:
     clock_hz: int
     baud: int
     send: str
+    guard: bool
+    """The board has guard lines, and tells faults by name."""
     commands: bytes
-    """Kinds of commands that the board takes."""
+    """Numbers of the commands that the board takes; see :meth:`Board.command`."""
     sent: int
     """Frames sent since power-up."""
     epoch: int
@@ -69,6 +72,11 @@ class Hello:
     """Number of the last request received; see :func:`contactfpga.wire.protocol.may_number`."""
     stuck: int
     """Columns that read pressed while no row was driven, in the frame packed last; 7 stands for 7 or more."""
+
+    @property
+    def self_test(self) -> bool:
+        """The board can test its lines."""
+        return SELF_TEST in self.commands
 
     @property
     def pulsed(self) -> bool:
@@ -87,6 +95,7 @@ def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuc
         _SENDS.index(skin.send),
         skin.sheet.zone_capacity,
         skin.ghosts,
+        skin.guard,
     )
     facts = [(SHEET, sheet), (PITCH, _PITCH.pack(skin.pitch_x_mm, skin.pitch_y_mm))]
     if skin.radius_mm is not None:
@@ -94,6 +103,8 @@ def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuc
     facts += [(FINGERPRINT, skin.fingerprint), (RATES, _RATES.pack(skin.clock_hz, skin.baud))]
     if skin.name:
         facts.append((NAME, skin.name.encode()))
+    if commands := Derived(skin).commands:
+        facts.append((COMMANDS, bytes(commands)))
     fixed = [bytes([kind, len(value)]) + value for kind, value in facts]
     counters = ((sent, SENT_DIGITS), (epoch, EPOCH_DIGITS), (heard, HEARD_DIGITS), (stuck, STUCK_DIGITS), (0, 1))
     state = bytes([STATE, STATE_DIGITS]) + b"".join(digits(value, count) for value, count in counters)
@@ -154,7 +165,7 @@ class HelloReader:
 
 
 def _hello(fields: dict[int, bytes]) -> Hello:
-    rows, columns, connectivity, report, bits, send, capacity, ghosts = _SHEET.unpack_from(fields[SHEET])
+    rows, columns, connectivity, report, bits, send, capacity, ghosts, faults = _SHEET.unpack_from(fields[SHEET])
     pitch_x_mm, pitch_y_mm = _PITCH.unpack_from(fields[PITCH])
     if report >= len(_REPORTS) or send >= len(_SENDS) or ghosts > 1:
         raise ValueError(f"report is {report}, send is {send}, diodes is {ghosts}")
@@ -184,6 +195,7 @@ def _hello(fields: dict[int, bytes]) -> Hello:
         clock_hz=clock_hz,
         baud=baud,
         send=_SENDS[send],
+        guard=bool(faults & 1),
         commands=fields.get(COMMANDS, b""),
         **_counters(state),
     )

@@ -45,6 +45,8 @@ class Batch:
     """(n,) of :data:`FRAME_DTYPE`, in order."""
     zones: np.ndarray
     """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and within these of the zones."""
+    faults: tuple[tuple[str, ...], ...] = ()
+    """:attr:`Zones.faults` of each frame."""
 
     @property
     def starts(self) -> np.ndarray:
@@ -57,17 +59,20 @@ class Batch:
         """Of frames of one sheet."""
         described = np.zeros(sum(len(one) if isinstance(one, Run) else 1 for one in frames), FRAME_DTYPE)
         counts = np.zeros(len(described), np.int64)
+        faults: list[tuple[str, ...]] = []
         start = 0
         for one in frames:
             if isinstance(one, Run):
                 stop = start + len(one)
                 _describe(one, described[start:stop])
                 counts[start:stop] = one.packets["items"]
+                faults += [one.faults if flagged else () for flagged in described["fault"][start:stop].tolist()]
                 start = stop
             else:
                 described[start], counts[start] = _row(one), len(one)
+                faults.append(one.faults)
                 start += 1
-        return cls(described, _zones(frames, described, counts))
+        return cls(described, _zones(frames, described, counts), tuple(faults))
 
 
 def _row(one: Zones) -> tuple[float, ...]:

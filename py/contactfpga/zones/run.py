@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, NO_RECORDS, Frame
 from contactfpga.zones.zone import Zones
 
@@ -28,6 +29,8 @@ class Run:
     times_us: np.ndarray
     """(n,) int64, since power-up."""
     host_time_s: float | None
+    faults: tuple[str, ...] = (STUCK,)
+    """Of its flagged frames; see :attr:`Zones.faults`."""
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -47,7 +50,7 @@ class Run:
         fields, starts, times_us = self._plain
         start, stop = starts[index], starts[index + 1]
         frame = frame_of(fields[index], self.records[start:stop], self.sheet)
-        return Zones(frame, self.sheet, times_us[index], None, self.host_time_s)
+        return Zones(frame, self.sheet, times_us[index], None, self.host_time_s, self.faults)
 
     def __iter__(self) -> Iterator[Zones]:
         return map(self.__getitem__, range(len(self)))

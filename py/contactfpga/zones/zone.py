@@ -11,6 +11,7 @@ from typing import overload
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
+from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import ghosts, labels
 
@@ -73,6 +74,7 @@ class Zones(Sequence[Zone]):
         time_us: int | None = None,
         before: Frame | None = None,
         host_time_s: float | None = None,
+        faults: tuple[str, ...] = (STUCK,),
     ):
         self.frame = frame
         """The frame as it came over the wire."""
@@ -86,6 +88,11 @@ class Zones(Sequence[Zone]):
         self.flags: frozenset[str] = frame.flags
         """Names from :data:`contactfpga.wire.protocol.FLAGS`; and `ghost` where a sheet without diodes may show pressed
         cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to."""
+        self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
+        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
+        ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
+        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
+        the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
         self._before = before
         if sheet.ghosts and (self._ghost_cells.any() if frame.bitmap is not None else ghosts.spread(frame, before)):
             self.flags |= {"ghost"}
@@ -99,12 +106,6 @@ class Zones(Sequence[Zone]):
     def overwritten(self) -> int:
         """Frames that the board replaced by newer ones before they were sent, modulo what the trailer has room for."""
         return self.frame.overwritten
-
-    @property
-    def faults(self) -> frozenset[str]:
-        """Faults of the sheet that the board noticed: ``stuck``, a column read pressed while no row was driven. How
-        many columns did is in ``board.hello.stuck``."""
-        return frozenset({"stuck"} if "fault" in self.flags else ())
 
     @property
     def total_zones(self) -> int:
@@ -230,7 +231,7 @@ class Zones(Sequence[Zone]):
             name: getattr(self, name)
             for name in ("sequence", "time_us", "host_time_s", "overwritten", "total_zones", "pressed")
         }
-        values["faults"] = sorted(self.faults)
+        values["faults"] = list(self.faults)
         values["flags"] = sorted(self.flags)
         values["rounding_mm"] = list(self.rounding_mm)
         values["zones"] = [dataclasses.asdict(zone) for zone in self]

@@ -70,6 +70,18 @@ class Facts:
         return mask
 
     @functools.cached_property
+    def fault_bits(self) -> int:
+        """Of the word that the board tells of its lines: open rows and columns, stuck columns and the guard column's
+        bit, joined lines; 0: it tells none."""
+        lines = [*range(self.rows), *range(self.columns), *range(self.columns + 1)] if self.skin.guard else []
+        return len(lines) + int(self.skin.self_test)
+
+    @property
+    def commands(self) -> bytes:
+        """Numbers of the commands that the board takes: 1 is the self-test."""
+        return b"\x01" if self.skin.self_test else b""
+
+    @functools.cached_property
     def clocks_per_us(self) -> int:
         return self.skin.clock_hz // 1_000_000
 

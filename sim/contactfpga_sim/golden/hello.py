@@ -13,7 +13,7 @@ from contactfpga_sim.golden.request import Heard
 from contactfpga_sim.golden.scan import Scan
 
 KIND = 4
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, CHECK = 1, 2, 3, 4, 5, 6, 7, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
 DIGITS = range(16, 32)
 """Where the digits lie, counted from the delimiter in front."""
 
@@ -26,13 +26,15 @@ def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
     fraction_bits = skin.barycenter_bits if facts.divided else 0
     on_change, no_diodes = skin.send == "on_change", skin.diodes == "none"
     head = (skin.rows, skin.columns, skin.connectivity, report, fraction_bits, on_change)
-    fixed = _field(SHEET, bytes(map(int, head)) + struct.pack("<HBB", skin.zone_capacity, no_diodes, 0))
+    fixed = _field(SHEET, bytes(map(int, head)) + struct.pack("<HBB", skin.zone_capacity, no_diodes, skin.guard))
     rest = _field(PITCH, struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm))
     if skin.radius_mm is not None:
         rest += _field(RADIUS, struct.pack("<d", skin.radius_mm))
     rest += _field(FINGERPRINT, facts.fingerprint) + _field(RATES, struct.pack("<II", skin.clock_hz, skin.baud))
     if skin.name:
         rest += _field(NAME, skin.name.encode("utf-8"))
+    if facts.commands:
+        rest += _field(COMMANDS, facts.commands)
     checked = _field(CHECK, struct.pack("<I", zlib.crc32(fixed + rest)))
     packet = Packet()
     packet.push(fixed + _field(STATE, bytes(128 + digit for digit in digits)) + rest + checked + bytes([KIND << 4]))

@@ -1,15 +1,20 @@
-"""Link: hellos and frames take turns on the wire; the newest complete frame waits."""
+"""Link: hellos, reports of faults and frames take turns on the wire; the newest complete frame waits."""
 
 from __future__ import annotations
 
 from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.faults import Reports, Told, report
 from contactfpga_sim.golden.hello import DIGITS, State, hello
 
 
 class Link:
-    """Who takes the wire when. Time only moves forward, by :meth:`advance`."""
+    """Who takes the wire when. Time only moves forward, by :meth:`advance`.
 
-    def __init__(self, facts: Facts, state: State):
+    ``told``: what the scan knows of its lines, which must be known up to the cycle of each :meth:`advance`; in the end
+    up to that of :meth:`finish`.
+    """
+
+    def __init__(self, facts: Facts, state: State, told: Told | None = None):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
@@ -22,6 +27,11 @@ class Link:
         """Hellos whose state is not filled in: where they begin in ``bytes``, when they were taken, how many frames
         had been sent."""
         self._frame: tuple[int, bytes] | None = None
+        self._reports = Reports(facts, told or Told()) if facts.fault_bits else None
+        self._reported: list[int] = []
+        """Where reports begin in ``bytes``; they are not filled in either."""
+        self._after_report = -1
+        """The cycle from which on the wire was idle after the last one."""
         self._idle_from = 0
         self._uart_from = 0
 
@@ -43,7 +53,9 @@ class Link:
     def advance(self, cycle: int) -> None:
         """Let the wire take what it takes up to and including ``cycle``."""
         while True:
-            waits = [*self._hellos, *([self._frame[0]] if self._frame else [])]
+            due = self._reports.due(cycle) if self._reports and self._idle_from <= cycle else None
+            frame_from = [self._frame[0]] if self._frame else []
+            waits = [*self._hellos, *frame_from, *([] if due is None else [due])]
             if not waits:
                 return
             taken = max(self._idle_from, min(waits))
@@ -52,6 +64,8 @@ class Link:
             if self._hellos and min(self._hellos) <= taken:
                 self._hellos = [wait for wait in self._hellos if wait > taken]
                 self._send_hello(taken)
+            elif due is not None and due <= taken and not self._frame_is_next(taken):
+                self._send_report(taken)
             else:
                 assert self._frame
                 packet = self._frame[1]
@@ -65,9 +79,27 @@ class Link:
         self.advance(cycle)
         for begin, taken, sent in self._blank:
             self._fill_in(begin, taken, sent)
+        for begin in self._reported:
+            assert self._reports is not None
+            handed = [cycle for cycle, _ in self.bytes[begin : begin + len(report(self._facts))]]
+            self.bytes[begin : begin + len(handed)] = list(zip(handed, self._reports.packet(handed), strict=True))
+
+    def _frame_is_next(self, cycle: int) -> bool:
+        """One that waits is, where a report has just been sent."""
+        return cycle == self._after_report and self._frame is not None and self._frame[0] <= cycle
+
+    def _send_report(self, taken: int) -> None:
+        assert self._reports is not None
+        begin = len(self.bytes)
+        self._reported.append(begin)
+        self._send(taken, report(self._facts))
+        self._after_report = self._idle_from
+        self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._idle_from)
 
     def _send_hello(self, taken: int) -> None:
         self._blank.append((len(self.bytes), taken, self.sent))
+        if self._reports:
+            self._reports.greet(taken)
         self._send(taken, hello(self._facts))
 
     def _fill_in(self, begin: int, taken: int, sent: int) -> None:

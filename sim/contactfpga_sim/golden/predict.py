@@ -9,6 +9,7 @@ import numpy as np
 
 from contactfpga_sim.golden import divide, label, request, safe, scan, uart
 from contactfpga_sim.golden.facts import Facts, facts
+from contactfpga_sim.golden.faults import Told
 from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
@@ -39,16 +40,17 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
 
 def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, scan.Scanned]:
     known = facts(skin)
-    heard = request.heard(timeline.received, known.bit_clocks)
+    heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands))
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
-    link = Link(known, State(known, frames, heard))
+    told = Told()
+    link = Link(known, State(known, frames, heard), told)
     half_second = 2**19 * known.clocks_per_us
     timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
     packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
-    stages = Stages(known, trace, packer, frames)
+    stages = Stages(known, trace, packer, frames, told)
     scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
     faulty = safe.fault(frames, stages.told)
@@ -60,8 +62,9 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
 class Stages:
     """The stages after the scan: rows are handed over, records leave, frames are packed; all noted in a trace."""
 
-    def __init__(self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan]):
+    def __init__(self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told):
         self._facts = facts
+        self._reported = reported
         self._trace = trace
         self._packer = packer
         self._scanned = scanned
@@ -77,6 +80,7 @@ class Stages:
         """Note what is told of faulty lines, from a cycle on."""
         if faults != (self.told[-1][1] if self.told else 0):
             self.told.append((cycle, faults))
+            self._reported.change(cycle, faults)
 
     def watch(self, cycle: int) -> None:
         """An untouched sheet was looked at."""

@@ -1,4 +1,5 @@
-"""Requests: what the host sends, what the board takes for one, and which number it repeats (docs/protocol.md)."""
+"""Requests and commands: what the host sends, what the board takes for one, and which number it repeats
+(docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -9,8 +10,8 @@ from collections.abc import Iterable
 from contactfpga_sim.golden import uart
 from contactfpga_sim.golden.packet import Packet, check
 
-KIND = 5
-_STUFFED, _LENGTH = 5, 8
+KIND, COMMAND_KIND = 5, 10
+_CHECK_BYTES = 3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Request:
     number: int
     hello: bool
     """It asks for one."""
+    command: tuple[int, int] | None = None
+    """(what, value) of a command."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,8 +42,22 @@ class Heard:
 
 def request(number: int, hello: bool = False, bit_clocks: int = 4) -> bytes:
     """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit."""
+    return _sent(_digits(number, 3) + bytes([KIND << 4 | hello]), bit_clocks)
+
+
+def command(number: int, what: int, value: int = 0, hello: bool = False, bit_clocks: int = 4) -> bytes:
+    """A command likewise."""
+    plain = _digits(number, 3) + _digits(what, 1) + _digits(value, 3)
+    return _sent(plain + bytes([COMMAND_KIND << 4 | hello]), bit_clocks)
+
+
+def _digits(value: int, count: int) -> bytes:
+    return bytes(128 + value // 128**place % 128 for place in range(count))
+
+
+def _sent(plain: bytes, bit_clocks: int) -> bytes:
     packet = Packet()
-    packet.push(bytes(128 + number // 128**place % 128 for place in range(3)) + bytes([KIND << 4 | hello]))
+    packet.push(plain)
     data = b"\0" + packet.wire()
     return pulses(data) if uart.pulsed(bit_clocks) else data
 
@@ -66,8 +83,9 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
     return sent
 
 
-def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int) -> Heard:
-    """Requests among (cycle, bytes), each of which begin at the pin back to back in that cycle."""
+def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False) -> Heard:
+    """Requests, and on a board that takes them ``commands``, among (cycle, bytes), each of which begin at the pin back
+    to back in that cycle."""
     found = Heard([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
@@ -77,18 +95,27 @@ def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int) -> Heard:
         if byte.value is None:
             packet = None
         elif byte.value == 0:
-            if packet is not None and _is_request(packet):
-                number = sum(digit % 128 * 128**place for place, digit in enumerate(packet[1:4]))
-                found.requests.append(Request(byte.stop, number, bool(packet[4] & 1)))
-                found.numbers.append((byte.stop + 1, number))
+            if packet is not None and (one := _read(packet, byte.stop, commands)) is not None:
+                found.requests.append(one)
+                found.numbers.append((byte.stop + 1, one.number))
             packet = []
         elif packet is not None:
             packet.append(byte.value)
     return found
 
 
-def _is_request(packet: list[int]) -> bool:
-    if len(packet) != _LENGTH or packet[4] >> 4 != KIND:
-        return False
-    wanted, got = check(bytes(packet[:_STUFFED])), packet[_STUFFED:]
-    return (got[0] ^ wanted[0]) % 128 == (got[1] ^ wanted[1]) % 128 == (got[2] ^ wanted[2]) % 4 == 0
+def _read(packet: list[int], cycle: int, commands: bool) -> Request | None:
+    """The request that a packet is, if it is one. Where there are commands, bit 3 of the first byte tells them."""
+    is_command = commands and packet[:1] != [] and bool(packet[0] & 8)
+    stuffed, kind = (9, COMMAND_KIND) if is_command else (5, KIND)
+    if len(packet) != stuffed + _CHECK_BYTES or packet[stuffed - 1] >> 4 != kind:
+        return None
+    wanted, got = check(bytes(packet[:stuffed])), packet[stuffed:]
+    if (got[0] ^ wanted[0]) % 128 or (got[1] ^ wanted[1]) % 128 or (got[2] ^ wanted[2]) % 4:
+        return None
+    what = (packet[4] % 128, _number(packet[5:8])) if is_command else None
+    return Request(cycle, _number(packet[1:4]), bool(packet[stuffed - 1] & 1), what)
+
+
+def _number(digits: list[int]) -> int:
+    return sum(digit % 128 * 128**place for place, digit in enumerate(digits))

@@ -87,7 +87,8 @@ class Stages(Protocol):
         """The cycle from which on a frame is due, for a scan that waits."""
 
     def tell(self, cycle: int, faults: int) -> None:
-        """From a cycle on, no earlier than any before, this is told of faulty lines."""
+        """From a cycle on, no earlier than any before, this is told of faulty lines. It is said before a frame of which
+        anything is on the wire in that cycle."""
 
     def watch(self, cycle: int) -> None:
         """In a cycle an untouched sheet was looked at, for a scan that waits."""
@@ -151,10 +152,10 @@ class Raster(ScanRule):
             np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
         )
         told = checks(facts, play.timeline, frames)
-        for number, (one, cells) in enumerate(zip(scanned, counted, strict=True)):
-            for cycle, word in told[number]:
-                play.stages.tell(cycle, word)
-            play.stages.frame(dataclasses.replace(one, faults=told[number][-1][1] if told[number] else 0), cells)
+        for change in (change for frame in told for change in frame):
+            play.stages.tell(*change)
+        for one, cells, changes in zip(scanned, counted, told, strict=True):
+            play.stages.frame(dataclasses.replace(one, faults=changes[-1][1] if changes else 0), cells)
         driven = []
         for slot in range(frames * facts.row_lines):
             start = facts.row_shift + slot * facts.row_clocks

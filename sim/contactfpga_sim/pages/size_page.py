@@ -9,17 +9,29 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import build, sizes
+from contactfpga_hdl.top import Top
 from contactfpga_sim.pages import writer
 from contactfpga_sim.studies import size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 """Sheets that the boards page shows beside the default ones."""
+
+
+FAULTS: dict[str, dict[str, Any]] = {
+    "`guard`": {"guard": True},
+    "`fail_safe`": {"fail_safe": True},
+    "`alive`": {"alive": True},
+    "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
+    "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
+}
+"""Options that tell of faults, by their titles."""
 
 
 def gateware_table() -> str:
@@ -38,6 +50,16 @@ def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
     print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
     found = size.measure(lambda: sizes.DESIGNS[name](sizes.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
+
+
+def faults_table() -> str:
+    """The reference Skin with the options that tell of faults."""
+    reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
+    rows = [("none", f"{reference:,}", "")]
+    for title, options in FAULTS.items():
+        found = size.luts(lambda options=options: Top(Skin(**options)), sizes.UP5K)  # type: ignore[misc]
+        rows.append((title, f"{found:,}", f"{found - reference:+}"))
+    return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
 
 
 def boards_table() -> str:
@@ -73,6 +95,7 @@ def board_row(board: BoardSpec, skin: Skin) -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     "gateware": gateware_table,
+    "faults": faults_table,
     "boards": boards_table,
 }
 

@@ -15,6 +15,7 @@ from contactfpga_sim.proofs import (
     pack,
     precharge,
     pulses,
+    raster_guard,
     records,
     reversal,
     reversal_frames,
@@ -30,6 +31,7 @@ from contactfpga_sim.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
+    *raster_guard.CASES,
     *seek.CASES,
     *adaptive.CASES,
     *precharge.CASES,

@@ -1,0 +1,124 @@
+"""What a board tells of its lines: faults by name, and the slots of its self-test (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+from contactfpga.wire.framing import DIGIT_BITS, PacketError, digits, last_byte, number
+
+KIND_FAULTS = 9
+SLOT = 1
+"""Flag of a packet that holds a slot of the self-test."""
+SLOT_DIGITS = 2
+"""Of a slot's number."""
+
+STUCK, UNNAMED = "stuck", "unnamed fault"
+"""Names of a fault where a board cannot name it, and where its name has not come."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Faults:
+    """Lines that the board found faulty, counted from 0; of a board whose Skin has ``guard`` or ``self_test``."""
+
+    rows_open: tuple[int, ...] = ()
+    """Rows that do not reach the guard column."""
+    columns_open: tuple[int, ...] = ()
+    """Columns that do not reach the guard row."""
+    columns_stuck: tuple[int, ...] = ()
+    """Columns that read pressed while no row was driven; the guard column counts as the one after the last."""
+    joined: bool = False
+    """The self-test found lines that are joined."""
+    names: tuple[str, ...] = dataclasses.field(default=(), compare=False)
+    """The same in words, sorted, as in :attr:`Zones.faults`."""
+
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self.rows_open or self.columns_open or self.columns_stuck or self.joined)
+
+    def named(self, rows: int, columns: int, mask: Iterable[tuple[int, int]] = ()) -> Faults:
+        """The same with their names, for a sheet of so many rows and columns; switches that are masked check no line.
+
+        Where all columns that are checked are open it is the guard row that is, and likewise for rows.
+        """
+        masked = set(mask)
+        all_rows, all_columns = range(rows), range(columns)
+        checked_rows = {row for row in all_rows if any((row, column) not in masked for column in all_columns)}
+        checked_columns = {column for column in all_columns if any((row, column) not in masked for row in all_rows)}
+        found = _open("row", "guard column open", self.rows_open, checked_rows)
+        found += _open("column", "guard row open", self.columns_open, checked_columns)
+        stuck = ("guard column" if column == columns else f"column {column}" for column in self.columns_stuck)
+        found += [f"{line} stuck" for line in stuck]
+        return dataclasses.replace(self, names=tuple(sorted(found + ["joined lines"] * self.joined)))
+
+
+def _open(line: str, guard: str, lines: tuple[int, ...], checked: set[int]) -> list[str]:
+    if len(checked) > 1 and checked <= set(lines):
+        return [guard]
+    return [f"{line} {index} open" for index in lines]
+
+
+@dataclasses.dataclass(frozen=True)
+class SelfTestSlot:
+    """What the board read in one slot of its self-test."""
+
+    number: int
+    rows: tuple[int, ...]
+    """Rows that read as selected, counted from 0."""
+    columns: tuple[int, ...]
+    """Columns likewise."""
+
+
+def digits_of(bits: int) -> int:
+    """Digits that a word of so many bits takes."""
+    return -(-bits // DIGIT_BITS)
+
+
+def fault_bits(rows: int, columns: int, guard: bool, self_test: bool) -> int:
+    """Of the word that a board tells: rows and columns that are open, columns and the guard column that are stuck, and
+    whether lines are joined; 0: it tells none."""
+    return (rows + 2 * columns + 1 if guard else 0) + self_test
+
+
+def encode_faults(word: int, bits: int) -> bytes:
+    """The plain bytes of a report of faults."""
+    return digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS)])
+
+
+def encode_slot(slot: int, word: int, bits: int) -> bytes:
+    """The plain bytes of a slot of the self-test."""
+    return digits(slot, SLOT_DIGITS) + digits(word, digits_of(bits)) + bytes([last_byte(KIND_FAULTS, SLOT)])
+
+
+def is_slot(plain: bytes) -> bool:
+    """Whether a packet of this kind is of the self-test."""
+    return bool(plain[-1] & SLOT)
+
+
+def decode_faults(plain: bytes, rows: int, columns: int, guard: bool, self_test: bool) -> Faults:
+    """Read an unsealed report of faults; raises :class:`PacketError` where it is none of such a board."""
+    parts = (rows, columns, columns + 1) if guard else (0, 0, 0)
+    rows_open, columns_open, columns_stuck, joined = _lines(plain[:-1], *parts, int(self_test))
+    return Faults(rows_open, columns_open, columns_stuck, bool(joined))
+
+
+def decode_slot(plain: bytes, rows: int, columns: int) -> SelfTestSlot:
+    """Read an unsealed slot of the self-test; raises :class:`PacketError` where it is none of such a sheet."""
+    slot, word = plain[:SLOT_DIGITS], plain[SLOT_DIGITS:-1]
+    if len(slot) < SLOT_DIGITS or not all(byte & 0x80 for byte in slot):
+        raise PacketError("content", "a slot of the self-test has no number")
+    return SelfTestSlot(number(slot), *_lines(word, rows, columns))
+
+
+def _lines(data: bytes, *widths: int) -> list[tuple[int, ...]]:
+    """Of each field of a word in digits, lowest first, the bits that are set."""
+    if len(data) != digits_of(sum(widths)):
+        raise PacketError("length", f"word of {len(data)} digits; lines of this sheet take {digits_of(sum(widths))}")
+    word = number(data)
+    if not all(byte & 0x80 for byte in data) or word >> sum(widths):
+        raise PacketError("content", "a word of lines is not written in digits, or filled up with something but zeros")
+    found = []
+    for width in widths:
+        found.append(tuple(bit for bit in range(width) if word >> bit & 1))
+        word >>= width
+    return found

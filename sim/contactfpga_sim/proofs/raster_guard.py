@@ -1,0 +1,108 @@
+"""Guard lines in a raster scan: a line that does not answer is told in that frame, one that does is not."""
+
+from functools import partial
+from typing import Literal
+
+from amaranth.hdl import Mux, Signal, Value
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.scan.guard import Told
+from contactfpga_hdl.scan.pins import released_levels
+from contactfpga_hdl.scan.raster import Scanner
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.precharge import level_lemmas
+from contactfpga_sim.proofs.proof import Proof
+
+Diodes = Literal["col2row", "row2col"]
+ROWS, COLUMNS = 3, 2
+
+
+def skin_of(diodes: Diodes) -> Skin:
+    """Row 2 is masked whole."""
+    return Skin(
+        rows=ROWS, columns=COLUMNS, guard=True, diodes=diodes, clock_hz=1_000_000, baud=500_000, settle_us=8,
+        release_us=2, zone_capacity=1, report="cells", mask=((2, 0), (2, 1)),
+    )  # fmt: skip
+
+
+def lines_told(proof: Proof, diodes: Diodes) -> None:
+    """Free: the columns, and when rows are taken.
+
+    Claimed: a row that did not read the guard column in its slot is told one clock after its strobe, a column that the
+    guard row did not read likewise, and the frame's tag says so two clocks after its last strobe. It stays told until
+    it answers in a round that renews. A line that answered in all of its slots is never told; neither is a row that is
+    masked whole.
+    """
+    m, skin = proof.m, skin_of(diodes)
+    dut = Scanner(skin)
+    inside = proof.put(dut)
+    columns = proof.free(skin.column_lines, "columns")
+    m.d.comb += [dut.pins.columns.eq(columns), dut.rows.ready.eq(proof.free(1, "ready"))]
+    released = released_levels(skin, skin.column_lines)
+    at_pins = proof.before(proof.before(columns, init=released), init=released)
+    silent = Signal(skin.column_lines)
+    m.d.comb += silent.eq(at_pins if skin.selects_low else ~at_pins)
+    slot, line = _slots(m, dut)
+    strobe = slot == dut.derived.settle_clocks + 1
+    for row in range(ROWS - 1):
+        _told(proof, inside, strobe & (line == row), silent[COLUMNS], dut.faults.rows[row])
+    proof.claim(~dut.faults.rows[ROWS - 1])
+    for column in range(COLUMNS):
+        _told(proof, inside, strobe & (line == ROWS), silent[column], dut.faults.columns[column])
+    with m.If(proof.before(proof.before(strobe & (line == ROWS - 1)))):
+        proof.claim(dut.tag.fault | ~proof.before((dut.faults.rows | dut.faults.columns).any()))
+    _lemmas(proof, inside, dut, slot, line)
+    level_lemmas(proof, inside, columns, released)
+
+
+def _told(proof: Proof, inside: Inside, checked: Value, silent: Value, told: Value) -> None:
+    """A line that is silent when it is checked is told in the next clock, and stays so until it answers in a round that
+    renews; one that never was silent is not told."""
+    ever = Signal(name="ever_silent")
+    with proof.m.If(checked & silent):
+        proof.m.d.sync += ever.eq(1)
+    proof.claim(told | ~proof.before(checked & silent))
+    proof.claim(told | ~proof.before(told) | proof.before(checked & inside["told.renewing"]))
+    proof.claim(ever | ~told)
+
+
+def _slots(m, dut: Scanner) -> tuple[Signal, Signal]:
+    """The clock within its slot, and the line whose slot it is, counted apart from the scanner."""
+    slot = Signal(range(dut.derived.row_clocks))
+    line = Signal(range(ROWS + 1), init=ROWS)
+    ends = slot == dut.derived.row_clocks - 1
+    m.d.sync += [slot.eq(Mux(ends, 0, slot + 1)), line.eq(line + ends)]
+    return slot, line
+
+
+def _lemmas(proof: Proof, inside: Inside, dut: Scanner, slot: Signal, line: Signal) -> None:
+    settled = dut.derived.settle_clocks
+    proof.lemma((inside["clock"] == slot) & (slot < dut.derived.row_clocks))
+    proof.lemma((inside["following"] == 1 << (line + 1)[:2]) & inside["scans"])
+    released = Signal()
+    with proof.m.If(slot == dut.derived.row_clocks - 1):
+        proof.m.d.sync += released.eq(1)
+    proof.lemma(inside["row"] == Mux(slot > settled + 1, line + 1, line)[:2])
+    proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
+    proof.lemma(inside["reader.done"] == ((slot == settled + 1) | released & (slot == 1)))
+    proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))
+    proof.lemma(inside["ended"] == proof.before((slot == settled + 1) & (line == ROWS - 1)))
+
+
+_BUGS = (
+    Bug("the next row is told", Told, "faults.rows", lambda rows, _: rows.rotate_left(1)),
+    Bug("a row is told once", Told, "faults.rows", lambda rows, inside: rows & ~inside["faults.rows"]),
+    Bug("columns that answer are told", Told, "faults.columns",
+        lambda columns, inside: columns ^ inside.component.checks_columns.replicate(COLUMNS)),
+    Bug("one column is told for all", Told, "faults.columns", lambda columns, _: columns.any().replicate(COLUMNS)),
+    Bug("a masked row is told", Told, "faults.rows",
+        lambda rows, inside: rows | inside.component.rows & inside.component.checks_rows),
+    Bug("columns are checked in rows' slots", Scanner, "checks_columns", lambda _, inside: inside["of_row"]),
+    Bug("the tag does not say so", Scanner, "at_end", lambda *_: 0),
+)  # fmt: skip
+CASES = (
+    Case("silent lines are told", "3x2, guard lines, col2row", partial(lines_told, diodes="col2row"), 2, _BUGS, 44),
+    Case("silent lines are told", "3x2, guard lines, row2col", partial(lines_told, diodes="row2col"), 2),
+)

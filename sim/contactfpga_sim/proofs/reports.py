@@ -1,0 +1,123 @@
+"""Reports of faults: what is sent is what the scan knows, nothing stays untold, and frames get their turn."""
+
+from unittest import mock
+
+from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import CHECK_BYTES
+from contactfpga.wire import protocol
+from contactfpga_hdl.link.faults import report_of
+from contactfpga_hdl.link.link import Link, stored_hello
+from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.streams import drain
+
+_SKIN = Skin(rows=2, columns=3, guard=True, settle_us=40)
+_DIGITS = 2  # of 2 + 3 + 4 bits
+_LENGTH = 1 + _DIGITS + 1
+_ROUND = 4
+_IDLE, _FETCH, _BYTE, _TAIL = range(4)
+_WHOLE_HELLO = protocol.encode_hello(_SKIN)
+_HELLO = _WHOLE_HELLO[:1] + _WHOLE_HELLO[-CHECK_BYTES - 1 :]  # so that a search soon comes to what follows it
+
+
+def reports_are_true(proof: Proof) -> None:
+    """Free: the word in each clock, frames, wishes for a hello, when bytes are taken, one place of a report.
+
+    Claimed: the byte at that place is what the word made it in the clock after the byte before was taken, and stays
+    so. A report is as long as it has to be. Where none was on the wire and the word stood for as many clocks as there
+    are places, and two more, it is the word that was sent last, or a report is due; after a hello one is due as well,
+    and what is due stays so until it is taken. Of two reports without a hello between them the second does not go
+    before a frame that waited while the first was taken.
+    """
+    m = proof.m
+    with mock.patch.object(protocol, "encode_hello", return_value=_HELLO):
+        dut = Link(_SKIN)
+        inside = proof.put(dut)
+        stored = stored_hello(_SKIN)
+    _free_inputs(proof, dut)
+    place = proof.chosen(range(_LENGTH), "place")
+    digits = Value.cast(dut.faults)
+    right = Array([Const(_LENGTH, 8), *(_digit(digits, index) for index in range(_DIGITS)), Const(0x90, 8)])
+    take = {name: inside[f"take_{name}"] for name in ("frame", "hello", "report")}
+    taken = take["frame"] | take["hello"] | take["report"]
+    reports, index = Signal(name="on_wire"), Signal(4, name="index")
+    transfer = dut.bytes.valid & dut.bytes.ready
+    with m.If(taken):
+        m.d.sync += [reports.eq(take["report"]), index.eq(0)]
+    with m.Elif(reports & transfer):
+        m.d.sync += [index.eq(index + 1), reports.eq(index != _LENGTH + CHECK_BYTES)]
+    expected = Signal(8, name="expected")
+    sent, ever = Signal(8, name="sent"), Signal(name="ever")
+    last = Mux(ever, sent, Array(report_of(9, 0))[place])
+    fetched = proof.before(taken | transfer)
+    with m.If(fetched):
+        m.d.sync += expected.eq(right[place])
+    with m.If(reports & dut.bytes.valid & (index == place)):
+        proof.claim(dut.bytes.payload == expected)
+        m.d.sync += [sent.eq(dut.bytes.payload), ever.eq(1)]
+    with m.If(reports & dut.bytes.valid & (index == _LENGTH + CHECK_BYTES)):
+        proof.claim(dut.bytes.payload == protocol.DELIMITER)
+    proof.claim(~(reports & taken))
+    _untold(proof, dut, inside, reports, take, last, right[place])
+    _turns(proof, inside, take)
+    _lemmas(proof, dut, inside, reports, index, place, expected, last, len(stored))
+
+
+def _digit(word: Value, index: int) -> Value:
+    bits = word[7 * index : 7 * index + 7]
+    return Cat(bits, Const(0, 7 - len(bits)), Const(1, 1))
+
+
+def _free_inputs(proof: Proof, dut: Link) -> None:
+    m, frames = proof.m, dut.frames
+    for port, name in ((dut.tag, "tag"), (dut.summary, "summary"), (dut.faults, "faults")):
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    ones = {"asked": dut.asked, "epoch": dut.epoch, "number": dut.number, "decide": frames.decide}
+    ones |= {"commit": frames.commit, "end": frames.end, "write": frames.write.en}
+    ones |= {"write_offset": frames.write.offset, "write_data": frames.write.data}
+    for name, port in ones.items():
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    drain(proof, dut.bytes, "bytes")
+
+
+def _untold(proof: Proof, dut: Link, inside: Inside, reports, take, last, right) -> None:
+    m = proof.m
+    word = Value.cast(dut.faults)
+    stood = Signal(range(_ROUND + 3), name="stood")  # clocks in which no report was on the wire and the word the same
+    steady = ~reports & (word == proof.before(word)) & ~take["report"]
+    m.d.sync += stood.eq(Mux(steady, Mux(stood == _ROUND + 2, stood, stood + 1), 0))
+    due = inside["reporter.due"]
+    started = proof.before(Const(1))
+    with m.If(started & steady & (stood == _ROUND + 2)):
+        proof.claim(due | (last == right))
+    with m.If(proof.before(take["hello"])):
+        proof.claim(due)
+    with m.If(proof.before(due & ~take["report"])):
+        proof.claim(due)
+
+
+def _turns(proof: Proof, inside: Inside, take) -> None:
+    waits = inside["waits"]
+    held = Signal(name="held")  # by the last report, a frame that has waited since
+    proof.m.d.sync += held.eq(Mux(take["report"], waits, held & waits & ~take["frame"] & ~take["hello"]))
+    proof.claim(~(take["report"] & held & waits))
+    proof.lemma(~held | inside["is_report"])
+
+
+def _lemmas(proof: Proof, dut: Link, inside: Inside, reports, index, place, expected, last, hello_length: int) -> None:
+    m, state, offset = proof.m, inside["wire_state"], inside["offset"]
+    fetch, byte, tail = (state == one for one in (_FETCH, _BYTE, _TAIL))
+    proof.lemma((inside["is_report"] & (state != _IDLE)) == reports)
+    with m.If(reports):
+        proof.lemma(inside["end"] == _LENGTH)
+        with m.If(fetch | byte):
+            proof.lemma((offset == index) & ((index < _LENGTH) | fetch & (index == _LENGTH) & (inside["tail"] == 0)))
+        with m.If(tail):
+            proof.lemma((inside["tail"] <= CHECK_BYTES) & (index == _LENGTH + inside["tail"]))
+    kept = inside.word("reporter.sent", place)
+    writes = inside["reporter.offers"] & (inside["reporter.at"] == place)
+    offered = reports & byte & (index == place)
+    proof.lemma(~offered | (inside["reporter.byte"] == expected))
+    proof.lemma(Mux(writes, inside["reporter.byte"], kept) == Mux(offered, expected, last))
