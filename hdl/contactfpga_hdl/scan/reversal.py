@@ -42,8 +42,8 @@ class ReversalScanner(wiring.Component):
     tag (out): of the frame that is under way; ``fault`` and the number of stuck columns from three clocks after it
     began.
     faults (out): with ``guard``; a check's from the clock after its sample is there.
-    watched (out): high for a clock when the rows of a sheet at rest were watched for another 256 us; with ``guard`` when
-    it was checked.
+    watched (out): high for a clock when the rows of a sheet at rest were watched for another 256 us; with ``guard``
+    when it was checked.
     packed (in): high for a clock when it is packed.
     time (out): in us.
     due (in): a frame is wanted, though nothing is touched.

@@ -24,8 +24,9 @@ def pins(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and what the stages after do in each clock.
 
     Claimed: at most one row is selected, the guard row counted, and none while rows are let go; no column is driven
-    then nor in the clock before or after; rows are let go together, but for the guard row, which is held at the released
-    level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is driven.
+    then nor in the clock before or after; rows are let go together, but for the guard row, which is held at the
+    released level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is
+    driven.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     drive, columns, every = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive, (1 << sheet.skin.rows) - 1
