@@ -12,6 +12,7 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.record import Stimulus
@@ -116,6 +117,17 @@ def test_any_skin_with_guard_lines_is_the_golden_models_in_every_clock(rng, soon
     skin, cycles = any_skin(rng).replace(guard=True, fail_safe=True, alive=True), 6000
     timeline = any_life(rng, skin, cycles)
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+def test_frames_come_between_reports_of_faults_and_tell_of_both():
+    skin, every, nothing = small(guard=True), np.ones((3, 4), bool), np.zeros((3, 4), bool)
+    pieces = [
+        (start + late, cells, None) for start in range(9000, 14_000, 250) for late, cells in ((0, every), (12, nothing))
+    ]
+    trace = predict(skin, Timeline(pieces, cuts=[(0, Cuts({1: 4}))]), 15_000)
+    flags = [one.frame.flags for one in frames_in(skin, trace.bytes)]
+    assert {"fault", "motion"} in flags
+    assert {"fault"} in flags
 
 
 def breaks(rows: int, columns: int) -> list[tuple[Cuts, int]]:
