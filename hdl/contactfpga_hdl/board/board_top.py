@@ -77,8 +77,8 @@ class BoardTop(Elaboratable):
         return "o" if self._sheet[name].flow == Out else "i"
 
     def _connect_both_ways(self, m: Module, name: str, port: io.SingleEndedPort, core: Top) -> None:
-        """A buffer per line, each with its own output enable. Columns are driven to the released level only, but for the
-        checks of guard lines."""
+        """A buffer per line, each with its own output enable. Without guard lines columns are driven to the released
+        level only."""
         levels, read = (core.rows, core.rows_read) if name == "rows" else (self._column_levels(core), core.columns)
         for line, (level, drive) in enumerate(zip(levels, getattr(core, f"{name}_drive"), strict=True)):
             m.submodules[f"{name}_{line}"] = buffer = io.Buffer("io", port[line])

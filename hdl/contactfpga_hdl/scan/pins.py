@@ -32,8 +32,8 @@ def column_pins(skin: Skin) -> dict[str, wiring.Member]:
     """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
     chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit.
 
-    A scan that reads the rows of a sheet with guard lines drives columns to ``columns_level``, and the guard column, the
-    last one, to the other level.
+    A scan that reads the rows of a sheet with guard lines drives columns to ``columns_level``, and the guard column,
+    the last one, to the other level.
     """
     if skin.precharge_us:
         level = {"columns_level": Out(1, init=int(skin.selects_low))} if skin.guard and skin.reads_rows else {}

@@ -30,13 +30,20 @@ SYNCHRONIZED = 3
 class ReversalScanner(wiring.Component):
     """Line reversal: the board *listens*, columns driven and rows let go, and then drives the rows that read touched.
 
+    With ``guard`` a frame with a driven row ends with a check of guard lines, and a sheet at rest is checked now and
+    then. The guard column is driven to the selecting level in between, the guard row to the released one.
+
     Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
     which it is driven; the row is offered three clocks later. The next row is not driven before this one is taken, and
     the next frame does not begin before this one is packed.
 
     rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
     untouched sheet has one empty row. With ``report = "cells"`` all rows.
-    tag (out): of the frame that is under way.
+    tag (out): of the frame that is under way; ``fault`` and the number of stuck columns from three clocks after it
+    began.
+    faults (out): with ``guard``; a check's from the clock after its sample is there.
+    watched (out): high for a clock when the rows of a sheet at rest were watched for another 256 us; with ``guard``
+    when it was checked.
     packed (in): high for a clock when it is packed.
     time (out): in us.
     due (in): a frame is wanted, though nothing is touched.

@@ -1,7 +1,7 @@
 """Line reversal with guard lines: the checks of rows and columns, one per frame and at rest one every 256 us.
 
-Rows: the guard column alone is driven to the released level, all others to the selecting one, and each row that is whole
-reads touched. Columns: the guard row alone is selected, and each column that is whole reads pressed.
+Rows: the guard column alone is driven to the released level, all others to the selecting one, and each row that is
+whole reads touched. Columns: the guard row alone is selected, and each column that is whole reads pressed.
 """
 
 from amaranth.hdl import Cat, Const, Module, Signal, Value

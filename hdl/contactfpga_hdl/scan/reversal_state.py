@@ -19,9 +19,7 @@ class Sheet:
         self.listens = Signal()  # rows are let go in the next clock
         self.selected = Signal(skin.rows)  # rows that are driven to the selecting level
         self.guard = Signal()  # so is the guard row
-        self.inverts = (
-            Signal()
-        )  # columns are driven to the selecting level in the next clock, and the guard column is not
+        self.inverts = Signal()  # in the next clock the guard column has the released level, the others do not
 
 
 class Turn:

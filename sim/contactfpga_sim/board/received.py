@@ -8,6 +8,7 @@ from typing import NamedTuple
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import Widths
 from contactfpga.wire import framing, protocol
+from contactfpga.wire.faults import KIND_FAULTS
 from contactfpga.wire.protocol import Frame
 
 
@@ -24,7 +25,8 @@ class Received(NamedTuple):
 
 
 class Receiver:
-    """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are counted."""
+    """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are counted, and
+    reports of faults passed over."""
 
     def __init__(self, skin: Skin) -> None:
         self._prefix = protocol.check_prefix(skin)
@@ -43,9 +45,9 @@ class Receiver:
                 packet = bytes(self._packet)
                 self._packet.clear()
                 plain = framing.unseal(packet, self._prefix)
-                if framing.kind_of(plain) == framing.KIND_HELLO:
-                    self.hellos += 1
-                else:
+                kind = framing.kind_of(plain)
+                self.hellos += kind == framing.KIND_HELLO
+                if kind not in (framing.KIND_HELLO, KIND_FAULTS):
                     frame = protocol.decode_frame(plain, self._widths)
                     yield Received(frame, self._first, time, len(packet) + 1)
 

@@ -42,7 +42,7 @@ class Scanner:
         self.contact: Changes = []
         self._facts = facts
         self._timeline = play.timeline
-        self._changes = [piece[0] for piece in play.timeline.pieces]
+        self._changes = [*(piece[0] for piece in play.timeline.pieces), *(cut[0] for cut in play.timeline.cuts)]
         self._requests = play.requests
         self._stages = play.stages
         self._debounce = debounce.Timed(facts.skin.debounce, facts.press_ticks, facts.release_ticks)
@@ -155,13 +155,7 @@ class Scanner:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
         retry = RETRY_US * self._facts.clocks_per_us
         driven = (cycle + 2 for cycle, _ in self._held)
-        turns = {
-            begin,
-            *self._changes,
-            *driven,
-            *(cycle for cycle, _ in self._timeline.cuts),
-            *range(begin // retry * retry + 2, end + 1, retry),
-        }
+        turns = {begin, *self._changes, *driven, *range(begin // retry * retry + 2, end + 1, retry)}
         return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
 
     def _rest(self, begin: int, end: int) -> None:

@@ -12,9 +12,7 @@ from contactfpga_sim.proofs.precharge import apart
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
 
-LISTEN, ANSWER, GAP, CHARGE, SELECT = range(
-    5
-)  # in the order in which the source names them where there are guard lines
+LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the source names them with guard lines
 
 
 def _inverted(sheet: Sheet) -> Value:
@@ -25,9 +23,10 @@ def _inverted(sheet: Sheet) -> Value:
 def pins(proof: Proof, **changes: Any) -> None:
     """Free: the sheet, and what the stages after do in each clock.
 
-    Claimed: at most one row is selected, the guard row counted, and none while rows are let go; no column is driven then
-    nor in the clock before or after; rows are let go together, but for the guard row, which is held at the released
-    level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is driven.
+    Claimed: at most one row is selected, the guard row counted, and none while rows are let go; no column is driven
+    then nor in the clock before or after; rows are let go together, but for the guard row, which is held at the
+    released level. Columns are driven to the selecting level while rows are let go, only. In the first clock nothing is
+    driven.
     """
     sheet = Sheet(proof, skin_of(guard=True, **changes))
     drive, columns, every = sheet.dut.pins.rows_drive, sheet.dut.pins.columns_drive, (1 << sheet.skin.rows) - 1
@@ -47,7 +46,7 @@ def pins(proof: Proof, **changes: Any) -> None:
 
 def pin_lemmas(sheet: Sheet) -> None:
     """What a state does to the sheet is seen a clock later."""
-    proof, state, clock, inside, skin = sheet.proof, sheet.state, sheet.clock, sheet.inside, sheet.skin
+    proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
     derived, rows = sheet.dut.derived, sheet.skin.rows
     before, started = proof.before(state, init=LISTEN), proof.before(1)
     lets_go = (before == LISTEN) | (before == ANSWER)
@@ -117,14 +116,8 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
     spared = checks - settle
-    checked, of_rows, selects, free = (
-        inside["checked"],
-        inside["of_rows"],
-        inside["selects"],
-        inside["precharge.free"][-1],
-    )
-    blind = told.stuck[-1]
-    proof.lemma(free | blind)
+    checked, of_rows, selects, blind = inside["checked"], inside["of_rows"], inside["selects"], told.stuck[-1]
+    proof.lemma(inside["precharge.free"][-1] | blind)
     proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
     proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= spared) | (before == ANSWER)))
     proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))
@@ -160,7 +153,8 @@ _WHOLE_BUGS = (
         lambda clock, inside: clock + (inside["starts"] & inside["of_rows"])),
     Bug("told by a stuck guard column", ReversalScanner, "checks_rows",
         lambda _, inside: inside["of_guard"].replicate(len(inside["checks_rows"]))),
-    Bug("columns are told by the rows' check", ReversalScanner, "checks_columns", lambda _, inside: inside["checked"][1]),
+    Bug("columns are told by the rows' check", ReversalScanner, "checks_columns",
+        lambda _, inside: inside["checked"][1]),
     Bug("rows only", ReversalScanner, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
     Bug("the next frame without a check", ReversalScanner, "checked",
         lambda checked, inside: Mux(inside["turn_state"] == SELECT, 0, checked)),

@@ -1,0 +1,252 @@
+"""Line reversal with guard lines: each break is told and nothing else, when touches are seen, and motion in a frame."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from amaranth.hdl import Cat
+from reversal import any_skin, small, touches
+from sample import sample
+
+from contactfpga.skin import Skin
+from contactfpga_hdl.scan import reversal, reversal_guard
+from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_sim.board.received import frames_in
+from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.cosim.record import Stimulus
+from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import reversal as golden
+from contactfpga_sim.golden import reversal_guard as golden_guard
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.trace import Cuts
+
+SLOW = {"clock_hz": 1_000_000, "baud": 100_000, "precharge_us": 1.0, "settle_us": 2.0, "release_us": 1.0, "guard": True}
+
+
+@dataclass
+class Life:
+    """What a scanner with guard lines did, cycle by cycle."""
+
+    words: list[int]
+    """What is told: rows lowest, then columns, then stuck columns."""
+    contact: list[int]
+    motion: list[int]
+    driven: list[tuple[int, int, int]]
+    """Rows that are driven, columns that are, and the level of the columns."""
+    packed: list[int]
+    """Cycles in which a frame was packed."""
+
+
+def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
+    """A scanner whose rows are taken at once; a frame is packed two clocks after its last row."""
+    dut = ReversalScanner(skin)
+    sim, sheet = bench(dut), Stimulus(skin, timeline)
+    sink, packed, driven = sim.sink(dut.rows), [], []
+    ports = [getattr(dut.pins, name) for name in sheet.reads]
+    places = list(itertools.accumulate((len(port) for port in ports), initial=0))
+
+    def levels(cycle: int, pins: int) -> int:
+        seen = [pins >> begin & (1 << end - begin) - 1 for begin, end in itertools.pairwise(places)]
+        named = dict(zip(sheet.reads, seen, strict=True))
+        driven.append((named["rows_drive"], named["columns_drive"], named["columns_level"]))
+        columns, rows, _ = sheet.pins(cycle, named)
+        return columns | rows << skin.column_lines
+
+    def is_packed(cycle: int) -> int:
+        ended = [taken for taken, word in sink.transfers[-2:] if word >> skin.columns & 1 and taken == cycle - 2]
+        packed.extend(cycle for _ in ended)
+        return int(bool(ended))
+
+    sim.drive(Cat(dut.pins.columns, dut.pins.rows_read), levels, Cat(*ports))
+    sim.drive(dut.packed, is_packed)
+    words, contact, motion = sim.watch(dut.faults), sim.watch(dut.contact), sim.watch(dut.tag.motion)
+    sim.run(cycles)
+    return Life(words.values, contact.values, motion.values, driven, packed)
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
+    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
+    monkeypatch.setattr(golden, "RETRY_US", 2**8)
+    for module in (reversal, reversal_guard):
+        monkeypatch.setattr(module, "CHECK_BIT", 5)
+    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+
+
+def cut_now_and_then(skin: Skin, rng, cycles: int) -> list[tuple[int, Cuts]]:
+    """Lines that are cut at any place for any time."""
+    found, start = [], rng.randrange(400)
+    while start < cycles:
+        rows = {rng.randrange(skin.row_lines): rng.randrange(skin.column_lines)} if rng.random() < 0.4 else {}
+        columns = {rng.randrange(skin.column_lines): rng.randrange(skin.row_lines)} if rng.random() < 0.4 else {}
+        found.append((start, Cuts(rows, columns)))
+        start += rng.randint(1, rng.choice([60, 900]))
+    return found
+
+
+def any_life(rng, skin: Skin, cycles: int) -> Timeline:
+    timeline = touches(skin, rng, cycles)
+    pieces = [
+        (start, cells, None if stuck is None else np.append(stuck, rng.random() < 0.5))
+        for start, cells, stuck in timeline.pieces
+    ]
+    return Timeline(pieces, timeline.received, cut_now_and_then(skin, rng, cycles))
+
+
+LOCKSTEP = [
+    {"rows": 3, "columns": 4, "alive": True, "fail_safe": True, "mask": ((1, 1),)},
+    {"rows": 4, "columns": 2, "report": "cells", "diodes": "row2col", "send": "always", "fail_safe": True},
+    {"rows": 2, "columns": 3, "debounce": "sym_defer_pk", "debounce_press_us": 7.0, "debounce_release_us": 12.0},
+]
+
+
+@pytest.mark.parametrize("fields", LOCKSTEP, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
+def test_the_whole_board_is_the_golden_models_in_every_clock(rng, soon, fields):
+    skin, cycles = small(**fields, guard=True), 1600
+    timeline = any_life(rng, skin, cycles)
+    assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 150
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("seed", range(60))
+def test_any_skin_with_guard_lines_is_the_golden_models_in_every_clock(rng, soon, seed):
+    skin, cycles = any_skin(rng).replace(guard=True, fail_safe=True, alive=True), 6000
+    timeline = any_life(rng, skin, cycles)
+    assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+def test_frames_come_between_reports_of_faults_and_tell_of_both():
+    skin, every, nothing = small(guard=True), np.ones((3, 4), bool), np.zeros((3, 4), bool)
+    pieces = []
+    for start in range(9000, 14_000, 500):
+        pieces += [(start, every, None), (start + 12, every & [[1], [0], [0]], None), (start + 250, nothing, None)]
+    trace = predict(skin, Timeline(pieces, cuts=[(0, Cuts({1: 4}))]), 16_000)
+    flags = [one.frame.flags for one in frames_in(skin, trace.bytes)]
+    assert {"fault", "motion"} in flags
+    assert flags[0] == frozenset()
+
+
+def breaks(rows: int, columns: int) -> list[tuple[Cuts, int]]:
+    """Each line, guard lines too, cut at each place, and the word that tells it."""
+    found = []
+    for end in range(columns + 1):
+        found += [(Cuts({row: end}), 1 << row) for row in range(rows)]
+        found.append((Cuts({rows: end}), (1 << columns) - (1 << end) << rows))
+    for end in range(rows + 1):
+        found += [(Cuts({}, {column: end}), 1 << rows + column) for column in range(columns)]
+        found.append((Cuts({}, {columns: end}), (1 << rows) - (1 << end)))
+    return found
+
+
+def in_turn(rng, spacing: int, lasts: int) -> tuple[list[int], list[tuple[int, Cuts]]]:
+    """Each break of a 3x2 sheet, from cycles that are about ``spacing`` apart, and mended ``lasts`` cycles later."""
+    at = [number * spacing + 40 + rng.randrange(40) for number in range(len(breaks(3, 2)))]
+    cuts = [(start, cut) for start, (cut, _) in zip(at, breaks(3, 2), strict=True)]
+    return at, sorted(cuts + [(start + lasts, Cuts()) for start in at], key=lambda cut: cut[0])
+
+
+@pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["row2col"]))
+def test_at_rest_each_break_at_each_place_is_told_after_two_checks_and_nothing_else(bench, soon, rng, diodes):
+    skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
+    spacing = 900
+    at, cuts = in_turn(rng, spacing, 100)
+    words = live(bench, skin, Timeline([], cuts=cuts), at[-1] + spacing).words
+    for start, (cut, wanted) in zip(at, breaks(3, 2), strict=True):
+        assert {word & ~wanted for word in words[start : start + spacing - 80]} == {0}, cut
+        assert words[start + 2 * 32 + 20] == wanted, cut
+        assert words[start + spacing - 80] == 0, f"{cut} was mended"
+
+
+def test_two_checks_at_rest_come_within_one_ms():
+    assert golden_guard.CHECK_US == 1 << reversal_guard.CHECK_BIT == 1 << reversal.CHECK_BIT
+    assert 2 * golden_guard.CHECK_US + 20 < 1000
+
+
+@pytest.mark.parametrize("diodes", sample(["col2row", "row2col"], quick=["col2row"]))
+def test_each_break_at_each_place_is_told_within_two_frames_whatever_is_pressed(bench, monkeypatch, rng, diodes):
+    monkeypatch.setattr(reversal, "RETRY_BIT", 7)
+    skin = small(rows=3, columns=2, project_us=2.0, diodes=diodes, **SLOW)
+    spacing = 800
+    at, cuts = in_turn(rng, spacing, 250)
+    pieces = []
+    for start in range(0, at[-1] + spacing, 25):
+        cells = np.array([[rng.random() < 0.5 for _ in range(2)] for _ in range(3)])
+        cells[0, 0] = cells[1, 1] = True  # no single break hides both
+        pieces.append((start, cells, None))
+    life = live(bench, skin, Timeline(pieces, cuts=cuts), at[-1] + spacing)
+    for start, (cut, wanted) in zip(at, breaks(3, 2), strict=True):
+        assert {word & ~wanted for word in life.words[start : start + spacing - 80]} == {0}, cut
+        _, _, _, after_two = [cycle for cycle in life.packed if cycle >= start][:4]  # the first one was under way
+        assert after_two < start + 250
+        assert life.words[after_two] == wanted, cut
+        assert life.words[start + spacing - 80] == 0, f"{cut} was mended"
+
+
+def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, soon, rng):
+    skin = small(rows=2, columns=3, project_us=2.0, mask=((0, 1),), **SLOW)
+    every = [np.array([number >> bit & 1 for bit in range(6)], bool).reshape(2, 3) for number in range(64)]
+    pieces = [(60 * number, cells, None) for number, cells in enumerate(every)]
+    pieces += [(start, every[rng.randrange(64)], None) for start in range(60 * 64, 60 * 64 + 1500, 5)]
+    assert set(live(bench, skin, Timeline(pieces), 60 * 64 + 1500).words) == {0}
+
+
+def test_lines_that_are_masked_whole_are_not_checked(bench, soon):
+    skin = small(rows=3, columns=3, project_us=2.0, mask=((0, 0), (0, 1), (0, 2), (1, 2), (2, 2)), **SLOW)
+    cuts = [(0, Cuts({0: 0}, {2: 0}))]
+    assert set(live(bench, skin, Timeline([], cuts=cuts), 600).words) == {0}
+
+
+def test_a_guard_column_that_is_stuck_is_told_alone_and_driven_no_more_until_the_next_turn(bench, soon):
+    """It says nothing about rows, then; columns are checked on."""
+    skin = small(rows=2, columns=2, project_us=2.0, **SLOW)
+    stuck, cells = np.array([False, False, True]), np.zeros((2, 2), bool)
+    cuts = [(130, Cuts({}, {1: 0}))]
+    life = live(bench, skin, Timeline([(40, cells, stuck), (300, cells, None)], cuts=cuts), 1200)
+    column_1, guard = 1 << 2 + 1, 1 << 4 + 2
+    assert set(life.words) == {0, guard, guard | column_1, column_1}
+    told = life.words.index(guard)
+    assert told < 40 + 3 * 32
+    assert not any(columns >> 2 for _, columns, _ in life.driven[told + 1 : 256])
+    assert any(columns >> 2 for _, columns, _ in life.driven[258:300]), "retried"
+    assert life.words[-1] == column_1
+
+
+def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng):
+    """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7
+    clocks after the touch, in place of 3 clocks."""
+    monkeypatch.setattr(reversal, "CHECK_BIT", 4)
+    monkeypatch.setattr(reversal_guard, "CHECK_BIT", 4)
+    skin = small(rows=2, columns=2, settle_us=0.5, project_us=1.0, precharge_us=0.25, guard=True)
+    turn, pieces = 24 * 16, []
+    touch = [number * turn + rng.choice([0, 1, rng.randrange(-6, 50)]) for number in range(3, 40)]
+    for start in touch:
+        pieces += [(start, np.eye(2, dtype=bool), None), (start + 60, np.zeros((2, 2), bool), None)]
+    contact = live(bench, skin, Timeline(pieces), 40 * turn + 100).contact
+    late = [contact.index(1, start) - start for start in touch]
+    settle, project = facts(skin).settle, facts(skin).project
+    assert min(late) == 3
+    assert settle + project + 3 <= max(late) <= settle + project + 7 == 43
+
+
+def test_a_row_that_is_empty_when_it_is_driven_is_told_as_motion(bench):
+    """Its touch was there as the frame began. What only a debounce time keeps is no motion."""
+    skin = small(rows=3, columns=3, project_us=2.0, mask=((2, 0),), **SLOW)
+    every, nothing = np.ones((3, 3), bool), np.zeros((3, 3), bool)
+    top, last = every & [[1], [0], [0]], every & [[0], [0], [1]]
+    held = [(40, every, None)]
+    assert not any(live(bench, skin, Timeline(held), 200).motion)
+    begun = 40 + 2 + facts(skin).project
+    moved = live(bench, skin, Timeline([*held, (begun + 8, top, None)]), 200)
+    assert moved.motion.index(1) > begun
+    frame = next(cycle for cycle in moved.packed if cycle > begun)
+    assert moved.motion[frame] == 1
+    assert moved.motion[-1] == 0, "the next frame is not"
+    masked = [(40, last, None), (begun + 1, nothing, None)]
+    assert not any(live(bench, skin, Timeline(masked), 200).motion), "a masked switch may have been the one"
+    slow = skin.replace(debounce="sym_defer_pk", debounce_release_us=50.0, mask=())
+    kept = live(bench, slow, Timeline([(40, top, None), (90, nothing, None)]), 200)
+    assert sum(kept.motion) <= 2 * facts(slow).row_clocks + 20
