@@ -21,6 +21,8 @@ from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
 from contactfpga_hdl.scan.pins import column_pins, connect_lines, connect_pins, row_pins
+from contactfpga_hdl.units.ports import unit_pins
+from contactfpga_hdl.units.units import Units
 
 
 class Top(wiring.Component):
@@ -29,8 +31,9 @@ class Top(wiring.Component):
     rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
     :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
     tx (out), rx (in): the UART.
-    contact (out): high while something touches the sheet; with ``fail_safe`` also while a fault is known, and a clock
-    later.
+    contact (out): high while something touches the sheet, or with units while a threshold is reached; with
+    ``fail_safe`` also while a fault is known or units have no threshold, and a clock later.
+    spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, those at their converter.
     alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
     With ``probes`` the transfers at the stage boundaries are outputs too, for co-simulation: rows handed to the
@@ -48,6 +51,7 @@ class Top(wiring.Component):
         ports = {
             **row_pins(skin),
             **column_pins(skin),
+            **unit_pins(skin),
             "tx": Out(1, init=1),
             "rx": In(1, init=1),
             "contact": Out(1),
@@ -88,7 +92,8 @@ class Top(wiring.Component):
         wiring.connect(m, link.bytes, transmitter.bytes)
         wiring.connect(m, receiver.bits, request.bits)
         connect_lines(m, self.skin, scan.pins, self)
-        self._watch_faults(m, scan, packer)
+        units = self._units(m, request, link) if self.skin.units else None
+        self._watch_faults(m, scan, packer, units)
         if "faults" in link.signature.members:
             m.d.comb += link.faults.eq(scan.faults)
         m.d.comb += [
@@ -115,15 +120,23 @@ class Top(wiring.Component):
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
-    def _watch_faults(self, m: Module, scan: Any, packer: Packer) -> None:
-        """What a fault does to the pins."""
+    def _units(self, m: Module, request: RequestReader, link: Link) -> Units:
+        m.submodules.units = units = Units(self.skin)
+        connect_pins(m, units.pins, self)
+        wiring.connect(m, units.packet, link.units)
+        m.d.comb += [units.command.eq(request.command), units.what.eq(request.what), units.value.eq(request.value)]
+        return units
+
+    def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: Units | None) -> None:
+        """What a fault does to the pins, and what units do."""
         fault = Signal()
+        over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
         if self.skin.fail_safe:
             # Both may change at once: from a register without a glitch.
-            m.d.sync += self.contact.eq(scan.contact | fault)
+            m.d.sync += self.contact.eq(scan.contact | over | fault | unwatched)
         else:
-            m.d.comb += self.contact.eq(scan.contact)
+            m.d.comb += self.contact.eq(scan.contact | over)
         if self.skin.alive:
             m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
             watched = scan.watched if self.derived.scan.waits else 0

@@ -1,4 +1,4 @@
-"""Whole frames from the packer to the wire, newest first, and hellos and reports of faults between them."""
+"""Whole frames from the packer to the wire, newest first, and hellos, reports of faults and readings between them."""
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import crc, memory, stream, wiring
@@ -7,10 +7,12 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, HELLO_BIT, KEEP_ALIVE_BIT, TIME_BITS, Derived
 from contactfpga.wire import protocol
+from contactfpga.wire.units import plain_bytes
 from contactfpga_hdl.link.faults import Reporter, slots_layout
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, summary_layout, tag_layout
+from contactfpga_hdl.units.pack import packet_signature
 
 HELLO_REGION = 3
 """The others hold frames."""
@@ -28,6 +30,8 @@ class _Wire:
         self.is_hello = Signal()
         self.take_report = Signal()
         self.is_report = Signal()
+        self.take_units = Signal()
+        self.is_units = Signal()
         self.offset = Signal(offset_bits(skin))  # of the byte on offer, in its region
         self.fetches = Signal()  # that byte is read
 
@@ -53,7 +57,7 @@ class Link(wiring.Component):
     The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
 
     A hello goes first, then a report of faults, then a frame; but a frame that waits is next after a report, so that
-    it waits for one at most, and one more per hello.
+    it waits for one at most, and one more per hello. Readings of units go when nothing else waits.
 
     frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -63,6 +67,7 @@ class Link(wiring.Component):
     due (out): a frame is to be sent though nothing has changed.
     number (in): of the last request.
     faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
+    units (in): of a Skin with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     """
 
@@ -82,6 +87,7 @@ class Link(wiring.Component):
                 "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
                 **({"faults": In(faults)} if faults.size else {}),
                 **({"slots": In(stream.Signature(slots_layout(self.derived)))} if skin.self_test else {}),
+                **({"units": In(packet_signature())} if skin.units else {}),
                 "bytes": Out(stream.Signature(8)),
             }
         )
@@ -97,6 +103,9 @@ class Link(wiring.Component):
         reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
         if reporter is not None:
             byte = Mux(wire.is_report, reporter.byte, byte)
+        if self.skin.units:
+            byte = Mux(wire.is_units, self.units.byte, byte)
+            m.d.comb += [self.units.taken.eq(wire.take_units), self.units.place.eq(wire.offset)]
         self._send(m, wire, regions, hello_due, byte, reporter)
         return m
 
@@ -123,6 +132,15 @@ class Link(wiring.Component):
         with m.If(wire.take_report):
             m.d.comb += wire.take_frame.eq(0)
             m.d.sync += end.eq(reporter.length)
+            m.next = "FETCH"
+
+    def _take_units(self, m: Module, wire: _Wire, end: Value) -> None:
+        """When nothing else waits."""
+        idle = ~(wire.take_hello | wire.take_report | wire.take_frame)
+        m.d.comb += wire.take_units.eq(self.units.due & idle)
+        m.d.sync += wire.is_units.eq(wire.take_units)
+        with m.If(wire.take_units):
+            m.d.sync += end.eq(1 + plain_bytes(self.skin.units, self.derived.units.converter.bits))
             m.next = "FETCH"
 
     def _place_frames(self, m: Module, wire: _Wire, regions: _Regions) -> None:
@@ -228,8 +246,8 @@ class Link(wiring.Component):
         self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value, reporter: Reporter | None
     ) -> None:
         end = Signal.like(wire.offset)
-        seeded = wire.take_frame if reporter is None else wire.take_frame | wire.take_report
-        seeds = Signal()  # one clock after a frame or a report was taken
+        seeded = wire.take_frame | wire.take_report | wire.take_units
+        seeds = Signal()  # one clock after anything but a hello was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
         tail = Signal(range(CHECK_BYTES + 1))
@@ -255,6 +273,8 @@ class Link(wiring.Component):
                     m.next = "FETCH"
                 if reporter is not None:
                     self._take_report(m, wire, regions, hello_due, end, reporter)
+                if self.skin.units:
+                    self._take_units(m, wire, end)
             with m.State("FETCH"):
                 m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"

@@ -7,12 +7,13 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from contactfpga.choices import debounces, labellers, scans
+from contactfpga.choices import converters, debounces, labellers, scans
 from contactfpga.choices.choice import Choice
 from contactfpga.choices.reports import REPORTS
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.skin import limits
+from contactfpga.skin.check_units import check_units
 from contactfpga.skin.derived import Derived
 
 if TYPE_CHECKING:
@@ -34,9 +35,12 @@ _REGISTERED: dict[str, Callable[[object], Choice]] = {
     "labeller": labellers.find,
     "scan": scans.find,
     "debounce": debounces.find,
+    "converter": converters.find,
 }
 _SWITCHES = ("guard", "fail_safe", "alive", "self_test", "dual")
-_WHOLE = ("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "clock_hz", "baud")
+_WHOLE = (
+    *("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "units", "clock_hz", "baud"),
+)
 
 
 def check_types(skin: Skin) -> dict[str, Any]:
@@ -112,7 +116,7 @@ def check_sheet(skin: Skin) -> dict[str, Any]:
     _check_surface(skin)
     _check_guard(skin)
     orders = {name: _check_order(name, getattr(skin, name), lines) for name, lines in _ordered(skin)}
-    return {"mask": mask, **orders}
+    return {"mask": mask, **orders, **check_units(skin)}
 
 
 def _ordered(skin: Skin) -> list[tuple[str, int]]:

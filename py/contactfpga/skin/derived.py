@@ -10,6 +10,7 @@ from contactfpga.choices import debounces, labellers, scans
 from contactfpga.choices.labellers import Labeller
 from contactfpga.choices.scans import Scan
 from contactfpga.skin import rates
+from contactfpga.skin.units import Units
 from contactfpga.skin.widths import CHECK_BYTES as CHECK_BYTES
 from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
@@ -61,7 +62,12 @@ class Derived(Widths):
     @property
     def commands(self) -> tuple[int, ...]:
         """Numbers of the commands that the board takes."""
-        return (SELF_TEST,) if self.skin.self_test else ()
+        return (*((SELF_TEST,) if self.skin.self_test else ()), *self.units.commands)
+
+    @functools.cached_property
+    def units(self) -> Units:
+        """What follows from its pressure units."""
+        return Units(self.skin)
 
     # ---- times, in clocks unless named otherwise
 

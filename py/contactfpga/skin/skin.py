@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from contactfpga.choices import scans
+from contactfpga.choices.converters import Converter, ConverterName
 from contactfpga.choices.debounces import Debounce, DebounceName
 from contactfpga.choices.labellers import Labeller, LabellerName
 from contactfpga.choices.reports import REPORTS, ReportName
@@ -117,6 +118,16 @@ class Skin:
     dual: bool = False
     """Two copies of the gateware are compared in each clock; where they differ nothing passes for a frame, and both
     start anew."""
+
+    units: int = 0
+    """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
+    converter: ConverterName | Converter = "mcp3208"
+    """What reads them."""
+    converter_v: float = limits.CONVERTER_V
+    """The converter's supply in V, which limits its SPI clock."""
+    unit_sums: tuple[tuple[int, ...], ...] = ()
+    """Up to four weighted sums of the units' deviations from their zeros, which have thresholds of their own: a weight
+    from -127 to 127 for each unit."""
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""

@@ -12,11 +12,12 @@ from contactfpga.skin.derived import SELF_TEST, Derived
 from contactfpga.skin.rates import pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
+from contactfpga.wire.units import FACTS_BYTES, UnitFacts
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 9, 255
 
 _SHEET = struct.Struct("<BBBBBBHBB")
 _PITCH = struct.Struct("<dd")
@@ -41,6 +42,7 @@ _SIZES = {
     RADIUS: _RADIUS.size,
     FINGERPRINT: _FINGERPRINT_BYTES,
     RATES: _RATES.size,
+    UNITS: FACTS_BYTES,
     CHECK: _CHECK.size,
 }
 """The least bytes of a field."""
@@ -64,6 +66,8 @@ class Hello:
     """The board has guard lines, and tells faults by name."""
     commands: bytes
     """Numbers of the commands that the board takes; see :meth:`Board.command`."""
+    units: UnitFacts | None = None
+    """Its pressure units; None: it has none."""
     sent: int
     """Frames sent since power-up."""
     epoch: int
@@ -105,6 +109,8 @@ def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuc
         facts.append((NAME, skin.name.encode()))
     if commands := Derived(skin).commands:
         facts.append((COMMANDS, bytes(commands)))
+    if skin.units:
+        facts.append((UNITS, UnitFacts.of(Derived(skin).units).encode()))
     fixed = [bytes([kind, len(value)]) + value for kind, value in facts]
     counters = ((sent, SENT_DIGITS), (epoch, EPOCH_DIGITS), (heard, HEARD_DIGITS), (stuck, STUCK_DIGITS), (0, 1))
     state = bytes([STATE, STATE_DIGITS]) + b"".join(digits(value, count) for value, count in counters)
@@ -197,6 +203,7 @@ def _hello(fields: dict[int, bytes]) -> Hello:
         send=_SENDS[send],
         guard=bool(faults & 1),
         commands=fields.get(COMMANDS, b""),
+        units=UnitFacts.decode(fields[UNITS]) if UNITS in fields else None,
         **_counters(state),
     )
 

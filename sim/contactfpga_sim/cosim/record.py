@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.sheet import converter
 from contactfpga_sim.sheet.shift import Sheet
 
 if TYPE_CHECKING:
@@ -40,8 +41,10 @@ class Stimulus:
 
     def __init__(self, skin: Skin, timeline: Timeline):
         self._sheet = Sheet(skin)
-        self.reads = self._sheet.reads
-        self.drives = (*self._sheet.drives, "rx")
+        self._converter = converter.converter_of(skin)
+        self.reads = self._sheet.reads + (converter.PINS if self._converter else ())
+        self.drives = (*self._sheet.drives, "rx", *(("spi_miso",) if self._converter else ()))
+        self._units = list(reversed(timeline.units))
         self._pieces = list(reversed(timeline.pieces))
         self._cuts = list(reversed(timeline.cuts))
         self._bit_clocks = facts(skin).bit_clocks
@@ -56,7 +59,15 @@ class Stimulus:
         if self._cuts and self._cuts[-1][0] <= cycle:
             _, cuts = self._cuts.pop()
             self._sheet.matrix.cut(cuts.rows, cuts.columns)
-        return (*self._sheet.step(pins), self._rx(cycle))
+        return (*self._sheet.step(pins), self._rx(cycle), *self._convert(cycle, pins))
+
+    def _convert(self, cycle: int, pins: Mapping[str, int]) -> tuple[int, ...]:
+        if self._converter is None:
+            return ()
+        if self._units and self._units[-1][0] <= cycle:
+            _, readings = self._units.pop()
+            self._converter.codes[: len(readings)] = readings
+        return (self._converter.step(*(pins[name] for name in converter.PINS)),)
 
     def _rx(self, cycle: int) -> int:
         if self._received and self._received[-1][0] == cycle:

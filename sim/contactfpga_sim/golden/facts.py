@@ -78,8 +78,9 @@ class Facts:
 
     @property
     def commands(self) -> bytes:
-        """Numbers of the commands that the board takes: 1 is the self-test."""
-        return b"\x01" if self.skin.self_test else b""
+        """Numbers of the commands that the board takes: 1 is the self-test, 3 to 5 are of units and their sums."""
+        of_units = b"\x03\x04" + b"\x05" * bool(self.skin.unit_sums) if self.skin.units else b""
+        return b"\x01" * self.skin.self_test + of_units
 
     @functools.cached_property
     def clocks_per_us(self) -> int:

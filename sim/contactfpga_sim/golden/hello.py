@@ -7,13 +7,14 @@ import struct
 import zlib
 from collections.abc import Sequence
 
+from contactfpga.choices import converters
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.packet import Packet
 from contactfpga_sim.golden.request import Heard
 from contactfpga_sim.golden.scan import Scan
 
 KIND = 4
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 9, 255
 DIGITS = range(16, 32)
 """Where the digits lie, counted from the delimiter in front."""
 
@@ -35,10 +36,21 @@ def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
         rest += _field(NAME, skin.name.encode("utf-8"))
     if facts.commands:
         rest += _field(COMMANDS, facts.commands)
+    if skin.units:
+        rest += _field(UNITS, _units(facts))
     checked = _field(CHECK, struct.pack("<I", zlib.crc32(fixed + rest)))
     packet = Packet()
     packet.push(fixed + _field(STATE, bytes(128 + digit for digit in digits)) + rest + checked + bytes([KIND << 4]))
     return b"\0" + packet.wire()
+
+
+def _units(facts: Facts) -> bytes:
+    skin = facts.skin
+    rule = converters.find(skin.converter).load_golden()
+    most = max((sum(map(abs, row)) for row in skin.unit_sums), default=0) * (2**rule.bits - 1)
+    between = rule.levels * rule.level(facts)
+    sizes = (skin.units, rule.bits, len(skin.unit_sums), most.bit_length())
+    return struct.pack("<BBBBHI", *sizes, between, between * skin.units)
 
 
 class State:

@@ -1,6 +1,9 @@
-"""Link: hellos, reports of faults and frames take turns on the wire; the newest complete frame waits."""
+"""Link: hellos, reports of faults, frames and readings of units take turns on the wire; the newest complete frame waits,
+and the newest sweep of all units."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.faults import Reports, Told, report
@@ -11,10 +14,13 @@ class Link:
     """Who takes the wire when. Time only moves forward, by :meth:`advance`.
 
     ``told``: what the scan knows of its lines, which must be known up to the cycle of each :meth:`advance`; in the end
-    up to that of :meth:`finish`.
+    up to that of :meth:`finish`. ``units``: (cycle from which on it waits, packet) of each sweep, the next one of which
+    takes its place.
     """
 
-    def __init__(self, facts: Facts, state: State, told: Told | None = None):
+    def __init__(
+        self, facts: Facts, state: State, told: Told | None = None, units: Sequence[tuple[int, bytes]] = ()
+    ):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
@@ -32,6 +38,9 @@ class Link:
         """Where reports begin in ``bytes``; they are not filled in either."""
         self._after_report = -1
         """The cycle from which on the wire was idle after the last one."""
+        self._units = units
+        self._swept = 0
+        """Sweeps that were taken, or replaced by one that was."""
         self._idle_from = 0
         self._uart_from = 0
 
@@ -55,7 +64,8 @@ class Link:
         while True:
             due = self._reports.due(cycle) if self._reports and self._idle_from <= cycle else None
             frame_from = [self._frame[0]] if self._frame else []
-            waits = [*self._hellos, *frame_from, *([] if due is None else [due])]
+            swept = [self._units[self._swept][0]] if self._swept < len(self._units) else []
+            waits = [*self._hellos, *frame_from, *([] if due is None else [due]), *swept]
             if not waits:
                 return
             taken = max(self._idle_from, min(waits))
@@ -66,8 +76,9 @@ class Link:
                 self._send_hello(taken)
             elif due is not None and due <= taken and not self._frame_is_next(taken):
                 self._send_report(taken)
+            elif not self._frame or self._frame[0] > taken:
+                self._send_sweep(taken)
             else:
-                assert self._frame
                 packet = self._frame[1]
                 self._frame = None
                 self.sent += 1
@@ -95,6 +106,12 @@ class Link:
         self._send(taken, report(self._facts))
         self._after_report = self._idle_from
         self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._idle_from)
+
+    def _send_sweep(self, taken: int) -> None:
+        while self._swept < len(self._units) and self._units[self._swept][0] <= taken:
+            packet = self._units[self._swept][1]
+            self._swept += 1
+        self._send(taken, packet)
 
     def _send_hello(self, taken: int) -> None:
         self._blank.append((len(self.bytes), taken, self.sent))

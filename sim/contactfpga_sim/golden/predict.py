@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import divide, label, request, safe, scan, uart
+from contactfpga_sim.golden import divide, label, request, safe, scan, uart, units
 from contactfpga_sim.golden.facts import Facts, facts
 from contactfpga_sim.golden.faults import Told
 from contactfpga_sim.golden.frame import Items, Packer, Queue, join
@@ -44,7 +44,8 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
     told = Told()
-    link = Link(known, State(known, frames, heard), told)
+    pressed = units.play(known, timeline, heard.requests, cycles)
+    link = Link(known, State(known, frames, heard), told, pressed.packets)
     half_second = 2**19 * known.clocks_per_us
     timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
@@ -54,7 +55,9 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
     scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
     faulty = safe.fault(frames, stages.told)
-    trace.contact = safe.contact(scanned.contact, faulty) if skin.fail_safe else scanned.contact
+    touched = safe.either(scanned.contact, pressed.over)
+    unwatched = [(0, 1), *((cycle, 1 - level) for cycle, level in pressed.armed)] if skin.units else []
+    trace.contact = safe.contact(touched, safe.either(faulty, unwatched)) if skin.fail_safe else touched
     trace.alive = safe.alive(known, sorted(stages.well), faulty, cycles) if skin.alive else []
     return trace, link, scanned
 

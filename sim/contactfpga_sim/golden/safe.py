@@ -23,6 +23,12 @@ def fault(scanned: Iterable[Scan], told: Changes) -> Changes:
     return _changes(levels)
 
 
+def either(one: Changes, other: Changes) -> Changes:
+    """Of a level that is high while one of two is."""
+    cycles = sorted({cycle for cycle, _ in (*one, *other)})
+    return _changes((cycle, _level(one, cycle) | _level(other, cycle)) for cycle in cycles)
+
+
 def contact(touched: Changes, faulty: Changes) -> Changes:
     """Of the contact pin with ``fail_safe``: a clock after either."""
     levels = []

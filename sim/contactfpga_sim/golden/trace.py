@@ -47,12 +47,14 @@ class Timeline:
     and the (C,) bool array ``stuck`` (or None) tells the columns that read pressed whatever row is driven; with a guard
     column it may be (C + 1,). Starts rise; before the first one nothing is pressed. ``received`` are (cycle, bytes):
     bytes whose first start bit begins at the receive pin in that cycle, back to back; cycles rise, and those before are
-    over. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; before the first one all lines are whole.
+    over. ``units`` are (start cycle, readings): what the converter's inputs would read from that cycle on, 0 before the
+    first one. ``cuts`` are (start cycle, :class:`Cuts`) at rising starts; before the first one all lines are whole.
     """
 
     pieces: Sequence[tuple[int, np.ndarray, np.ndarray | None]]
     received: Sequence[tuple[int, bytes]] = ()
     cuts: Sequence[tuple[int, Cuts]] = ()
+    units: Sequence[tuple[int, Sequence[int]]] = ()
 
     def __post_init__(self) -> None:
         starts = [piece[0] for piece in self.pieces]
@@ -63,8 +65,12 @@ class Timeline:
         cut = [start for start, _ in self.cuts]
         if any(late <= early for early, late in itertools.pairwise(cut)):
             raise ValueError("lines must be cut at rising cycles")
+        read = [start for start, _ in self.units]
+        if any(late <= early for early, late in itertools.pairwise(read)):
+            raise ValueError("readings must change at rising cycles")
         object.__setattr__(self, "_starts", starts)
         object.__setattr__(self, "_cut", cut)
+        object.__setattr__(self, "_read", read)
 
     @classmethod
     def frames(
@@ -91,6 +97,11 @@ class Timeline:
         """Lines that are cut in ``cycle``."""
         index = bisect.bisect_right(self._cut, cycle) - 1  # type: ignore[attr-defined]
         return Cuts() if index < 0 else self.cuts[index][1]
+
+    def units_at(self, cycle: int, unit: int) -> int:
+        """What a unit would read in ``cycle``."""
+        index = bisect.bisect_right(self._read, cycle) - 1  # type: ignore[attr-defined]
+        return 0 if index < 0 else self.units[index][1][unit]
 
 
 @dataclasses.dataclass

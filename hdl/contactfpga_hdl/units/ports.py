@@ -1,0 +1,36 @@
+"""The pins of an SPI converter, and what every converter hands over."""
+
+from amaranth.lib import data, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.skin.units import INDEX_BITS
+
+
+def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
+    """The pins at the converter; none without units."""
+    if not skin.units:
+        return {}
+    return {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
+
+
+def reading_layout(skin: Skin) -> data.StructLayout:
+    """A reading, of which unit, and whether that is the sweep's last one."""
+    return data.StructLayout({"value": Derived(skin).units.converter.bits, "unit": INDEX_BITS, "last": 1})
+
+
+def converter_ports(skin: Skin) -> dict[str, wiring.Member]:
+    """Of every converter.
+
+    pins: those at the converter, from registers.
+    sampled (out): high in the clock in which a sweep's first unit is sampled.
+    done (out): high for a clock when a reading is there; units come in ascending order, at least 14 clocks apart.
+    reading (out): valid with ``done``.
+    """
+    return {
+        "pins": Out(wiring.Signature(unit_pins(skin))),
+        "sampled": Out(1),
+        "done": Out(1),
+        "reading": Out(reading_layout(skin)),
+    }

@@ -1,0 +1,65 @@
+"""Converters: what reads the pressure units, over SPI."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+from contactfpga.choices.choice import Choice
+from contactfpga.choices.choice import find as find_choice
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Converter(Choice):
+    """Pressure units in, readings out, in sweeps over all units.
+
+    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.units.ports.converter_ports`. ``golden`` is a
+    :class:`contactfpga_sim.golden.units.ConverterRule`.
+    """
+
+    bits: int
+    """Of a reading, at most 28."""
+    channels: int
+    """The most units."""
+    limits: tuple[tuple[float, int], ...]
+    """(supply in V, SPI clock in Hz at most) of the data sheet, rising; the first one is the least supply."""
+    most_v: float
+    """The highest supply."""
+    least_level_ns: int
+    """How long the SPI clock must be high and low."""
+    sweep_levels: int
+    """High or low levels of the SPI clock in a sweep, for each unit."""
+    spacing_levels: int
+    """The same between the samples of two units; 0 where all are taken at once."""
+
+    def most_hz(self, supply_v: float) -> int:
+        """The SPI clock at most; between two supplies of the data sheet that of the lower one counts."""
+        return max((hz for volts, hz in self.limits if volts <= supply_v), default=0)
+
+
+ConverterName = Literal["mcp3208"]
+
+CONVERTERS: dict[str, Converter] = {
+    converter.name: converter
+    for converter in (
+        Converter(
+            name="mcp3208",
+            title="MCP3208",
+            gateware="contactfpga_hdl.units.mcp3208:Mcp3208",
+            golden="contactfpga_sim.golden.units:MCP3208",
+            bits=12,
+            channels=8,
+            limits=((2.7, 1_000_000), (5.0, 2_000_000)),
+            most_v=5.5,
+            least_level_ns=250,
+            sweep_levels=40,
+            spacing_levels=40,
+        ),
+    )
+}
+"""The built-in ones, by name. A new one is a line here, its gateware and its golden rule (docs/extend.md)."""
+
+
+def find(value: object) -> Converter:
+    """The converter that a Skin's ``converter`` names or is. Raises SkinError."""
+    return find_choice(Converter, CONVERTERS, value)

@@ -1,0 +1,73 @@
+"""What follows from a Skin's pressure units: clocks of their converter, widths of their sums, and their packets."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import TYPE_CHECKING
+
+from contactfpga.choices import converters
+from contactfpga.choices.converters import Converter
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+ZERO, THRESHOLD, SUM_THRESHOLD = 3, 4, 5
+"""Numbers of commands: what a unit reads without load, from which deviation on a unit, and a sum, raises ``contact``
+(docs/protocol.md)."""
+
+INDEX_BITS, NUMBER_BITS = 3, 18
+"""Of such a command's value: which unit or sum, and a number in steps of a power of two."""
+MAX_SUMS, MAX_WEIGHT = 4, 127
+
+
+@dataclasses.dataclass(frozen=True)
+class Units:
+    """Of a Skin with ``units``."""
+
+    skin: Skin
+
+    @functools.cached_property
+    def converter(self) -> Converter:
+        return converters.find(self.skin.converter)
+
+    @property
+    def level_clocks(self) -> int:
+        """How long the SPI clock is high, and how long low."""
+        most_hz = self.converter.most_hz(self.skin.converter_v)
+        least = self.converter.least_level_ns * self.skin.clock_hz
+        return max(-(-self.skin.clock_hz // (2 * most_hz)), -(-least // 1_000_000_000))
+
+    @property
+    def spacing_clocks(self) -> int:
+        """From a unit's sample to that of the next one."""
+        return self.converter.spacing_levels * self.level_clocks
+
+    @property
+    def sweep_clocks(self) -> int:
+        """From a unit's sample to its next one."""
+        return self.converter.sweep_levels * self.level_clocks * self.skin.units
+
+    @functools.cached_property
+    def sum_bits(self) -> int:
+        """Of the largest amount that a weighted sum of deviations can have; 0 without sums."""
+        full = (1 << self.converter.bits) - 1
+        return max((full * sum(map(abs, row)) for row in self.skin.unit_sums), default=0).bit_length()
+
+    @property
+    def commands(self) -> tuple[int, ...]:
+        """Numbers of the commands that a board takes for its units."""
+        if not self.skin.units:
+            return ()
+        return (ZERO, THRESHOLD, SUM_THRESHOLD) if self.skin.unit_sums else (ZERO, THRESHOLD)
+
+
+def number_shift(bits: int) -> int:
+    """Commands give numbers of so many bits in steps of 2 to this power."""
+    return max(0, bits - NUMBER_BITS)
+
+
+def digits_of_reading(bits: int) -> int:
+    """Digits of seven bits on the wire."""
+    return math.ceil(bits / 7)

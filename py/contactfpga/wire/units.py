@@ -1,0 +1,134 @@
+"""What a board tells of its pressure units, and the commands that set their zeros and thresholds (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from collections.abc import Sequence
+
+from contactfpga.inputs.values import shown, whole
+from contactfpga.skin.units import (
+    INDEX_BITS,
+    SUM_THRESHOLD,
+    THRESHOLD,
+    ZERO,
+    Units,
+    digits_of_reading,
+    number_shift,
+)
+from contactfpga.wire.framing import DIGIT_BITS, FLAG_BITS, PacketError, digits, last_byte, number
+
+KIND_UNITS = 8
+TIME_BITS, SEQUENCE_BITS = 24, 8
+TRAILER_DIGITS = -(-(TIME_BITS + SEQUENCE_BITS) // DIGIT_BITS)
+OVER, ARMED = 1, 2
+"""Flags: a threshold is reached, and there is one."""
+
+_FACTS = struct.Struct("<BBBBHI")
+FACTS_BYTES = _FACTS.size
+
+
+@dataclasses.dataclass(frozen=True)
+class UnitFacts:
+    """What a hello says of a board's pressure units."""
+
+    count: int
+    bits: int
+    """Of a reading."""
+    sums: int
+    sum_bits: int
+    """Of the largest amount of a sum; 0: there is none."""
+    spacing_clocks: int
+    """From a unit's sample to that of the next one; 0: all are sampled at once."""
+    sweep_clocks: int
+    """From one sweep to the next."""
+
+    @classmethod
+    def of(cls, units: Units) -> UnitFacts:
+        """Of a Skin."""
+        skin = units.skin
+        sums = len(skin.unit_sums)
+        clocks = units.spacing_clocks, units.sweep_clocks
+        return cls(skin.units, units.converter.bits, sums, units.sum_bits, *clocks)
+
+    def encode(self) -> bytes:
+        """As in a hello."""
+        return _FACTS.pack(*dataclasses.astuple(self))
+
+    @classmethod
+    def decode(cls, value: bytes) -> UnitFacts:
+        """Raises ValueError."""
+        facts = cls(*_FACTS.unpack_from(value))
+        if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= 28 and facts.sweep_clocks):
+            raise ValueError(f"{facts.count} units of {facts.bits} bits, {facts.sweep_clocks} clocks a sweep")
+        return facts
+
+
+@dataclasses.dataclass(frozen=True)
+class Sweep:
+    """The readings of all units, one after the other."""
+
+    time_us: int
+    """Device time of the first unit's sample, modulo 2^24 us."""
+    sequence: int
+    """Sweeps before this one, modulo 256."""
+    readings: tuple[int, ...]
+    over: bool
+    """A threshold is reached."""
+    armed: bool
+    """The board has a threshold."""
+
+
+def plain_bytes(units: int, bits: int) -> int:
+    """Of a packet."""
+    return units * digits_of_reading(bits) + TRAILER_DIGITS + 1
+
+
+def encode_sweep(sweep: Sweep, bits: int) -> bytes:
+    """The plain bytes of a packet."""
+    data = b"".join(digits(reading, digits_of_reading(bits)) for reading in sweep.readings)
+    trailer = digits(sweep.sequence << TIME_BITS | sweep.time_us, TRAILER_DIGITS)
+    return data + trailer + bytes([last_byte(KIND_UNITS, OVER * sweep.over | ARMED * sweep.armed)])
+
+
+def decode_sweep(plain: bytes, facts: UnitFacts) -> Sweep:
+    """Read an unsealed packet; raises :class:`PacketError` where it is none of such a board."""
+    if len(plain) != plain_bytes(facts.count, facts.bits):
+        raise PacketError("length", f"sweep of {len(plain)} bytes; {facts.count} units take another number")
+    width, trailer = digits_of_reading(facts.bits), number(plain[-TRAILER_DIGITS - 1 : -1])
+    readings = tuple(number(plain[place * width : (place + 1) * width]) for place in range(facts.count))
+    written = all(byte & 0x80 for byte in plain[:-1])
+    if not written or trailer >> TIME_BITS + SEQUENCE_BITS or any(reading >> facts.bits for reading in readings):
+        raise PacketError("content", "a sweep is not written in digits, or filled up with something but zeros")
+    flags = plain[-1] & (1 << FLAG_BITS) - 1
+    return Sweep(
+        trailer & (1 << TIME_BITS) - 1, trailer >> TIME_BITS, readings, bool(flags & OVER), bool(flags & ARMED)
+    )
+
+
+def zero_value(facts: UnitFacts, unit: int, reading: object) -> tuple[int, int]:
+    """(what, value) of the command that says what a unit reads without load. Raises ValueError."""
+    return _value(ZERO, "unit", unit, facts.count, "zero", reading, facts.bits)
+
+
+def threshold_value(facts: UnitFacts, unit: int, deviation: object) -> tuple[int, int]:
+    """(what, value) of the command that sets the deviation from which on a unit raises ``contact``; 0: never."""
+    return _value(THRESHOLD, "unit", unit, facts.count, "threshold", deviation, facts.bits)
+
+
+def sum_threshold_value(facts: UnitFacts, index: int, deviation: object) -> tuple[int, int]:
+    """The same of a weighted sum; rounded down where the board has no finer steps, but not to 0."""
+    return _value(SUM_THRESHOLD, "sum", index, facts.sums, "threshold", deviation, facts.sum_bits)
+
+
+def _value(what: int, kind: str, index: object, count: int, name: str, given: object, bits: int) -> tuple[int, int]:
+    place, amount = whole(index), whole(given)
+    if place is None or not 0 <= place < count:
+        raise ValueError(f"{kind} is {shown(index)}; this board has {count}, counted from 0")
+    if amount is None or not 0 <= amount < 1 << bits:
+        raise ValueError(f"{name} of {kind} {place} is {shown(given)}; it must be a whole number from 0 to {(1 << bits) - 1}")
+    shift = number_shift(bits)
+    steps = max(amount >> shift, 1) if amount and what != ZERO else amount >> shift
+    return what, steps << INDEX_BITS | place
+
+

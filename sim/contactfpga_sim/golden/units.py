@@ -1,0 +1,159 @@
+"""Pressure units: when each is read, what is sent of it, and when thresholds raise the contact pin (docs/timing.md)."""
+
+from __future__ import annotations
+
+import bisect
+import dataclasses
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from contactfpga.choices import converters
+from contactfpga_sim.golden.facts import Facts
+from contactfpga_sim.golden.packet import Packet
+from contactfpga_sim.golden.request import Request
+
+if TYPE_CHECKING:
+    from contactfpga_sim.golden.scan import Changes
+    from contactfpga_sim.golden.trace import Timeline
+
+KIND, OVER, ARMED = 8, 1, 2
+SET_ZERO, SET_THRESHOLD, SET_SUM_THRESHOLD = 3, 4, 5
+
+
+@dataclasses.dataclass(frozen=True)
+class ConverterRule:
+    """A converter that reads one unit after the other; times in levels of its clock, high or low."""
+
+    bits: int
+    supplies: tuple[tuple[float, int], ...]
+    """(V, Hz): from this supply on its clock may be this fast."""
+    least_level_ns: int
+    levels: int
+    """From one conversion to the next."""
+    sampled: int
+    """From the selection to the sample."""
+    last_bit: int
+    """From the selection to the edge at which the last bit is taken."""
+
+    def level(self, facts: Facts) -> int:
+        """Clocks of a level."""
+        fastest = max(hz for volts, hz in self.supplies if volts <= facts.skin.converter_v)
+        by_rate = Fraction(facts.skin.clock_hz, 2 * fastest)
+        by_level = Fraction(self.least_level_ns * facts.skin.clock_hz, 10**9)
+        return -(-max(by_rate, by_level) // 1)
+
+    def first(self, facts: Facts) -> int:
+        """The cycle in which the first conversion selects the converter: two levels after power-up, from a register."""
+        return 2 * self.level(facts) + 1
+
+
+MCP3208 = ConverterRule(12, ((2.7, 1_000_000), (5.0, 2_000_000)), 250, levels=40, sampled=12, last_bit=37)
+
+
+@dataclasses.dataclass
+class Units:
+    """What the units do in a run."""
+
+    packets: list[tuple[int, bytes]] = dataclasses.field(default_factory=list)
+    """(cycle from which on it waits, packet) of every sweep, as on the wire."""
+    over: Changes = dataclasses.field(default_factory=list)
+    """(cycle, level): whether a threshold is reached."""
+    armed: Changes = dataclasses.field(default_factory=list)
+    """(cycle, level): whether there is a threshold."""
+
+
+class _Settings:
+    """Zeros and thresholds by cycle; a command counts from the cycle after it was taken."""
+
+    def __init__(self, facts: Facts, bits: int, requests: Sequence[Request]):
+        skin = facts.skin
+        largest = max((sum(map(abs, row)) for row in skin.unit_sums), default=0) * (2**bits - 1)
+        counts = {SET_ZERO: skin.units, SET_THRESHOLD: skin.units, SET_SUM_THRESHOLD: len(skin.unit_sums)}
+        widths = {SET_ZERO: bits, SET_THRESHOLD: bits, SET_SUM_THRESHOLD: largest.bit_length()}
+        self._set: dict[tuple[int, int], list[tuple[int, int, bool]]] = {}
+        for one in requests:
+            what, value = one.command or (0, 0)
+            place, number = value % 8, value // 8
+            if place < counts.get(what, 0):
+                width = widths[what]
+                kept = number * 2 ** max(0, width - 18) % 2**width
+                self._set.setdefault((what, place), []).append((one.cycle + 1, kept, number > 0))
+
+    def at(self, what: int, place: int, cycle: int) -> tuple[int, bool]:
+        """The number, and whether it is not 0."""
+        given = self._set.get((what, place), [])
+        index = bisect.bisect_right(given, cycle, key=lambda one: one[0])
+        return given[index - 1][1:] if index else (0, False)
+
+    def reached(self, what: int, place: int, cycle: int, amount: int) -> bool:
+        threshold, is_set = self.at(what, place, cycle)
+        return is_set and amount >= threshold
+
+    def armed(self) -> Changes:
+        """Whether any threshold is set."""
+        marks = sorted(
+            (cycle, key, is_set) for key, given in self._set.items() if key[0] != SET_ZERO for cycle, _, is_set in given
+        )
+        now: set[tuple[int, int]] = set()
+        changes: Changes = []
+        for cycle, key, is_set in marks:
+            (now.add if is_set else now.discard)(key)
+            if bool(now) != bool(changes and changes[-1][1]):
+                changes.append((cycle, int(bool(now))))
+        return changes
+
+
+def play(facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: int) -> Units:
+    """What happens in cycles 0 to ``cycles`` - 1, and some beyond."""
+    skin = facts.skin
+    if not skin.units:
+        return Units()
+    rule: ConverterRule = converters.find(skin.converter).load_golden()
+    level = rule.level(facts)
+    settings = _Settings(facts, rule.bits, requests)
+    found = Units(armed=settings.armed())
+    hits: dict[tuple[int, int], bool] = {}
+    begin, sequence = rule.first(facts), 0
+    while begin < cycles:
+        readings, deviations, sampled = [], [], begin + rule.sampled * level
+        for unit in range(skin.units):
+            readings.append(timeline.units_at(begin + rule.sampled * level, unit))
+            done = begin + rule.last_bit * level + 2
+            deviations.append(readings[-1] - settings.at(SET_ZERO, unit, done)[0])
+            hits[SET_THRESHOLD, unit] = settings.reached(SET_THRESHOLD, unit, done + 1, abs(deviations[-1]))
+            _note(found.over, done + 2, hits)
+            begin += rule.levels * level
+        for place, weights in enumerate(skin.unit_sums):
+            total = sum(weight * deviation for weight, deviation in zip(weights, deviations, strict=True))
+            hits[SET_SUM_THRESHOLD, place] = settings.reached(SET_SUM_THRESHOLD, place, done + 3 + place, abs(total))
+            _note(found.over, done + 4 + place, hits)
+        told = done + -(-rule.bits // 7) + 6
+        over, armed = (bool(_level(changes, told)) for changes in (found.over, found.armed))
+        packet = _packet(facts, rule, readings, sampled, sequence, over, armed)
+        found.packets.append((told + 1, packet))
+        sequence += 1
+    return found
+
+
+def _packet(
+    facts: Facts, rule: ConverterRule, readings: list[int], sampled: int, sequence: int, over: bool, armed: bool
+) -> bytes:
+    time_us = sampled // facts.clocks_per_us
+    plain = [128 + reading // 128**place % 128 for reading in readings for place in range(-(-rule.bits // 7))]
+    trailer = time_us % 2**24 + sequence % 256 * 2**24
+    plain += [128 + trailer // 128**place % 128 for place in range(5)]
+    packet = Packet()
+    packet.push(bytes([*plain, KIND * 16 + OVER * over + ARMED * armed]))
+    return packet.wire(before=facts.fingerprint[:2])
+
+
+def _note(changes: Changes, cycle: int, hits: dict[tuple[int, int], bool]) -> None:
+    level = int(any(hits.values()))
+    if level != (changes[-1][1] if changes else 0):
+        changes.append((cycle, level))
+
+
+def _level(changes: Changes, cycle: int) -> int:
+    index = bisect.bisect_right(changes, cycle, key=lambda change: change[0]) - 1
+    return changes[index][1] if index >= 0 else 0

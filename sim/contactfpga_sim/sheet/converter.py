@@ -1,0 +1,58 @@
+"""A converter at the board's pins, edge by edge as its data sheet has it, with what its inputs are set to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from contactfpga.choices import converters
+
+if TYPE_CHECKING:
+    from contactfpga.skin import Skin
+
+PINS = ("spi_clock", "spi_select_n", "spi_mosi")
+
+
+class Mcp3208:
+    """Microchip DS21298E, chapter 5: single-ended channels, bits on falling edges, the highest first."""
+
+    def __init__(self, codes: Sequence[int]):
+        self.codes = list(codes)
+        """What each input would read now."""
+        self._select_n = self._clock = self._mosi = 1
+        self._rises = 0  # since the start bit, that one counted
+        self._command: list[int] = []
+        self._held = self._output = 0
+
+    def step(self, clock: int, select_n: int, mosi: int) -> int:
+        """The level that it gives in this cycle."""
+        rose, fell = clock and not self._clock, self._clock and not clock
+        if select_n:
+            self._rises, self._command, self._output = 0, [], 0
+        elif rose and (self._rises or self._mosi):
+            self._rises += 1
+            self._command.append(self._mosi)  # as it was before the edge
+        elif fell and self._rises:
+            self._fall()
+        self._clock, self._select_n, self._mosi = clock, select_n, mosi
+        return self._output
+
+    def _fall(self) -> None:
+        if self._rises == 6:  # the fifth clock after the start bit
+            single, *channel = self._command[1:5]
+            assert single, "only single-ended channels are simulated"
+            self._held = self.codes[channel[0] << 2 | channel[1] << 1 | channel[2]]
+            self._output = 0
+        elif 7 <= self._rises <= 18:
+            self._output = self._held >> 18 - self._rises & 1
+
+
+_MODELS = {"mcp3208": Mcp3208}
+
+
+def converter_of(skin: Skin) -> Mcp3208 | None:
+    """The one of a Skin, or None without units."""
+    if not skin.units:
+        return None
+    channels = converters.find(skin.converter).channels
+    return _MODELS[skin.converter if isinstance(skin.converter, str) else skin.converter.name]([0] * channels)
