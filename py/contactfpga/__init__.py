@@ -28,6 +28,7 @@ from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.suspicion import Suspicion
+from contactfpga.zones.units import UnitHistory, UnitSamples
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zone, Zones
 
@@ -62,6 +63,8 @@ __all__ = [
     "Stats",
     "Subscription",
     "Suspicion",
+    "UnitHistory",
+    "UnitSamples",
     "VersionMismatch",
     "Watch",
     "Zone",

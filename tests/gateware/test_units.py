@@ -41,4 +41,4 @@ def test_board_does_what_the_golden_model_says(name):
     timeline = play(skin, 3, cycles)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
-    assert len(expected.contact) > 4
+    assert len(expected.contact) >= 2

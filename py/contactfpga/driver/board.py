@@ -11,13 +11,15 @@ from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport
-from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReplayEnded
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
+from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
 QUEUE = 16_384
@@ -105,6 +107,12 @@ class Board:
         also where it sends no frame. None: none were told, or its Skin has neither ``guard`` nor ``self_test``."""
         self._link.check_open()
         return self._link.conversation.lines.told
+
+    @property
+    def unit_history(self) -> UnitHistory | None:
+        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None: it has none."""
+        self._link.check_open()
+        return self._link.conversation.units.history
 
     @property
     def silence(self) -> Silence:
@@ -202,6 +210,23 @@ class Board:
         it, ValueError for numbers that no command has, and as :meth:`read` does.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
+
+    def set_zero(self, unit: int, reading: int, timeout: float = 1.0) -> Zones:
+        """Tell the board what a pressure unit reads without load, in steps of its converter; as :meth:`command`."""
+        return self.command(*zero_value(self._unit_facts(), unit, reading), timeout=timeout)
+
+    def set_threshold(self, unit: int, deviation: int, timeout: float = 1.0) -> Zones:
+        """From this deviation from its zero on, either way, a unit raises ``contact``; 0: never. As :meth:`command`."""
+        return self.command(*threshold_value(self._unit_facts(), unit, deviation), timeout=timeout)
+
+    def set_sum_threshold(self, index: int, deviation: int, timeout: float = 1.0) -> Zones:
+        """The same of a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
+        return self.command(*sum_threshold_value(self._unit_facts(), index, deviation), timeout=timeout)
+
+    def _unit_facts(self) -> UnitFacts:
+        if (facts := self.hello.units) is None:
+            raise NoSuchCommand(f"{self.port}: this board has no pressure units; build its Skin with units")
+        return facts
 
     def __iter__(self) -> Iterator[Zones]:
         """Every frame, forever; a recording ends."""

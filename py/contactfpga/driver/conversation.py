@@ -16,6 +16,7 @@ from contactfpga.driver.lines import Lines
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.timeline import MOST_S, Timeline, continues
+from contactfpga.driver.unit_line import UnitLine
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet
@@ -26,7 +27,9 @@ from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_sl
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
+from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.run import Run, frame_of
+from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
 _FRAME_KINDS = set(protocol.KINDS.values())
@@ -41,7 +44,7 @@ class Arrival:
     """Every :meth:`Conversation.ask` whose ticket is not above this one came before the frame was scanned."""
 
 
-Event = Arrival | Hello | Faults | SelfTestSlot | SkinMismatch | VersionMismatch
+Event = Arrival | Hello | Faults | SelfTestSlot | UnitSamples | SkinMismatch | VersionMismatch
 
 FEW, FEW_IN_RUN = 16, 8
 """Fewer packets are decoded, and fewer frames taken, faster one by one."""
@@ -65,6 +68,8 @@ class Conversation:
         """What frames are read with; None until a hello has come, or where it is of another Skin than expected."""
         self.lines = Lines(expected.mask if expected is not None else ())
         """What the board says of its lines."""
+        self.units = UnitLine(self.stats)
+        """What the board says of its pressure units."""
         self._expected = expected
         self._live = live
         self._requests = Requests(rng)
@@ -172,7 +177,7 @@ class Conversation:
         self._requests.take_frame(last.heard, now)  # all of them carry the same
         self._passed()
         arrived, faults = now if self._live else None, self.lines.names(flagged=True)
-        return Run(widths.sheet, packets, starts, table.records, times_us, arrived, before, faults)
+        return Run(widths.sheet, packets, starts, table.records, times_us, arrived, before, faults, self.units.history)
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
@@ -227,6 +232,9 @@ class Conversation:
         hello = self.hello
         if kind == KIND_FAULTS and hello is not None and (hello.guard or hello.self_test):
             return self._take_lines(plain, hello)
+        if kind == KIND_UNITS and hello is not None and hello.units is not None:
+            samples = self.units.take(plain, self._timeline)
+            return samples if self._widths is not None else None
         if kind not in _FRAME_KINDS:
             self.stats.unknown_kinds += 1
             return None
@@ -253,7 +261,7 @@ class Conversation:
             return None
         self._requests.take_frame(frame.heard, now)
         faults = self.lines.names("fault" in frame.flags)
-        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None, faults)
+        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None, faults, self.units.history)
         return Arrival(zones, self._requests.answered)
 
     def _take_hello(self, hello: Hello, now: float) -> Hello | SkinMismatch:
@@ -263,6 +271,7 @@ class Conversation:
         if changed:
             self.stats.skin_changes += 1
             self.lines.forget()
+            self.units.forget()
             self._timeline = Timeline(self.stats, self._live)
         expected = self._expected
         if expected is not None and hello.fingerprint != expected.fingerprint:
@@ -272,7 +281,9 @@ class Conversation:
         self._timeline.take_hello(hello, now, self._requests.sent_since(hello.heard, self._doubted))
         if self.stats.restarts > restarts:
             self.lines.forget()
+            self.units.forget()
         self.lines.take_hello(hello)
+        self.units.take_hello(hello)
         self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud

@@ -13,6 +13,7 @@ from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.mismatch import report_of
+from contactfpga.zones.units import only
 from contactfpga.zones.zone import Zones
 
 USB_SERIAL = Path("/sys/bus/usb-serial/devices")
@@ -133,6 +134,28 @@ def lines(board: Board, zones: Zones) -> Iterator[Finding]:
         yield Finding("fault", f"{name}: {step}")
 
 
+def units(board: Board) -> Iterator[Finding]:
+    """What the pressure units read while frames were counted."""
+    history, stats = board.unit_history, board.stats
+    if history is None:
+        return
+    if history.last is None:
+        yield Finding("fault", "no readings of the pressure units came: frames leave them no room; set a higher baud")
+        return
+    full = (1 << history.facts.bits) - 1
+    for value, what in ((0, "0"), (full, f"full scale ({full})")):
+        found = only(history.lows, history.highs, value)
+        if len(found) == history.facts.count:
+            yield Finding("fault", f"the converter reads only {what}: look at its supply, its reference and its wires")
+        else:
+            for unit in found:
+                yield Finding("fault", f"unit {unit} reads only {what}: look at its amplifier and at its wires")
+    spans = ", ".join(f"{low} to {high}" for low, high in zip(history.lows, history.highs, strict=True))
+    yield Finding("ok", f"{history.facts.count} units read {spans}; {stats.sweeps} sweeps, {stats.sweeps_lost} lost")
+    if not history.last.armed:
+        yield Finding("note", "no threshold is set: the pressure units cannot raise contact")
+
+
 def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     """Frames and losses over some seconds of device time."""
     try:
@@ -165,6 +188,7 @@ def count(board: Board, seconds: float, timeout: float) -> Iterator[Finding]:
     told = ", ".join(f"{number} {name}" for name, number in faults.items())
     yield Finding("fault" if any(faults.values()) else "ok", told)
     yield from lines(board, zones)
+    yield from units(board)
     for flag in sorted(zones.flags - {"fault"}):
         if flag == "ghost":
             yield Finding("note", "the last frame has zones that may be ghosts: the sheet has no diodes")

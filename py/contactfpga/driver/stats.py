@@ -31,6 +31,12 @@ class Stats:
     """Hellos received."""
     fault_reports: int = 0
     """Reports of faults received, from a board that names them: one after each hello, and one when they change."""
+    sweeps: int = 0
+    """Sweeps of the pressure units received."""
+    sweeps_lost: int = 0
+    """Sweeps that did not arrive, a gap modulo 256: replaced by newer ones while frames filled the line, or damaged."""
+    sweeps_unexplained: int = 0
+    """Sweeps received and not passed on, as their times could not be known before the next frame."""
     before_hello: int = 0
     """Packets that came before the first hello, without which they cannot be read."""
     unknown_kinds: int = 0

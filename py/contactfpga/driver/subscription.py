@@ -16,6 +16,7 @@ from contactfpga.inputs.values import is_finite
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
+from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
 Item = TypeVar("Item")
@@ -129,10 +130,10 @@ class Listening(Generic[Item]):
         self._frames.put(item)
 
 
-class Events(Listening[Zones | Faults | SelfTestSlot | Silence]):
+class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     """All that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
     :class:`Zones`; :class:`Faults`, first those that there are and then whenever they change, also where no frame is
-    sent; the slots of a self-test; and with a deadline :class:`Silence`, each time that it passes without a frame.
+    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline :class:`Silence`, each time that it passes without a frame.
 
     ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
     """

@@ -97,6 +97,12 @@ class Timeline:
         self._now, self.before = now, frame
         return time_us
 
+    def place(self, time_us: int) -> int | None:
+        """The time since power-up in us of these bits of it, which are of about now; None where that is not known."""
+        if not self._known or self._last_us < 0:
+            return None
+        return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
+
     def expects(self, heard: int, time_us: int, now: float) -> bool:
         """Whether a frame that carries these continues the one explained last."""
         if self.before is None or self._time_us is None or not self._known:

@@ -12,6 +12,7 @@ import numpy as np
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, NO_RECORDS, Frame
+from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
 
@@ -33,6 +34,8 @@ class Run:
     """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
     """Of its flagged frames; see :attr:`Zones.faults`."""
+    history: UnitHistory | None = None
+    """Of the board's pressure units."""
 
     def __len__(self) -> int:
         return len(self.packets)
@@ -55,7 +58,7 @@ class Run:
     def __getitem__(self, index: int) -> Zones:
         before = self._frame(index - 1) if index else self.before
         time_us = self._plain[2][index]
-        return Zones(self._frame(index), self.sheet, time_us, before, self.host_time_s, self.faults)
+        return Zones(self._frame(index), self.sheet, time_us, before, self.host_time_s, self.faults, self.history)
 
     def _frame(self, index: int) -> Frame:
         if (made := self._made.get(index)) is None:

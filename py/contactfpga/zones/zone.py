@@ -14,6 +14,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import ghosts, labels, motion
+from contactfpga.zones.units import UnitHistory, UnitSamples
 
 Vector = tuple[float, float, float]
 
@@ -75,6 +76,7 @@ class Zones(Sequence[Zone]):
         before: Frame | None = None,
         host_time_s: float | None = None,
         faults: tuple[str, ...] = (STUCK,),
+        history: UnitHistory | None = None,
     ):
         self.frame = frame
         """The frame as it came over the wire."""
@@ -91,6 +93,18 @@ class Zones(Sequence[Zone]):
         are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
         the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
         self._before = before
+        self._history = history
+        self._units: UnitSamples | None = None
+
+    @property
+    def units(self) -> UnitSamples | None:
+        """What the pressure units read at :attr:`time_us`, interpolated between their samples before and after it. None
+        for a board without units, and until both have come: as a frame arrives the later one is mostly still on its
+        way. So ask again some sweeps later, or take the newest readings, with their own time, from
+        :meth:`Board.events`. It is kept once it was found; after about a second nobody knows it any more."""
+        if self._units is None and self._history is not None:
+            self._units = self._history.at(self.time_us)
+        return self._units
 
     @functools.cached_property
     def flags(self) -> frozenset[str]:
@@ -249,6 +263,8 @@ class Zones(Sequence[Zone]):
         values["faults"] = list(self.faults)
         values["flags"] = sorted(self.flags)
         values["rounding_mm"] = list(self.rounding_mm)
+        if self._history is not None:
+            values["units"] = None if self.units is None else dataclasses.asdict(self.units)
         values["zones"] = [dataclasses.asdict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]

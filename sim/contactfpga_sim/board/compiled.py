@@ -99,6 +99,13 @@ class CompiledBoard:
         arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
         self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
 
+    def load(self, readings: Iterable[int]) -> None:
+        """From the next cycle on the converter's inputs would read this, one for each pressure unit; 0 at first."""
+        codes = np.array(list(readings), np.uint32)
+        if len(codes) != self.skin.units:
+            raise ValueError(f"{len(codes)} readings; the board has {self.skin.units} pressure units")
+        self._call("load", codes.ctypes.data_as(ctypes.c_void_p))
+
     def run(self, cycles: int) -> None:
         """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
         self._call("run", ctypes.c_uint64(cycles))
@@ -186,6 +193,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "PROBES": int(netlist is None),
             "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),
+            "UNITS": skin.units,
         },
     )
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
+from contactfpga.choices import converters
 from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.skin import Skin
@@ -15,12 +18,23 @@ CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
 
 
+UnitSource = Callable[[float], Sequence[int]]
+"""From the simulated time in s to what each pressure unit reads, in steps of its converter."""
+
+
+def _at_rest(skin: Skin) -> UnitSource:
+    readings = [1 << converters.find(skin.converter).bits - 1] * skin.units
+    return lambda _: readings
+
+
 class VirtualBoard:
     """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
-    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none.
+    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
+    units: a function of the simulated time in s that returns what each pressure unit reads, by default half of full
+    scale.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
@@ -32,10 +46,12 @@ class VirtualBoard:
         scene: Source = None,
         cover: Cover | None = None,
         circuit: Circuit | None = None,
+        units: UnitSource | None = None,
     ):
         self.skin = skin or Skin()
         self._scene = make_scene(self.skin, scene, cover)
         self._board = CompiledBoard(self.skin)
+        self._units = units or _at_rest(self.skin)
         if circuit is not None:
             self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
 
@@ -56,6 +72,8 @@ class VirtualBoard:
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the scene as it is now."""
         self._board.press(self._scene(self.clock()))
+        if self.skin.units:
+            self._board.load(self._units(self.clock()))
         self._board.run(cycles)
 
     def clock(self) -> float:

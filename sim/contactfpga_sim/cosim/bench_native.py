@@ -22,8 +22,8 @@ def run(skin: Skin, timeline: Timeline, cycles: int, model: native.Model | None 
 def play(board: CompiledBoard, timeline: Timeline, until: int) -> None:
     """Let the board live through the timeline from the cycle it is at up to cycle ``until`` - 1."""
     changes = {cycle: (cells, stuck) for cycle, cells, stuck in timeline.pieces}
-    received, cuts = dict(timeline.received), dict(timeline.cuts)
-    for now in sorted(cycle for cycle in {*changes, *received, *cuts} if board.cycle <= cycle < until):
+    received, cuts, units = dict(timeline.received), dict(timeline.cuts), dict(timeline.units)
+    for now in sorted(cycle for cycle in {*changes, *received, *cuts, *units} if board.cycle <= cycle < until):
         board.run(now - board.cycle)
         if now in changes:
             cells, stuck = changes[now]
@@ -31,6 +31,8 @@ def play(board: CompiledBoard, timeline: Timeline, until: int) -> None:
             board.stick(stuck)
         if now in cuts:
             board.cut(cuts[now].rows, cuts[now].columns)
+        if now in units:
+            board.load(units[now])
         if now in received:
             board.send(received[now])
     board.run(until - board.cycle)

@@ -2,7 +2,7 @@
 // Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and
 // COLUMN_CHAINS, 0 for direct lines; PROBES is 0 for a netlist, which has the pins only; DIVIDED is 1 where items are
 // apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns can be driven, REVERSAL where
-// rows can be let go and are read. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
+// rows can be let go and are read. UNITS pressure units are read by an MCP3208. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
 // bits can be flipped, and a moment kept and returned to.
 #include <algorithm>
 #include <deque>
@@ -11,6 +11,7 @@
 #define COLUMN_LINES (COLUMNS + GUARD)
 
 #include "clocked.h"
+#include "converter.h"
 #include "shift.h"
 #ifdef STATE
 #include "state.h"
@@ -192,6 +193,19 @@ private:
 class Board {
     Clocked model_;
 
+#if UNITS
+    bool put_miso() {
+        const auto &top = model_.top;
+        const bool level = converter.step(get(top.p_spi__clock), get(top.p_spi__select__n), get(top.p_spi__mosi));
+        const bool changed = level != miso_;
+        put(model_.top.p_spi__miso, miso_ = level);
+        return changed;
+    }
+    bool miso_ = false;
+#else
+    bool put_miso() { return false; }
+#endif
+
 #if ROW_CHAINS
     RowRegisters<ROW_LINES, ROW_CHAINS> row_registers_;
 
@@ -243,6 +257,9 @@ class Board {
 #endif
 
 public:
+#if UNITS
+    Mcp3208 converter;
+#endif
     Matrix matrix;
     Sender sender;
     Reader reader;
@@ -260,8 +277,8 @@ public:
             model_.settle();
             const Word driven = Matrix::driven(rows()) & rows_driven();
             const Word levels = read(matrix.levels(driven, columns_driven()));
-            const bool rows_change = put_rows();
-            if (levels != levels_ || rows_change) {
+            const bool rows_change = put_rows(), miso_changes = put_miso();
+            if (levels != levels_ || rows_change || miso_changes) {
                 // Lines enter flip-flops only, so the second evaluation changes nothing but what those take.
                 put(columns(), levels_ = levels);
                 model_.settle();
@@ -382,6 +399,11 @@ EXPORT void board_settle(
     }
     matrix.release_share = release_share;
     matrix.threshold = threshold;
+}
+EXPORT void board_load(Board *board, const uint32_t *codes) {
+#if UNITS
+    std::copy_n(codes, UNITS, board->converter.codes);
+#endif
 }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 
