@@ -1,44 +1,256 @@
-"""Pressure units: readings, thresholds and commands, in lockstep with the golden model."""
+"""Pressure units: SPI, readings, thresholds and commands, in lockstep with the golden model."""
 
+import itertools
 import random
 
 import pytest
+from amaranth.hdl import Value
 
 from contactfpga import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.units.mcp3208 import Mcp3208
+from contactfpga_hdl.units.units import Units
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.request import command
+from contactfpga_sim.golden import Timeline, predict, units
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.request import Request, command
+from contactfpga_sim.sheet import converter
 
 SMALL = {"rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000}
+TILTED = [[1, 1, 1], [127, -127, 3], [0, 0, -5], [1, -2, 1]]
 SKINS = {
-    "sums": Skin(**SMALL, units=3, unit_sums=[[1, 1, 1], [127, -127, 3], [0, 0, -5], [1, -2, 1]]),
+    "sums": Skin(**SMALL, units=3, unit_sums=TILTED),
     "fail safe": Skin(**SMALL | {"clock_hz": 3_000_000, "baud": 750_000}, units=2, fail_safe=True, unit_sums=[[1, -1]]),
 }
+ALONE = {
+    "one unit": Skin(**SMALL, units=1),
+    "four sums": SKINS["sums"],
+    "12 MHz at 5 V": Skin(units=2, converter_v=5.0, unit_sums=[[1, 1]]),
+    "eight units": Skin(**SMALL, units=8, unit_sums=[[127] * 8]),
+}
+ZERO, THRESHOLD, SUM_THRESHOLD = 3, 4, 5
 
 
-def play(skin, seed, cycles):
-    """Random readings; zeros and thresholds that some of them reach; touches now and then."""
-    rng = random.Random(seed)
-    units, start = [], 0
+def readings(rng, skin, cycles):
+    """What the units would read, at random changes."""
+    changes, start = [], 0
     while start < cycles:
-        units.append((start, [rng.choice([0, 4095, rng.randrange(4096)]) for _ in range(skin.units)]))
+        changes.append((start, [rng.choice([0, 4095, rng.randrange(4096)]) for _ in range(skin.units)]))
         start += rng.choice([7, 60, 500])
-    received, at, number = [], 30, 129 * 128 + 1
-    while at < cycles:
-        what = rng.choice([3, 4, 4, 5, 1])
-        value = rng.randrange(skin.units + 1) | rng.choice([0, rng.randrange(4096), rng.randrange(2**14)]) << 3
-        data = command(number, what, value, bit_clocks=skin.clock_hz // skin.baud)
-        received.append((at, data))
-        at += 10 * skin.clock_hz // skin.baud * len(data) + rng.randrange(50)
-        number += 2 if number % 8 == 7 else 1
-    return Timeline([], received, units=units)
+    return changes
+
+
+def setting(rng, skin):
+    """(what, value) of a command that some readings reach, now and then of a unit that is not there."""
+    what = rng.choice([ZERO, THRESHOLD, THRESHOLD, SUM_THRESHOLD, SUM_THRESHOLD, 1])
+    number = rng.choice([0, rng.randrange(4096), rng.randrange(2**18)])
+    return what, rng.randrange(skin.units + 1) % 8 | number << 3
+
+
+class Inputs:
+    """A converter at the pins of a component in the bench."""
+
+    def __init__(self, pins, timeline):
+        self.targets, self.watched = [pins.spi_miso], []
+        self._pins = [Value.cast(getattr(pins, name)) for name in converter.PINS]
+        self._model, self._units = converter.Mcp3208([0] * 8), dict(timeline.units)
+
+    def drive(self, cycle, ctx):
+        codes = self._units.get(cycle, [])
+        self._model.codes[: len(codes)] = codes
+        return (self._model.step(*(ctx.get(pin) for pin in self._pins)),)
+
+    def note(self, _cycle):
+        pass
 
 
 @pytest.mark.parametrize("name", SKINS)
 def test_board_does_what_the_golden_model_says(name):
-    skin, cycles = SKINS[name], 5_000
-    timeline = play(skin, 3, cycles)
+    skin, cycles = SKINS[name], 4_000
+    rng = random.Random(3)
+    received, at, number, bit = [], 30, 129 * 128 + 1, skin.clock_hz // skin.baud
+    while at < cycles:
+        data = command(number, *setting(rng, skin), bit_clocks=bit)
+        received.append((at, data))
+        at += 10 * bit * len(data) + rng.randrange(50)
+        number += 2 if number % 8 == 7 else 1
+    timeline = Timeline([], received, units=readings(rng, skin, cycles))
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
     assert len(expected.contact) >= 2
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_readings_and_thresholds_are_the_golden_models_in_every_clock(bench, rng, name):
+    """Commands come in any clock, and the wire takes packets at any time."""
+    skin, cycles = ALONE[name], 4_000
+    requests = [Request(cycle, 1, False, setting(rng, skin)) for cycle in range(cycles) if rng.random() < 0.02]
+    timeline = Timeline([], units=readings(rng, skin, cycles))
+    expected = units.play(facts(skin), timeline, requests, cycles)
+    dut = Units(skin)
+    sim = bench(dut)
+    sim._add(Inputs(dut.pins, timeline))
+    orders = {one.cycle: one.command for one in requests}
+    sim.drive(dut.command, lambda cycle: int(cycle in orders))
+    sim.drive(dut.what, lambda cycle: orders.get(cycle, (0, 0))[0])
+    sim.drive(dut.value, lambda cycle: orders.get(cycle, (0, 0))[1])
+    over, armed, due = sim.watch(dut.over), sim.watch(dut.armed), sim.watch(dut.packet.due)
+    sim.run(cycles)
+    assert changes(over.values) == [one for one in expected.over if one[0] < cycles]
+    assert changes(armed.values) == [one for one in expected.armed if one[0] < cycles]
+    assert due.values.index(1) == expected.packets[0][0]
+    assert len(expected.over) > 4
+
+
+def changes(levels):
+    """(cycle, level) of every change of a level that is low at first."""
+    pairs = enumerate(itertools.pairwise([0, *levels]))
+    return [(cycle, level) for cycle, (before, level) in pairs if level != before]
+
+
+def sweep_of(readings, data):
+    """What plain bytes of a packet say: readings and sequence, by docs/protocol.md."""
+    digits = [byte - 128 for byte in data]
+    found = [digits[place] + 128 * digits[place + 1] for place in range(0, 2 * readings, 2)]
+    trailer = sum(digit << 7 * place for place, digit in enumerate(digits[2 * readings :]))
+    return found, trailer % 2**24, trailer >> 24
+
+
+def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rng):
+    """Each sweep reads numbers that say which one it is."""
+    skin, cycles = SKINS["sums"], 9_000
+    sweep = Derived(skin).units.sweep_clocks
+    timeline = Timeline([], units=[(3 + n * sweep, [3 * n, 3 * n + 1, 3 * n + 2]) for n in range(cycles // sweep)])
+    ready = [cycle for cycle, _ in units.play(facts(skin), timeline, [], cycles).packets]
+    dut = Units(skin)
+    sim = bench(dut)
+    sim._add(Inputs(dut.pins, timeline))
+    starts = []  # cycles in which a packet is taken
+    state = {"until": 40}
+
+    def take(cycle, due):
+        taken = bool(due) and cycle >= state["until"]
+        if taken:
+            starts.append(cycle)
+            state["until"] = cycle + 20 + rng.choice([0, 1, 5, 60, 100, 119, 300])
+        return int(taken)
+
+    sim.drive(dut.packet.taken, take, dut.packet.due)
+    sim.drive(dut.packet.place, lambda cycle: max(0, min(20, cycle - starts[-1] - 1)) if starts else 0)
+    byte = sim.watch(dut.packet.byte)
+    sim.run(cycles)
+    whole = [start for start in starts if start + 20 < cycles]
+    for start in whole:
+        data = [byte[start + 2 + place] for place in range(13)]
+        assert data[0] == 13
+        assert data[-1] == 0x80
+        newest = max(index for index, cycle in enumerate(ready) if cycle <= start)
+        read, time_us, sequence = sweep_of(3, data[1:-1])
+        assert (read, sequence) == ([3 * newest, 3 * newest + 1, 3 * newest + 2], newest % 256)
+        assert time_us == 3 + newest * sweep + 12
+    assert len(whole) > 20
+
+
+LIMITS = {2.7: (1_000_000, 1e-6), 3.3: (1_000_000, 1e-6), 5.0: (2_000_000, 0.5e-6)}
+"""By supply: fastest clock in Hz, and half a period of it twice, in s (DS21298E, table 1-1)."""
+
+
+@pytest.mark.parametrize("supply_v", LIMITS)
+@pytest.mark.parametrize("clock_hz", [1_000_000, 12_000_000, 25_000_000, 60_000_000])
+def test_pins_keep_the_times_of_the_data_sheet(bench, clock_hz, supply_v):
+    """High and low 250 ns each, select 100 ns before the first edge, 500 ns without it, data 50 ns about an edge."""
+    skin = Skin(clock_hz=clock_hz, baud=clock_hz // 12, units=3, converter_v=supply_v, settle_us=100)
+    dut = Mcp3208(skin)
+    sim = bench(dut)
+    clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.PINS)
+    sim.run(4 * Derived(skin).units.spacing_clocks)
+    s, most_hz = 1 / clock_hz, LIMITS[supply_v][0]
+    edges = changes(clock.values)
+    rises = [cycle for cycle, level in edges if level]
+    assert min(late - early for (early, _), (late, _) in itertools.pairwise(edges)) * s >= 250e-9 - 1e-15
+    assert min(late - early for early, late in itertools.pairwise(rises)) * s >= 1 / most_hz - 1e-15
+    selected = changes([1 - level for level in select_n.values])
+    for (begin, _), (end, _) in zip(selected[:6:2], selected[1:6:2], strict=True):
+        inside = [cycle for cycle in rises if begin <= cycle < end]
+        assert len(inside) == 19
+        assert (inside[0] - begin) * s >= 100e-9
+        assert min(abs(cycle - rise) for rise in inside for cycle, _ in changes(mosi.values)) * s >= 50e-9
+    gaps = [begin - end for (_, _), (end, _), (begin, _) in zip(selected[::2], selected[1::2], selected[2::2])]
+    assert min([selected[0][0], *gaps]) * s >= 500e-9 - 1e-15
+
+
+@pytest.mark.parametrize("delay_ns", [0, 200])
+def test_a_converter_that_answers_late_is_read(bench, delay_ns):
+    """It may take 200 ns after the falling edge: 2 of 3 clocks of a level at 12 MHz."""
+    skin = ALONE["12 MHz at 5 V"]
+    dut = Mcp3208(skin)
+    sim = bench(dut)
+    inputs = Inputs(dut.pins, Timeline([], units=[(0, [0b101010101010, 0b010101010101])]))
+    answers = [0] * (delay_ns * 12 // 1000)
+    drive = inputs.drive
+    inputs.drive = lambda cycle, ctx: (answers.append(drive(cycle, ctx)[0]), (answers.pop(0),))[1]
+    sim._add(inputs)
+    done, value = sim.watch(dut.done), sim.watch(dut.reading.value)
+    sim.run(600)
+    read = [value[cycle] for cycle in range(600) if done[cycle]]
+    assert read[:4] == [0b101010101010, 0b010101010101] * 2
+
+
+def test_contact_rises_within_a_sweep_and_eight_clocks():
+    """Of a sweep in which all units see it; of a touch at any other moment, within a conversion more."""
+    skin = SKINS["sums"].replace(fail_safe=True)
+    derived = Derived(skin).units
+    begun, sweep = 2 * derived.level_clocks + 1, derived.sweep_clocks
+    set_all = [
+        Request(0, 1, False, one) for one in ((THRESHOLD, 2 | 900 << 3), (SUM_THRESHOLD, 3 | 900 // 8 << 3))
+    ]  # sums of 21 bits
+    for moment in range(begun + sweep, begun + 2 * sweep, 7):
+        timeline = Timeline([], units=[(moment, [0, 0, 1000])])
+        over = units.play(facts(skin), timeline, set_all, 5 * sweep).over
+        assert moment < over[0][0] + 1 <= moment + sweep + derived.spacing_clocks + 8
+    timeline = Timeline([], units=[(begun + sweep, [1000, 0, 0])])  # which only the last sum sees
+    by_sum = units.play(facts(skin), timeline, set_all, 5 * sweep).over
+    assert by_sum[0][0] + 1 <= begun + 2 * sweep + 8
+
+
+def test_without_a_threshold_nothing_rises_and_fail_safe_is_high():
+    loads = Timeline([], units=[(100, [4095, 4095])])
+    plain, safe = SKINS["fail safe"].replace(fail_safe=False), SKINS["fail safe"]
+    assert predict(plain, loads, 5_000).contact == []
+    assert predict(safe, loads, 5_000).contact == [(1, 1)]
+
+
+@pytest.mark.parametrize("baud", [3_000_000, 6_000_000])
+def test_frames_are_late_by_one_packet_of_readings_at_most(baud):
+    """Also where the line has no room for both: then more frames are replaced by newer ones."""
+    without = Skin(rows=8, columns=8, baud=baud)
+    skin = without.replace(units=8)
+    bit = round(skin.clock_hz / baud)
+    longest = 10 * bit * (1 + 16 + 5 + 1 + 3 + 1) + 3
+    alone, beside = (frames(predict(one, Timeline([]), 400_000).bytes) for one in (without, skin))
+    late = [beside[time] - alone[time] for time in beside if time in alone]
+    assert len(late) > 200
+    assert max(late) <= longest
+    assert max(late) > longest / 3  # so that the bound means something
+
+
+def frames(sent):
+    """By a frame's time the cycle of its first byte, of frames without zones."""
+    found, begin = {}, 0
+    for end, (_, value) in enumerate(sent):
+        if value == 0:
+            stuffed = [byte for _, byte in sent[begin : end - 3]]
+            if stuffed and stuffed[-1] >> 4 == 5:
+                plain = unstuffed(stuffed)
+                found[plain[0] | plain[1] << 8 | plain[2] << 16] = sent[begin][0]
+            begin = end + 1
+    return found
+
+
+def unstuffed(data):
+    plain, place = [], 0
+    while place < len(data):
+        plain += [*data[place + 1 : place + data[place]], 0]
+        place += data[place]
+    return plain[:-1]

@@ -14,7 +14,7 @@ __all__ = ["check", "crc16", "request"]  # some tests take apart what others tak
 
 HELLO, ZONES, CELLS, BARYCENTERS, REQUEST, FAULTS, COMMAND = 4, 5, 6, 7, 5, 9, 10
 FLAGS = {"overflow": 1, "mismatch": 2, "fault": 4}
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 9, 255
 EPOCH_US = 2**22
 
 
@@ -148,8 +148,12 @@ class Wire:
         facts[RATES] = struct.pack("<II", skin.clock_hz, skin.baud)
         if skin.name:
             facts[NAME] = skin.name.encode()
-        if skin.self_test:
-            facts[COMMANDS] = b"\x01"
+        commands = b"\x01" * skin.self_test + (b"\x03\x04" if skin.units else b"")
+        if commands:
+            facts[COMMANDS] = commands
+        if skin.units:  # an MCP3208 at 3.3 V, without sums: 20 clocks of 1 MHz for each
+            clocks = 20 * skin.clock_hz // 1_000_000
+            facts[UNITS] = struct.pack("<BBBBHI", skin.units, 12, 0, 0, clocks, clocks * skin.units)
         return facts
 
     def hello_fields(self, *, sent=0, epoch=0, heard=0, stuck=0, facts=None) -> list:

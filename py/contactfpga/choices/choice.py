@@ -82,7 +82,9 @@ def load_own(place: str, what: str) -> Any:
 def own_files(skin: Skin) -> set[Path]:
     """Files of the modules that the Skin's choices of your own name, for keys of what is kept."""
     own = [
-        load(value) for value in (skin.labeller, skin.scan, skin.debounce, skin.converter) if isinstance(value, str) and ":" in value
+        load(value)
+        for value in (skin.labeller, skin.scan, skin.debounce, skin.converter)
+        if isinstance(value, str) and ":" in value
     ]
     places = {place for one in own for place in (one.name, one.gateware, one.golden) if place}
     specs = [importlib.util.find_spec(place.partition(":")[0]) for place in places]

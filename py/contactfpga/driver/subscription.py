@@ -133,7 +133,8 @@ class Listening(Generic[Item]):
 class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
     """All that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
     :class:`Zones`; :class:`Faults`, first those that there are and then whenever they change, also where no frame is
-    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline :class:`Silence`, each time that it passes without a frame.
+    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline
+    :class:`Silence`, each time that it passes without a frame.
 
     ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
     """

@@ -26,9 +26,7 @@ def check_units(skin: Skin) -> dict[str, Any]:
         return {"unit_sums": sums}
     least_v = converter.limits[0][0]
     if not least_v <= skin.converter_v <= converter.most_v:
-        raise SkinError(
-            f"converter_v is {skin.converter_v}; {converter.title} needs {least_v} to {converter.most_v} V"
-        )
+        raise SkinError(f"converter_v is {skin.converter_v}; {converter.title} needs {least_v} to {converter.most_v} V")
     return {"unit_sums": sums}
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Sequence
 
 from contactfpga.inputs.values import shown, whole
 from contactfpga.skin.units import (
@@ -126,9 +125,9 @@ def _value(what: int, kind: str, index: object, count: int, name: str, given: ob
     if place is None or not 0 <= place < count:
         raise ValueError(f"{kind} is {shown(index)}; this board has {count}, counted from 0")
     if amount is None or not 0 <= amount < 1 << bits:
-        raise ValueError(f"{name} of {kind} {place} is {shown(given)}; it must be a whole number from 0 to {(1 << bits) - 1}")
+        raise ValueError(
+            f"{name} of {kind} {place} is {shown(given)}; it must be a whole number from 0 to {(1 << bits) - 1}"
+        )
     shift = number_shift(bits)
     steps = max(amount >> shift, 1) if amount and what != ZERO else amount >> shift
     return what, steps << INDEX_BITS | place
-
-

@@ -1,5 +1,5 @@
-"""Link: hellos, reports of faults, frames and readings of units take turns on the wire; the newest complete frame waits,
-and the newest sweep of all units."""
+"""Link: hellos, reports of faults, frames and readings of units take turns on the wire; the newest complete frame
+waits, and the newest sweep of all units."""
 
 from __future__ import annotations
 
@@ -18,9 +18,7 @@ class Link:
     takes its place.
     """
 
-    def __init__(
-        self, facts: Facts, state: State, told: Told | None = None, units: Sequence[tuple[int, bytes]] = ()
-    ):
+    def __init__(self, facts: Facts, state: State, told: Told | None = None, units: Sequence[tuple[int, bytes]] = ()):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
