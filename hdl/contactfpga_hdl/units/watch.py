@@ -41,7 +41,7 @@ class Watch(wiring.Component):
         m.submodules.settings = settings = Settings(self.skin)
         deviation = Signal(signed(Derived(self.skin).units.converter.bits + 1))
         compares = Signal()
-        over = Signal(self.skin.units)
+        of_units = Signal(self.skin.units)
         amount = Mux(deviation < 0, -deviation, deviation).as_unsigned()
         m.d.comb += [
             settings.command.eq(self.command),
@@ -55,9 +55,9 @@ class Watch(wiring.Component):
             m.d.sync += deviation.eq(self.reading.value - settings.zero)
         with m.If(compares):
             reached = settings.watched & (amount >= settings.threshold)
-            m.d.sync += over.bit_select(self.reading.unit, 1).eq(reached)
+            m.d.sync += of_units.bit_select(self.reading.unit, 1).eq(reached)
         if not self.skin.unit_sums:
-            m.d.comb += self.over.eq(over.any())
+            m.d.comb += self.over.eq(of_units.any())
             return m
         m.submodules.sums = sums = Sums(self.skin)
         m.d.comb += [
@@ -68,6 +68,6 @@ class Watch(wiring.Component):
             settings.sum.eq(sums.sum),
             sums.threshold.eq(settings.sum_threshold),
             sums.watched.eq(settings.sum_watched),
-            self.over.eq(over.any() | sums.over.any()),
+            self.over.eq(of_units.any() | sums.over.any()),
         ]
         return m

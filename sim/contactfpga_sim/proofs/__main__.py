@@ -28,6 +28,7 @@ from contactfpga_sim.proofs import (
     seek,
     streams,
     uart,
+    units,
 )
 from contactfpga_sim.proofs.case import Case
 
@@ -54,6 +55,7 @@ CASES: tuple[Case, ...] = (
     *uart.CASES,
     *pulses.CASES,
     *dual.CASES,
+    *units.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

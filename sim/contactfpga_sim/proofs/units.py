@@ -1,0 +1,195 @@
+"""Pressure units: their converter is driven as its data sheet wants it, and thresholds are compared rightly."""
+
+from functools import partial
+
+from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.units.mcp3208 import Mcp3208
+from contactfpga_hdl.units.settings import Settings
+from contactfpga_hdl.units.watch import Watch
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+_FAST = Skin(units=3, converter_v=5.0)
+_SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)
+
+
+def conversions(proof: Proof, skin: Skin) -> None:
+    """Free: what the converter answers.
+
+    Claimed: one conversion follows the other, of the units in turn, each with 19 clocks while the converter is selected
+    and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
+    pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge and stay
+    for a level after it. A reading is what the pin was in the clock before the last twelve rising edges, and is there
+    three clocks after the last one.
+    """
+    m = proof.m
+    dut = Mcp3208(skin)
+    inside = proof.put(dut)
+    least = Derived(skin).units.level_clocks
+    miso = proof.free(1, "miso")
+    m.d.comb += dut.pins.spi_miso.eq(miso)
+    clock, select_n, mosi = dut.pins.spi_clock, dut.pins.spi_select_n, dut.pins.spi_mosi
+    before = proof.before(clock), proof.before(select_n, init=1), proof.before(mosi)
+    rises, selected = clock & ~before[0], ~select_n & before[1]
+    edges = Signal(5, name="edges")  # rising ones in this conversion, before this clock
+    unit = Signal(3, name="unit")  # of this conversion
+    since = {name: Signal(range(2 * least + 1), name=f"since_{name}") for name in ("clock", "select", "mosi")}
+    changed = {"clock": clock != before[0], "select": select_n != before[1], "mosi": mosi != before[2]}
+    for name, count in since.items():
+        m.d.sync += count.eq(Mux(changed[name], 1, Mux(count == 2 * least, count, count + 1)))
+    begun = Signal(name="begun")
+    with m.If(selected):
+        m.d.sync += [edges.eq(0), begun.eq(1)]
+        m.d.sync += unit.eq(Mux(begun, Mux(unit == skin.units - 1, 0, unit + 1), 0))
+        proof.claim(since["select"] == 2 * least)
+        proof.claim(~begun | (edges == 19))
+    with m.Elif(rises):
+        m.d.sync += edges.eq(edges + 1)
+        sent = Cat(Const(0b11, 2), unit[2], unit[1], unit[0])
+        proof.claim((since["clock"] >= least) & (since["select"] >= least) & (since["mosi"] >= least))
+        proof.claim(~select_n & (edges < 19) & (mosi == (sent >> edges)[0]))
+    with m.If(select_n):
+        proof.claim(~clock)
+    with m.If(changed["clock"] & ~clock):
+        proof.claim(since["clock"] >= least)
+    with m.If(changed["mosi"]):
+        proof.claim(~clock | rises)
+    _readings(proof, dut, rises, edges, miso, unit)
+    _tie(proof, inside, least, edges, unit, begun, since)
+
+
+def _readings(proof: Proof, dut: Mcp3208, rises: Value, edges: Value, miso: Value, unit: Value) -> None:
+    """The pin in the clock before an edge, shifted in as it comes."""
+    taken = Signal(12, name="taken")
+    with proof.m.If(rises):
+        proof.m.d.sync += taken.eq(Cat(proof.before(miso), taken))
+    last = proof.before(rises & (edges == 18))
+    proof.claim(dut.done == proof.before(last))
+    proof.lemma(dut.reading.value == proof.before(taken))
+    with proof.m.If(dut.done):
+        proof.claim(dut.reading.value == proof.before(taken))
+        proof.claim(dut.reading.unit == proof.before(proof.before(unit)))
+        proof.claim(dut.reading.last == (dut.reading.unit == dut.skin.units - 1))
+
+
+def _tie(proof: Proof, inside, least: int, edges: Value, unit: Value, begun: Value, since: dict[str, Signal]) -> None:
+    """What is watched from outside, by the counters inside, to which the pins are a clock late."""
+    dut, level, clock, its_unit = inside.component, inside["level"], inside["clock"], inside["unit"]
+    last_unit = dut.skin.units - 1
+    late, phase = proof.before(level, init=38), proof.before(clock)
+    late_unit = proof.before(its_unit, init=last_unit)
+    starts = Signal(init=1, name="starts")
+    proof.m.d.sync += starts.eq(0)
+    ends = phase == least - 1
+    next_unit = Mux(ends & (late == 39), Mux(late_unit == last_unit, 0, late_unit + 1), late_unit)
+    follows = (clock == Mux(ends, 0, phase + 1)) & (its_unit == next_unit)
+    follows &= level == Mux(ends, Mux(late == 39, 0, late + 1), late)
+    at_start = (level == 38) & (clock == 0) & (its_unit == last_unit)
+    first, resting = (late == 0) & (phase == 0), late >= 38
+    word = Cat(Const(0b11, 2), late_unit[2], late_unit[1], late_unit[0])
+    proof.lemma((late < 40) & (phase < least) & (late_unit <= last_unit) & (late < 40))
+    proof.lemma(Mux(starts, at_start & resting & (phase == 0) & (late_unit == last_unit), follows))
+    proof.lemma((dut.pins.spi_select_n == resting) & (dut.pins.spi_clock == (late[0] & ~resting)))
+    proof.lemma(dut.pins.spi_mosi == (word >> (late >> 1))[0])
+    proof.lemma(begun | (edges == 0) & (resting | first))
+    with proof.m.If(first):
+        proof.lemma(late_unit == Mux(begun & (unit != last_unit), unit + 1, 0))
+    with proof.m.Else():
+        proof.lemma(late_unit == Mux(begun, unit, last_unit))
+    counted = (late + (late[0] & (phase != 0))) >> 1
+    proof.lemma(edges == Mux(first | resting, Mux(begun, 19, 0), counted))
+    whole = 2 * least
+    of_clock = Mux(late[0] & (late != 1) | ~late[0] & (late != 38), least, Mux(late == 38, 0, whole))
+    of_clock = Mux(phase == 0, of_clock, phase)
+    of_clock = Mux(late == 0, whole, Mux(late == 39, least + phase, of_clock))
+    proof.lemma(since["clock"] >= of_clock)
+    of_select = Mux(late == 38, phase, Mux(late == 39, least + phase, Mux(first, whole, whole)))
+    of_select = Mux((late == 0) & ~first, phase, Mux(late == 1, least + phase, of_select))
+    proof.lemma(since["select"] >= of_select)
+    proof.lemma(since["mosi"] >= Mux(late[0], least, phase))
+    pin_rises = dut.pins.spi_clock & ~proof.before(dut.pins.spi_clock)
+    last = pin_rises & (edges == 18)
+    proof.lemma(inside["takes"] == Cat(pin_rises, proof.before(pin_rises)))
+    proof.lemma(inside["of_last"] == Cat(last, proof.before(last)))
+    with proof.m.If(last):
+        proof.lemma((dut.reading.unit == late_unit) & (dut.reading.last == (late_unit == last_unit)))
+
+
+def thresholds(proof: Proof, skin: Skin) -> None:
+    """Free: readings of any unit, commands in any clock; a unit is chosen. Given: readings of one unit are no closer
+    than two clocks.
+
+    Claimed: two clocks after a reading of the unit its bit is whether a threshold is set, and the reading that far or
+    farther from the zero; until its next reading it stays so. Before a threshold is set nothing is over or armed, and
+    the unit's makes it so.
+    """
+    m = proof.m
+    dut = Watch(skin)
+    inside = proof.put(dut)
+    unit = proof.chosen(range(skin.units), "unit")
+    proof.given(unit < skin.units)
+    for port, name in ((dut.done, "done"), (dut.command, "command"), (dut.what, "what"), (dut.value, "value")):
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    reading, of = proof.free(12, "value_read"), proof.free(range(skin.units), "of")
+    m.d.comb += [dut.reading.value.eq(reading), dut.reading.unit.eq(of)]
+    done = proof.before(dut.done)
+    proof.given((of < skin.units) & ~(done & dut.done) & (~done | (of == proof.before(of))))
+    zero, threshold, is_set = Signal(12, name="zero"), Signal(12, name="threshold"), Signal(name="is_set")
+    number = dut.value[3:]
+    with m.If(dut.command & (dut.value[:3] == unit)):
+        with m.If(dut.what == 3):
+            m.d.sync += zero.eq(number)
+        with m.If(dut.what == 4):
+            m.d.sync += [threshold.eq(number), is_set.eq(number != 0)]
+    read = proof.before(reading)
+    zero_then = proof.before(zero)
+    far = (read >= zero_then + threshold) | (read + threshold <= zero_then)
+    expected = Signal(name="expected")
+    with m.If(done & (of == unit)):
+        m.d.sync += expected.eq(is_set & far)
+    overs = inside["of_units"]
+    bits = Array(overs[index] for index in range(skin.units))
+    proof.claim(bits[unit] == expected)
+    proof.claim(~expected | dut.over)
+    kept = {name: [inside[f"settings.{name}"] for name in names] for name, names in _registers(skin).items()}
+    ever = Signal(name="ever")
+    with m.If(dut.command & (dut.what == 4) & (number != 0)):
+        m.d.sync += ever.eq(1)
+    proof.claim((~is_set | dut.armed) & (ever | ~dut.armed & ~dut.over))
+    proof.lemma(ever | ~(inside["of_units"].any() | Cat(kept["given"]).any()))
+    proof.lemma(Array(kept["zero"])[unit] == zero)
+    proof.lemma(Array(kept["threshold"])[unit] == threshold)
+    proof.lemma(Array(kept["given"])[unit] == is_set)
+    proof.lemma(~(done & (of == unit)) | (inside["deviation"] == proof.before(reading) - zero_then))
+    proof.lemma(inside["compares"] == done)
+
+
+def _registers(skin: Skin) -> dict[str, list[str]]:
+    places = range(skin.units)
+    forms = {"zero": "zero_{}", "threshold": "threshold_{}", "given": "threshold_{}_given"}
+    return {name: [form.format(place) for place in places] for name, form in forms.items()}
+
+
+_SPI_BUGS = (
+    Bug("a clock short", Mcp3208, "pins__spi_select_n", lambda level, inside: level | (inside["level"] >= 36)),
+    Bug("selected too soon", Mcp3208, "pins__spi_select_n", lambda level, inside: level & (inside["level"] != 39)),
+    Bug("data with the rising edge", Mcp3208, "pins__spi_mosi", lambda level, inside: level ^ (inside["level"] == 3)),
+    Bug("channels counted from the lowest bit", Mcp3208, "pins__spi_mosi",
+        lambda level, inside: Mux((inside["level"] >> 1) == 2, inside["unit"][0], level)),
+    Bug("a bit too late", Mcp3208, "done", lambda done, inside: inside["of_last"][0]),
+)  # fmt: skip
+_WATCH_BUGS = (
+    Bug("above the threshold only", Watch, "of_units",
+        lambda over, inside: Mux(inside["deviation"] == inside["settings.threshold"], 0, over)),
+    Bug("one way only", Watch, "of_units", lambda over, inside: Mux(inside["deviation"] < 0, 0, over)),
+    Bug("armed at power-up", Settings, "armed", lambda armed, inside: ~armed),
+)  # fmt: skip
+CASES = (
+    Case("conversions of an MCP3208", "3 units, 12 MHz, 5 V", partial(conversions, skin=_FAST), 4),
+    Case("conversions of an MCP3208", "2 units, 1 MHz", partial(conversions, skin=_SLOWEST), 4, _SPI_BUGS, 50),
+    Case("thresholds of units", "3 units", partial(thresholds, skin=_FAST), 4, _WATCH_BUGS, 8),
+)
