@@ -82,6 +82,19 @@ def test_wires_to_shift_registers_are_ports_of_the_gateware_and_share_no_pin(boa
 
 
 @every_board
+def test_a_converter_takes_four_pins_which_the_sheet_then_does_not(board):
+    most = board.lines - 4 - 1 - 1
+    skin = Skin(rows=most, columns=1, units=8, alive=True, settle_us=9)
+    pins = board.pins(skin)
+    used = [*itertools.chain(*pins.values()), board.contact]
+    assert tuple(pins[name][0] for name in ("spi_clock", "spi_select_n", "spi_mosi", "spi_miso")) == board.row_side[-4:]
+    assert len({*used}) == len(used) == board.lines + 1
+    board.check(skin.replace(clock_hz=board.clock_hz, baud=1_000_000))
+    with pytest.raises(SkinError, match="free pins beside `contact` and `alive` and the converter"):
+        board.check(skin.replace(columns=2, clock_hz=board.clock_hz, baud=1_000_000))
+
+
+@every_board
 def test_alive_takes_one_pin_which_the_sheet_then_does_not(board):
     most = board.lines - 2
     skin = Skin(rows=most, columns=1, alive=True, settle_us=9)

@@ -40,6 +40,8 @@ CHANGES = {
         "row_order": (2, 0, 1),
         "column_order": (3, 1, 0, 2),
     },
+    "units": {"rows": 4, "columns": 4, "row_drive": "direct", "units": 6, "alive": True},
+    "units, chained": CHAINED | {"units": 8, "row_chains": 2},
     "guard, chained": CHAINED | {"guard": True, "alive": True, "row_chains": 2},
 }
 
@@ -67,7 +69,7 @@ def _port(name):
 
 CASES = list(itertools.product(BOARDS, CHANGES))
 QUICK = [(board, "as shipped") for board in ("icebreaker", "icestick", "ulx3s-12f-ft232h")] + [
-    *(("icebreaker", name) for name in ("two and three chains", "guard, chained")),
+    *(("icebreaker", name) for name in ("two and three chains", "guard, chained", "units")),
     *(("ulx3s-12f-ft232h", name) for name in ("one line each", "reversal", "guard and alive")),
 ]
 

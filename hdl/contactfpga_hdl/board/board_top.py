@@ -13,6 +13,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board.clock import PllClock
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.top import Top
+from contactfpga_hdl.units.ports import unit_pins
 
 _UART = 1
 """The platform's own is 0."""
@@ -35,7 +36,7 @@ class BoardTop(Elaboratable):
     def __init__(self, board: BoardSpec, skin: Skin):
         self.board = board
         self.skin = skin
-        self._sheet = row_pins(skin) | column_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
+        self._sheet = row_pins(skin) | column_pins(skin) | unit_pins(skin) | ({"alive": Out(1)} if skin.alive else {})
 
     def elaborate(self, platform):
         m = Module()

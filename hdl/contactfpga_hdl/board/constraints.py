@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.boards import BOARDS
-from contactfpga.boards.spec import NAME, BoardSpec, column_wires, row_wires
+from contactfpga.boards.spec import NAME, UNIT_PORTS, BoardSpec, column_wires, row_wires
 from contactfpga.skin import Skin
 from contactfpga_hdl.board.build import plan_for
 from contactfpga_hdl.board.sites import connector_sites
@@ -33,7 +33,8 @@ def constraints(board: BoardSpec) -> str:
 
 def pin_tables(board: BoardSpec) -> str:
     """Which wire goes where, as Markdown: one pin per line, and shift registers."""
-    rows = [(str(row), pin) for row, pin in enumerate(board.row_side)]
+    units = dict(zip(board.converter, UNIT_PORTS, strict=True))
+    rows = [(f"{row} or `{units[pin]}`" if pin in units else str(row), pin) for row, pin in enumerate(board.row_side)]
     columns = [
         (f"{column} or `alive`" if pin == board.alive else str(column), pin)
         for column, pin in enumerate(board.column_side)

@@ -18,6 +18,9 @@ from contactfpga.skin import Skin, SkinError
 NAME = "contactfpga"
 """Of the files that a build leaves."""
 
+UNIT_PORTS = ("spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
+"""At the converter of the pressure units."""
+
 MAX_BRIDGE_ERROR = 0.03
 """FTDI's limit for the difference between its rate and that of the other end."""
 
@@ -94,11 +97,20 @@ class BoardSpec:
         """The pin of ``alive``, for a Skin that has it; for others it is one of the sheet's."""
         return self.column_side[-1]
 
+    @property
+    def converter(self) -> tuple[str, ...]:
+        """The pins of :data:`UNIT_PORTS`, for a Skin with units; for others they are the sheet's."""
+        return self.row_side[-len(UNIT_PORTS) :]
+
     def pins(self, skin: Skin) -> dict[str, tuple[str, ...]]:
-        """Pins of each port that the gateware has at the sheet, lowest bit first, and of ``alive``."""
+        """Pins of each port that the gateware has at the sheet and at the units' converter, lowest bit first, and of
+        ``alive``."""
         columns = self.column_side[:-1] if skin.alive else self.column_side
-        dealt = self._dealt(row_wires(skin), self.row_side + columns[::-1])
-        dealt |= self._dealt(column_wires(skin), columns + self.row_side[::-1])
+        rows = self.row_side[: -len(UNIT_PORTS)] if skin.units else self.row_side
+        dealt = self._dealt(row_wires(skin), rows + columns[::-1])
+        dealt |= self._dealt(column_wires(skin), columns + rows[::-1])
+        if skin.units:
+            dealt |= {port: (pin,) for port, pin in zip(UNIT_PORTS, self.converter, strict=True)}
         return dealt | ({"alive": (self.alive,)} if skin.alive else {})
 
     @staticmethod
@@ -130,7 +142,7 @@ class BoardSpec:
 
     def _check_wires(self, skin: Skin) -> None:
         rows, columns = sum(row_wires(skin).values()), sum(column_wires(skin).values())
-        free = self.lines - skin.alive
+        free = self.lines - skin.alive - (len(UNIT_PORTS) if skin.units else 0)
         if rows + columns <= free:
             return
         direct_rows, direct_columns = skin.row_drive == "direct", skin.column_read == "direct"
@@ -142,6 +154,7 @@ class BoardSpec:
             remedy = "use fewer chains"
         guarded = " with guard lines" if skin.guard else ""
         outputs = "`contact` and `alive`" if skin.alive else "`contact`"
+        outputs += " and the converter" if skin.units else ""
         raise SkinError(
             f"{skin.rows} rows and {skin.columns} columns{guarded} take {rows} + {columns} wires, {self.title} has "
             f"{free} free pins beside {outputs}; {remedy}"

@@ -24,6 +24,10 @@ _CHIP_PINS = {
     "column_clock": "CLK 2 of every 74HC165",
     "column_load_n": "SH/LD 1 of every 74HC165",
     "column_data": "QH 9 of chip 0, chain {}, 74HC165",
+    "spi_clock": "CLK 13 of the MCP3208",
+    "spi_select_n": "CS 10 of the MCP3208, 10 kΩ to its supply",
+    "spi_mosi": "DIN 11 of the MCP3208",
+    "spi_miso": "DOUT 12 of the MCP3208",
 }
 
 
