@@ -14,7 +14,9 @@ from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, units
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import Request, command
+from contactfpga_sim.golden.hello import State
+from contactfpga_sim.golden.link import Link
+from contactfpga_sim.golden.request import Heard, Request, command
 from contactfpga_sim.sheet import converter
 
 SMALL = {"rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000}
@@ -221,36 +223,43 @@ def test_without_a_threshold_nothing_rises_and_fail_safe_is_high():
     assert predict(safe, loads, 5_000).contact == [(1, 1)]
 
 
-@pytest.mark.parametrize("baud", [3_000_000, 6_000_000])
-def test_frames_are_late_by_one_packet_of_readings_at_most(baud):
-    """Also where the line has no room for both: then more frames are replaced by newer ones."""
-    without = Skin(rows=8, columns=8, baud=baud)
-    skin = without.replace(units=8)
-    bit = round(skin.clock_hz / baud)
-    longest = 10 * bit * (1 + 16 + 5 + 1 + 3 + 1) + 3
-    alone, beside = (frames(predict(one, Timeline([]), 400_000).bytes) for one in (without, skin))
-    late = [beside[time] - alone[time] for time in beside if time in alone]
-    assert len(late) > 200
-    assert max(late) <= longest
-    assert max(late) > longest / 3  # so that the bound means something
+@pytest.mark.parametrize("baud", [1_000_000, 3_000_000, 12_000_000])
+def test_a_frame_waits_for_one_packet_of_readings_at_most_and_these_for_five_frames(rng, baud):
+    """Frames come so fast that they fill the line, or leave room."""
+    known = facts(Skin(units=8, clock_hz=24_000_000, baud=baud))
+    readings = [(2_000 + 3_840 * n, bytes([8] * 26) + b"\0") for n in range(100)]
+    link = Link(known, State(known, [], Heard([], [])), units=readings)
+    cycle, offered, starts = 1_000, 0, {}
+    while cycle < 300_000:
+        link.advance(cycle)
+        link.drop()
+        offered += 1
+        packet = (
+            bytes([5, *(1 + offered // 250**place % 250 for place in range(3)), *[5] * rng.randrange(8, 14)]) + b"\0"
+        )
+        link.offer(cycle, packet)
+        starts[packet[1:4]] = cycle
+        cycle += rng.randrange(2_000, 3_000)
+    sent = packets(link.bytes)
+    waits, kinds = [], [kind for _, kind, _ in sent]
+    for index, (begin, kind, data) in enumerate(sent):
+        if kind == 5:
+            between = [other for other in sent[:index] if other[0] - 2 > starts[data[1:4]]]  # taken after it came
+            assert len(between) <= 1
+            assert all(one[1] == 8 for one in between)
+            waits.append(begin - starts[data[1:4]])
+    runs = [len(list(run)) for kind, run in itertools.groupby(kinds) if kind == 5]
+    assert len(runs) > 8
+    assert max(runs[1:-1]) <= 5  # one may be on the wire as readings begin to wait
+    assert max(waits) <= 10 * known.bit_clocks * (27 + 18)
 
 
-def frames(sent):
-    """By a frame's time the cycle of its first byte, of frames without zones."""
-    found, begin = {}, 0
+def packets(sent):
+    """(cycle of the first byte, first byte, bytes) of each packet."""
+    found, begin = [], 0
     for end, (_, value) in enumerate(sent):
         if value == 0:
-            stuffed = [byte for _, byte in sent[begin : end - 3]]
-            if stuffed and stuffed[-1] >> 4 == 5:
-                plain = unstuffed(stuffed)
-                found[plain[0] | plain[1] << 8 | plain[2] << 16] = sent[begin][0]
+            if end > begin:
+                found.append((sent[begin][0], sent[begin][1], bytes(byte for _, byte in sent[begin:end])))
             begin = end + 1
     return found
-
-
-def unstuffed(data):
-    plain, place = [], 0
-    while place < len(data):
-        plain += [*data[place + 1 : place + data[place]], 0]
-        place += data[place]
-    return plain[:-1]

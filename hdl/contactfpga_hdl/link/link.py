@@ -17,6 +17,9 @@ from contactfpga_hdl.units.pack import packet_signature
 HELLO_REGION = 3
 """The others hold frames."""
 
+FRAMES_BEFORE_UNITS = 4
+"""As many frames go in a row while readings of units wait."""
+
 STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 
 
@@ -57,7 +60,8 @@ class Link(wiring.Component):
     The hello is fixed but for the digits of its state: each is taken in the clock before its byte is offered.
 
     A hello goes first, then a report of faults, then a frame; but a frame that waits is next after a report, so that
-    it waits for one at most, and one more per hello. Readings of units go when nothing else waits.
+    it waits for one at most, and one more per hello. Readings of units go when nothing else waits, and at the latest
+    after :data:`FRAMES_BEFORE_UNITS` frames, so that frames that fill the line do not hold them back.
 
     frames (in): from the packer, see :func:`~contactfpga_hdl.link.pack.frames_signature`.
     tag, summary (in): describe the frame from ``frames.decide`` to ``frames.commit``.
@@ -134,12 +138,18 @@ class Link(wiring.Component):
             m.d.sync += end.eq(reporter.length)
             m.next = "FETCH"
 
-    def _take_units(self, m: Module, wire: _Wire, end: Value) -> None:
-        """When nothing else waits."""
-        idle = ~(wire.take_hello | wire.take_report | wire.take_frame)
-        m.d.comb += wire.take_units.eq(self.units.due & idle)
+    def _take_units(self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value) -> None:
+        """When nothing else waits, or only a frame and it is their turn."""
+        frames = Signal(range(FRAMES_BEFORE_UNITS + 1))  # since the last ones
+        turn = frames == FRAMES_BEFORE_UNITS
+        others = hello_due | wire.take_report | regions.waits & ~turn
+        m.d.comb += wire.take_units.eq(self.units.due & ~others)
         m.d.sync += wire.is_units.eq(wire.take_units)
+        with m.If(wire.take_frame & ~turn):
+            m.d.sync += frames.eq(frames + 1)
         with m.If(wire.take_units):
+            m.d.comb += wire.take_frame.eq(0)
+            m.d.sync += frames.eq(0)
             m.d.sync += end.eq(1 + plain_bytes(self.skin.units, self.derived.units.converter.bits))
             m.next = "FETCH"
 
@@ -274,7 +284,7 @@ class Link(wiring.Component):
                 if reporter is not None:
                     self._take_report(m, wire, regions, hello_due, end, reporter)
                 if self.skin.units:
-                    self._take_units(m, wire, end)
+                    self._take_units(m, wire, regions, hello_due, end)
             with m.State("FETCH"):
                 m.d.comb += wire.fetches.eq(1)
                 m.next = "BYTE"

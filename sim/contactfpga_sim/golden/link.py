@@ -39,6 +39,8 @@ class Link:
         self._units = units
         self._swept = 0
         """Sweeps that were taken, or replaced by one that was."""
+        self._frames_since = 0
+        """Frames that went since the last sweep did."""
         self._idle_from = 0
         self._uart_from = 0
 
@@ -74,9 +76,10 @@ class Link:
                 self._send_hello(taken)
             elif due is not None and due <= taken and not self._frame_is_next(taken):
                 self._send_report(taken)
-            elif not self._frame or self._frame[0] > taken:
+            elif not self._frame or self._frame[0] > taken or self._sweep_is_next(taken):
                 self._send_sweep(taken)
             else:
+                self._frames_since += 1
                 packet = self._frame[1]
                 self._frame = None
                 self.sent += 1
@@ -105,7 +108,13 @@ class Link:
         self._after_report = self._idle_from
         self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._idle_from)
 
+    def _sweep_is_next(self, cycle: int) -> bool:
+        """One that waits is, after four frames."""
+        waits = self._swept < len(self._units) and self._units[self._swept][0] <= cycle
+        return waits and self._frames_since >= 4
+
     def _send_sweep(self, taken: int) -> None:
+        self._frames_since = 0
         while self._swept < len(self._units) and self._units[self._swept][0] <= taken:
             packet = self._units[self._swept][1]
             self._swept += 1

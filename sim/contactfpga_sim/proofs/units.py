@@ -23,8 +23,8 @@ def conversions(proof: Proof, skin: Skin) -> None:
     Claimed: one conversion follows the other, of the units in turn, each with 19 clocks while the converter is selected
     and none while it is not, which lasts two levels. No level of the clock is shorter than it has to be, nor is the
     pause between selection and clock. Start, single-ended and channel bits are there a level before each rising edge,
-    and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising edges, and is there
-    three clocks after the last one.
+    and do not change while the clock is high. A reading is what the pin was in the clock before the last twelve rising
+    edges, and is there three clocks after the last one.
     """
     m = proof.m
     dut = Mcp3208(skin)
