@@ -242,9 +242,10 @@ def test_a_frame_waits_for_one_packet_of_readings_at_most_and_these_for_five_fra
         cycle += rng.randrange(2_000, 3_000)
     sent = packets(link.bytes)
     waits, kinds = [], [kind for _, kind, _ in sent]
+    byte = 10 * known.bit_clocks + 2  # from when a packet is taken until its first byte is
     for index, (begin, kind, data) in enumerate(sent):
         if kind == 5:
-            between = [other for other in sent[:index] if other[0] - 2 > starts[data[1:4]]]  # taken after it came
+            between = [other for other in sent[:index] if other[0] - byte > starts[data[1:4]]]
             assert len(between) <= 1
             assert all(one[1] == 8 for one in between)
             waits.append(begin - starts[data[1:4]])

@@ -117,7 +117,7 @@ class Skin:
     """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
     dual: bool = False
     """Two copies of the gateware are compared in each clock; where they differ nothing passes for a frame, and both
-    start anew."""
+    restart."""
 
     units: int = 0
     """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
