@@ -74,10 +74,10 @@ constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/
 	$(PY) -m contactfpga_hdl.board.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
-	$(PY) -m contactfpga_sim.pages.figures docs/performance.md
+	$(PY) -m contactfpga_sim.pages.figures docs/performance.md docs/units.md
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
-	$(PY) -m contactfpga_sim.pages.size_page docs/performance.md docs/boards.md
+	$(PY) -m contactfpga_sim.pages.size_page docs/performance.md docs/boards.md docs/units.md
 
 rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
 	$(PY) scripts/measure_rivals.py --page docs/performance.md docs/rivals.md $(ARGS)

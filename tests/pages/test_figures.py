@@ -36,6 +36,13 @@ def test_the_gains_of_the_adaptive_scan_are_up_to_date():
     assert writer.update(text, {"gain": figures.TABLES["gain"]}) == text
 
 
+def test_the_times_of_pressure_units_are_up_to_date():
+    page = ROOT / "docs/units.md"
+    text = page.read_text(encoding="utf-8")
+    assert writer.update(text, {"units": figures.TABLES["units"]}) == text
+    assert "<!-- figures: units_size -->" in text
+
+
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_all_tables_are_up_to_date():

@@ -23,6 +23,7 @@ from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.pages import writer
 from contactfpga_sim.pages.fast_figures import latency_table, sides_table
 from contactfpga_sim.pages.label_figures import labeller_table, recorded_table
+from contactfpga_sim.pages.units_figures import units_table
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import CONTACTS
 from contactfpga_sim.studies.sheets import adaptive_skin
@@ -215,6 +216,7 @@ TABLES: writer.Tables = {
     "report": report_table,
     "fast": latency_table,
     "sides": sides_table,
+    "units": units_table,
     "gain": lambda: gain_table(built_in_scenes()),
 }
 if RECORDINGS.is_dir():  # else their tables stay as they are

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 import tempfile
 from collections.abc import Callable
@@ -33,6 +34,14 @@ FAULTS: dict[str, dict[str, Any]] = {
 }
 """Options that tell of faults, by their titles."""
 
+WEIGHTS = (
+    (1, 2, 3, -4, 5, 6, 7, 8),
+    (-1, 1, -1, 1, -1, 1, -1, 1),
+    (100, -50, 20, 10, 5, -7, 9, 11),
+    (1, 1, 1, 1, 1, 1, 1, 1),
+)
+"""Of sums, which are cut to the units there are."""
+
 
 def gateware_table() -> str:
     """The whole design and the labeller alone, by sheet and device."""
@@ -60,6 +69,17 @@ def faults_table() -> str:
         found = size.luts(lambda options=options: Top(Skin(**options)), sizes.UP5K)  # type: ignore[misc]
         rows.append((title, f"{found:,}", f"{found - reference:+}"))
     return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
+
+
+def units_table() -> str:
+    """The reference Skin with pressure units and weighted sums of them."""
+    reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
+    rows = []
+    for units, sums in ((1, 0), (3, 1), (6, 0), (6, 4), (8, 4)):
+        skin = Skin(units=units, unit_sums=tuple(row[:units] for row in WEIGHTS[:sums]))
+        found = size.luts(functools.partial(Top, skin), sizes.UP5K)
+        rows.append((str(units), str(sums), f"{found:,}", f"{found - reference:+}"))
+    return writer.table(("units", "sums", "LUT4", "more"), map(writer.line, rows))
 
 
 def boards_table() -> str:
@@ -96,6 +116,7 @@ def board_row(board: BoardSpec, skin: Skin) -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "gateware": gateware_table,
     "faults": faults_table,
+    "units_size": units_table,
     "boards": boards_table,
 }
 
