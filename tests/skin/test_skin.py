@@ -41,6 +41,30 @@ REFUSED = [
     ({"rows": 2, "row_order": [0, 0]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 2 times"),
     ({"rows": 2, "row_order": [1]}, "row_order must hold each line from 0 to 1 once; line 0 stands in it 0 times"),
     ({"columns": 2, "column_order": [1, 0, 2]}, "column_order must hold each line from 0 to 1 once; it has 3"),
+    # pressure units
+    ({"units": 9}, "units is 9; MCP3208 has 8 channels"),
+    ({"units": -1}, "units is -1; MCP3208 has 8 channels"),
+    ({"units": 2.5}, "units is 2.5; it must be a whole number"),
+    (
+        {"units": 2, "converter": "ads"},
+        "converter is 'ads'; it must be one of 'mcp3208', or 'module:attribute' of your own",
+    ),
+    ({"units": 2, "converter_v": 2.5}, "converter_v is 2.5; MCP3208 needs 2.7 to 5.5 V"),
+    ({"units": 2, "converter_v": 6}, "converter_v is 6.0; MCP3208 needs 2.7 to 5.5 V"),
+    ({"converter_v": 5.0}, "converter_v is 5.0; leave it out, or set units"),
+    ({"unit_sums": [[1]]}, "unit_sums holds [1]; it must hold a weight for each of 0 units, not all 0"),
+    ({"unit_sums": 3}, "unit_sums is 3; it must be a list of at most 4 lists of weights"),
+    (
+        {"units": 1, "unit_sums": [[1]] * 5},
+        "unit_sums is [[1], [1], [1], [1], [1]]; it must be a list of at most 4 lists of weights",
+    ),
+    ({"units": 2, "unit_sums": [[1]]}, "unit_sums holds [1]; it must hold a weight for each of 2 units, not all 0"),
+    (
+        {"units": 2, "unit_sums": [[0, 0]]},
+        "unit_sums holds [0, 0]; it must hold a weight for each of 2 units, not all 0",
+    ),
+    ({"units": 2, "unit_sums": [[1, 128]]}, "unit_sums holds [1, 128]; weights are whole numbers from -127 to 127"),
+    ({"units": 2, "unit_sums": [[1, 0.5]]}, "unit_sums holds [1, 0.5]; weights are whole numbers from -127 to 127"),
     # the sheet
     ({"rows": 0}, "rows is 0; it must lie between 1 and 64"),
     ({"rows": 65}, "rows is 65; it must lie between 1 and 64"),
@@ -557,8 +581,11 @@ def test_every_field_is_in_the_fingerprint():
         reversal.replace(precharge_us=0.5),
         reversal.replace(self_test=True),
     ]
-    elsewhere = {"name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", "self_test"}
-    assert {*OTHER, *elsewhere, *only_there} == {field.name for field in dataclasses.fields(Skin)}
+    measured = Skin(units=2)
+    of_units = {"converter": "toy_converter:MINE", "converter_v": 5.0, "unit_sums": ((1, 1),)}
+    others += [measured, *(measured.replace(**{name: value}) for name, value in of_units.items())]
+    elsewhere = {"units", "name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", "self_test"}
+    assert {*OTHER, *elsewhere, *only_there, *of_units} == {field.name for field in dataclasses.fields(Skin)}
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
 
 
@@ -663,4 +690,9 @@ def test_a_cover_that_cannot_be_is_refused(tmp_path, old, new, message):
 def test_fields_are_plain_values():
     """Whatever reads a Skin's fields, as the golden model does, needs no code of the host."""
     fields = dataclasses.asdict(Skin(mask=[[1, 2]]))
-    assert json.loads(json.dumps(fields)) == fields | {"mask": [[1, 2]], "row_order": [], "column_order": []}
+    assert json.loads(json.dumps(fields)) == fields | {
+        "mask": [[1, 2]],
+        "row_order": [],
+        "column_order": [],
+        "unit_sums": [],
+    }

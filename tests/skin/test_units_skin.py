@@ -1,36 +1,18 @@
-"""Pressure units in the Skin: what is refused, and the clocks that follow."""
+"""Pressure units in the Skin: a converter of one's own, and the clocks that follow. What is refused: test_skin."""
 
 import pytest
+import toy_converter
 
 from contactfpga import Skin, SkinError
 from contactfpga.skin.derived import Derived
 
-SUMS = "unit_sums holds "
 
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"units": 9}, "units is 9; MCP3208 has 8 channels"),
-        ({"units": -1}, "units is -1"),
-        ({"units": 2.5}, "units is 2.5; it must be a whole number"),
-        ({"units": 2, "converter": "ads"}, "converter is 'ads'; it must be one of 'mcp3208'"),
-        ({"units": 2, "converter_v": 2.5}, "converter_v is 2.5; MCP3208 needs 2.7 to 5.5 V"),
-        ({"units": 2, "converter_v": 6}, "converter_v is 6.0; MCP3208 needs 2.7 to 5.5 V"),
-        ({"converter_v": 5.0}, "converter_v is 5.0; leave it out, or set units"),
-        ({"unit_sums": [[1]]}, SUMS),
-        ({"units": 2, "unit_sums": 3}, "unit_sums is 3; it must be a list of at most 4 lists of weights"),
-        ({"units": 1, "unit_sums": [[1]] * 5}, "it must be a list of at most 4 lists"),
-        ({"units": 2, "unit_sums": [[1]]}, "it must hold a weight for each of 2 units, not all 0"),
-        ({"units": 2, "unit_sums": [[0, 0]]}, "not all 0"),
-        ({"units": 2, "unit_sums": [[1, 128]]}, "weights are whole numbers from -127 to 127"),
-        ({"units": 2, "unit_sums": [[1, 0.5]]}, "weights are whole numbers from -127 to 127"),
-    ],
-)
-def test_units_that_cannot_be_are_refused(fields, message):
-    with pytest.raises(SkinError) as caught:
-        Skin(**fields)
-    assert message in str(caught.value)
+def test_a_converter_of_ones_own_is_found_and_has_its_own_channels():
+    skin = Skin(units=4, converter="toy_converter:MINE")
+    assert skin.fingerprint != Skin(units=4).fingerprint
+    assert Skin(units=4, converter=toy_converter.MINE) == skin
+    with pytest.raises(SkinError, match="units is 5; MCP3204 has 4 channels"):
+        skin.replace(units=5)
 
 
 def test_a_file_keeps_units(tmp_path):
