@@ -190,6 +190,7 @@ enum {
     CONTACTFPGA__RATES = 6,
     CONTACTFPGA__NAME = 7,
     CONTACTFPGA__COMMANDS = 8,
+    CONTACTFPGA__UNITS = 9,
     CONTACTFPGA__CHECK = 255,
     CONTACTFPGA__STATE_DIGITS = 16,
     CONTACTFPGA__LONGEST_HELLO = 8192
@@ -323,7 +324,8 @@ static inline bool contactfpga__may_be(const contactfpga_hello *hello) {
 /* The least bytes of a field. */
 static inline uint8_t contactfpga__least(uint8_t kind) {
     switch (kind) {
-    case CONTACTFPGA__SHEET: return 10;
+    case CONTACTFPGA__SHEET:
+    case CONTACTFPGA__UNITS: return 10;
     case CONTACTFPGA__STATE: return CONTACTFPGA__STATE_DIGITS;
     case CONTACTFPGA__PITCH: return 16;
     case CONTACTFPGA__RADIUS:
@@ -334,7 +336,7 @@ static inline uint8_t contactfpga__least(uint8_t kind) {
     }
 }
 
-enum { CONTACTFPGA__ODD_SHEET = 16, CONTACTFPGA__ODD_STATE = 17, CONTACTFPGA__ODD_NAME = 18 };
+enum { CONTACTFPGA__ODD_SHEET = 16, CONTACTFPGA__ODD_STATE = 17, CONTACTFPGA__ODD_NAME = 18, CONTACTFPGA__ODD_UNITS = 19 };
 
 /* Keep a field's content; what is wrong with it counts only once the hello is whole. */
 static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t kind, const uint8_t *value, uint8_t length) {
@@ -366,6 +368,11 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
         hello->clock_hz = contactfpga__word(value), hello->baud = contactfpga__word(value + 4);
         break;
     case CONTACTFPGA__COMMANDS: hello->self_test = length && memchr(value, 1, length); break;
+    case CONTACTFPGA__UNITS: /* whose readings are not read here */
+        reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_UNITS);
+        if (value[0] < 1 || value[0] > 8 || value[1] < 1 || value[1] > 28 || !contactfpga__word(value + 6))
+            odd = UINT32_C(1) << CONTACTFPGA__ODD_UNITS;
+        break;
     case CONTACTFPGA__NAME: {
         size_t kept = length < sizeof hello->name - 1 ? length : sizeof hello->name - 1;
         reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_NAME);
