@@ -304,14 +304,8 @@ public:
 #endif
 
 private:
-<<<<<<< HEAD
-    Clocked model_;
     Word levels_ = 0, driven_ = 0, charged_ = 0;
     bool line_ = true, contact_ = false, alive_ = false;
-=======
-    uint64_t levels_ = 0, driven_ = 0, charged_ = 0;
-    bool line_ = true, contact_ = false;
->>>>>>> flips
 
     void watch(Word driven) {
         auto &top = model_.top;
