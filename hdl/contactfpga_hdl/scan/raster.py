@@ -163,7 +163,7 @@ class Scanner(wiring.Component):
         """What was sampled early counts when it always does."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
-        due, kept = Signal(), Signal.like(reader.levels)
+        due, kept = Signal(name="sample_due"), Signal.like(reader.levels)
         m.d.comb += sample.of_driven.eq(due & (slots.clock == counts))
         m.d.sync += due.eq(due & ~sample.of_driven | sample.begins)
         with m.If(reader.done):

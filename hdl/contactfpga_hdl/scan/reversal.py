@@ -155,9 +155,8 @@ class ReversalScanner(wiring.Component):
             sheet.selected.eq(0),
             sheet.guard.eq(0),
         ]
-        sampled = settle  # of a row's clocks, counted from 1
-        if moves_sample(derived):
-            sampled = SampleAt(m, derived, self.moves, self.clocks, turn.begins).clock
+        moves = moves_sample(derived)
+        moved = SampleAt(m, derived, self.moves, self.clocks, turn.begins) if moves else None
         with m.FSM(name="turn"):
             with m.State("LISTEN"):
                 m.d.comb += [
@@ -199,11 +198,13 @@ class ReversalScanner(wiring.Component):
                     sheet.selected.eq(Mux(checks.selects, 0, Const(1, self.skin.rows) << turn.y)),
                     sheet.guard.eq(checks.selects),
                 ]
-                with m.If(clock == sampled):
-                    m.d.sync += due[0].eq(~checks.selects)
+                sampled = due[0].eq(~checks.selects)
+                if moved is not None:
+                    with m.If(clock == moved.clock):
+                        m.d.sync += sampled
                 with m.If(clock == settle):
                     m.d.sync += [sheet.selected.eq(0), sheet.guard.eq(0), clock.eq(0)]
-                    m.d.sync += checks.checked[0].eq(checks.selects)
+                    m.d.sync += [*([sampled] if moved is None else []), checks.checked[0].eq(checks.selects)]
                     with m.If(turn.todo.any()):
                         m.next = "CHARGE"
                     with m.Else():

@@ -29,8 +29,8 @@ class SampleAt:
     def __init__(self, m: Module, derived: Derived, moves: Value, clocks: Value, begins: Value):
         """``begins``: a frame does in the next clock."""
         self.settle = settle = derived.settle_clocks
-        asked = Signal(range(settle + 1), init=settle)
-        self.clock = Signal(range(settle + 1), init=settle)
+        asked = Signal(range(settle + 1), init=settle, name="next_sample_clock")
+        self.clock = Signal(range(settle + 1), init=settle, name="sample_clock")
         self.early = Signal()
         fits = (clocks >= derived.first_sample_clocks) & (clocks < settle)
         with m.If(moves):
