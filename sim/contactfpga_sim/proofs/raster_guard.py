@@ -89,6 +89,7 @@ def _lemmas(proof: Proof, inside: Inside, dut: Scanner, slot: Signal, line: Sign
     proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
     proof.lemma(inside["reader.done"] == ((slot == settled + 1) | released & (slot == 1)))
     proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))
+    proof.lemma(inside["is_last"] == Mux(slot >= settled, line == ROWS - 1, released & (line == ROWS)))
     at_settle_time(proof, inside, dut.derived, slot)
     proof.lemma(inside["ended"] == proof.before((slot == settled + 1) & (line == ROWS - 1)))
 
