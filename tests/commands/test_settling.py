@@ -54,7 +54,7 @@ def all_but_one():
 def test_the_image_is_what_the_circuit_predicts(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:
-        assert settling.measure(board, arguments(0.1)) == 0
+        assert settling.measure(board, arguments(0.07)) == 0
         assert board.next().cells.tolist() == pressed.tolist(), "it samples at the end of the settle time again"
     answer = json.loads(capsys.readouterr().out)
     expected = predicted(pressed)
@@ -72,7 +72,7 @@ def test_the_image_is_what_the_circuit_predicts(capsys):
 def test_the_image_in_a_terminal(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:
-        assert settling.measure(board, arguments(0.1, in_json=False)) == 0
+        assert settling.measure(board, arguments(0.07, in_json=False)) == 0
     lines = capsys.readouterr().out.splitlines()
     expected = predicted(pressed)
     tenths = [[str((cell - 1) * 10 // SETTLE) if cell else "·" for cell in row] for row in expected.tolist()]
