@@ -157,9 +157,7 @@ class Scanner(wiring.Component):
         sample.early = chosen.early
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 
-    def _keep_sample(
-        self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample
-    ) -> Value:
+    def _keep_sample(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> Value:
         """What was sampled early counts when it always does."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks

@@ -35,8 +35,8 @@ class ReversalScanner(wiring.Component):
     then. The guard column is driven to the selecting level in between, the guard row to the released one.
 
     Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
-    which it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is not driven before this one is taken, and
-    the next frame does not begin before this one is packed.
+    which it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is
+    not driven before this one is taken, and the next frame does not begin before this one is packed.
 
     rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
     untouched sheet has one empty row. With ``report = "cells"`` all rows.

@@ -18,7 +18,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.once(parser)
     bounce = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
     parser.add_argument("--bounce", action="store_true", help=bounce)
-    settle = 'Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same.'
+    settle = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
     parser.add_argument("--settle", action="store_true", help=settle)
     seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, help=seconds)
@@ -43,7 +43,7 @@ def _measure(args: argparse.Namespace) -> int:
         raise ContactFPGAError(f"--once shows one frame, which tells of no {what}; leave it out")
     with flags.opened(args) as board:
         _check_cells(board)
-        return (bouncing if args.bounce else settling).measure(board, args)
+        return bouncing.measure(board, args) if args.bounce else settling.measure(board, args)
 
 
 def _show(args: argparse.Namespace) -> int:

@@ -50,8 +50,8 @@ def _settling(board: Board, skin: Skin) -> Settling:
     first, settle = derived.first_sample_clocks, derived.settle_clocks
     if settle <= first:
         raise ContactFPGAError(
-            f"{board.port}: a row is driven for {settle} clocks, and its columns cannot be sampled before {first}; build "
-            "a bitstream from the same Skin with a longer settle_us for this measurement"
+            f"{board.port}: a row is driven for {settle} clocks, and its columns cannot be sampled before {first}; "
+            "build a bitstream from the same Skin with a longer settle_us for this measurement"
         )
     return Settling((skin.rows, skin.columns), first, settle, skips=skin.reads_rows, guard=skin.guard)
 
@@ -140,8 +140,9 @@ def _show(found: Settling, skin: Skin, end: list[Finding]) -> None:
     print(drawing.text)
     terminal.say(drawing.legend)
     terminal.say(
-        f"{len(known)} of {skin.rows * skin.columns - len(skin.mask)} cells measured: {_span(known.min(), found, per_us)} "
-        f"at least, {found.median / per_us:.2f} us the median, {known.max() / per_us:.2f} us at most.",
+        f"{len(known)} of {skin.rows * skin.columns - len(skin.mask)} cells measured: "
+        f"{_span(known.min(), found, per_us)} at least, {found.median / per_us:.2f} us the median, "
+        f"{known.max() / per_us:.2f} us at most.",
         hang=2,
     )
     _show_slow(found, per_us)
@@ -164,8 +165,8 @@ def _show_slow(found: Settling, per_us: int) -> None:
             terminal.say(f"slow {kind}{'s' * (len(lines) > 1)} {named}: a long or thin line, or a weak pin", hang=2)
     alone = [cell for cell in slow.cells if cell[0] not in slow.rows and cell[1] not in slow.columns]
     if alone:
-        named = [f"({row}, {column}) {found.clocks[row, column] / per_us:.2f} us" for row, column in alone[:NAMED]]
-        what = f"slow cells {', '.join(named)}{', ...' if len(alone) > NAMED else ''}: contacts of high resistance"
+        times = [f"({row}, {column}) {found.clocks[row, column] / per_us:.2f} us" for row, column in alone[:NAMED]]
+        what = f"slow cells {', '.join(times)}{', ...' if len(alone) > NAMED else ''}: contacts of high resistance"
         terminal.say(what, hang=2)
 
 
@@ -174,7 +175,9 @@ def _show_back(found: Settling, per_us: int) -> None:
     late = np.flatnonzero(found.back_clocks > found.first).tolist()
     if late:
         named = [f"{column} ({found.back_clocks[column] / per_us:.2f} us)" for column in late[:NAMED]]
-        what = f"slow to come back: columns {', '.join(named)}{', ...' if len(late) > NAMED else ''} after the next row's"
+        what = (
+            f"slow to come back: columns {', '.join(named)}{', ...' if len(late) > NAMED else ''} after the next row's"
+        )
         terminal.say(f"{what} selection; a longer release_us, precharge_us or a stronger pull helps", hang=2)
 
 
@@ -186,6 +189,8 @@ def _propose(found: Settling, skin: Skin) -> None:
     try:
         skin.replace(settle_us=settle_us)
     except ContactFPGAError as error:
-        terminal.say(f"{settle_us:g} us would be enough for the sheet, but not for the rest of this Skin: {error}", hang=2)
+        terminal.say(
+            f"{settle_us:g} us would be enough for the sheet, but not for the rest of this Skin: {error}", hang=2
+        )
         return
     terminal.say(f"Proposed, {MARGIN:g} times the longest of the measured cells:\nsettle_us = {settle_us:g}")

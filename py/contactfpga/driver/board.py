@@ -196,8 +196,8 @@ class Board:
     # ---- commands
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
-        """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame scanned after it took the
-        command; where answers were lost it may have taken it twice.
+        """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame
+        scanned after it took the command; where answers were lost it may have taken it twice.
 
         ``value`` is the command's, ``timeout`` in seconds. Raises :class:`NoSuchCommand` where the board does not take
         it, ValueError for numbers that no command has, and as :meth:`read` does.

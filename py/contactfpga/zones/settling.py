@@ -1,7 +1,7 @@
 """How many clocks after its row is selected each cell reads pressed, of frames that were sampled at different ones.
 
-A frame that is sampled early lies between two that are not. A cell tells something only where it was pressed in both, and
-in those before: then it is no press that has just begun, and none that bounces.
+A frame that is sampled early lies between two that are not. A cell tells something only where it was pressed in both,
+and in those before: then it is no press that has just begun, and none that bounces.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ class Slow:
 class Settling:
     """Made of frames in turn: one at the full settle time, one at :meth:`next_clocks`, one at the full settle time, ...
 
-    first, settle: least and most clocks that a sample can be moved to; skips: the scan drives touched rows only; guard: a
-    guard row is driven before row 0.
+    first, settle: least and most clocks that a sample can be moved to; skips: the scan drives touched rows only; guard:
+    a guard row is driven before row 0.
     """
 
     def __init__(self, shape: tuple[int, int], first: int, settle: int, *, skips: bool = False, guard: bool = False):
@@ -86,7 +86,9 @@ class Settling:
     def next_clocks(self) -> int | None:
         """Where to sample next: where most places that can tell want it; None: nothing that is pressed is unknown."""
         columns = (self._after_pressed(self._full) & ~self._full).any(axis=0)
-        wanted = [search.middle[search.open & now] for search, now in ((self._press, self._full), (self._back, columns))]
+        wanted = [
+            search.middle[search.open & now] for search, now in ((self._press, self._full), (self._back, columns))
+        ]
         counts = np.bincount(np.concatenate(wanted))
         return int(counts.argmax()) if len(counts) else None
 

@@ -100,8 +100,8 @@ class CompiledBoard:
         self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
-        """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all while
-        one of ``rows`` pulls them, and each of ``columns``. Guard lines are the last."""
+        """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all
+        while one of ``rows`` pulls them, and each of ``columns``. Guard lines are the last."""
         skin = self.skin
         factors = (
             np.array([given.get(line, 1.0) for line in range(lines)])
