@@ -60,8 +60,10 @@ def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
     for number in itertools.count(129 * 128 + 1):
         value = int(rng.choice([*values, *rng.integers(known.first_sample, known.settle, size=10)]))
         what = int(rng.choice([2, 2, 2, 2, 1, 3]))
+        if not received:
+            what, value = 2, known.first_sample
         data = command(number, what, value, False, known.bit_clocks)
-        if number % 8 == 0 or rng.random() < 0.2:
+        if number % 8 == 0 or (received and rng.random() < 0.2):
             data = request(number | 1, False, known.bit_clocks)
         if start + len(data) * 10 * known.bit_clocks > cycles:
             return Timeline(pieces, received, cuts)
