@@ -148,6 +148,12 @@ def test_lines_are_pulled_to_the_level_that_they_have_untouched(changes, rows, c
     assert {line.pull for line in wiring.column_lines(skin)} == {columns}
 
 
+@pytest.fixture(autouse=True)
+def wide(monkeypatch):
+    """As wide as where nothing has a width; a parallel run of the tests sets its own."""
+    monkeypatch.setenv("COLUMNS", "160")
+
+
 def printed(capsys, *arguments):
     assert cli.main(["build", *arguments]) == 0
     return capsys.readouterr().out

@@ -44,7 +44,8 @@ def python(code, *arguments, timeout=60):
 # ---- starting
 
 
-def test_help_names_every_command(capsys):
+def test_help_names_every_command(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
     with pytest.raises(SystemExit) as caught:
         cli.main(["--help"])
     assert caught.value.code == 0

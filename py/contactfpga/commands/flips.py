@@ -7,7 +7,7 @@ import argparse
 from contactfpga.console import flags, numbers, outputs
 from contactfpga.console.interrupt import Interrupted
 
-HELP = "Flip bits of the running gateware one by one; does the host notice?"
+HELP = "Flip bits of the running gateware one by one and see what the host notices."
 EXTRA = "chart"
 
 

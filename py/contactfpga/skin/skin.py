@@ -116,7 +116,7 @@ class Skin:
     """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
     dual: bool = False
     """Two copies of the gateware are compared in each clock; where they differ nothing passes for a frame, and both
-    start anew."""
+    restart."""
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
