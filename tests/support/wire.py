@@ -148,9 +148,15 @@ class Wire:
         facts[RATES] = struct.pack("<II", skin.clock_hz, skin.baud)
         if skin.name:
             facts[NAME] = skin.name.encode()
-        if skin.self_test:
-            facts[COMMANDS] = b"\x01"
+        if commands := self.commands:
+            facts[COMMANDS] = commands
         return facts
+
+    @property
+    def commands(self) -> bytes:
+        """Numbers of the commands that its board takes: a self-test, and "sample at"."""
+        moves = self.skin.report == "cells" and self.skin.scan != "adaptive"
+        return b"\x01" * self.skin.self_test + b"\x02" * moves
 
     def hello_fields(self, *, sent=0, epoch=0, heard=0, stuck=0, facts=None) -> list:
         """The fields of a hello, as bytes, in order."""

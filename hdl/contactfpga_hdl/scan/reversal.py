@@ -20,6 +20,7 @@ from contactfpga_hdl.scan.reversal_rows import (
     watch_motion,
 )
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
+from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
 from contactfpga_hdl.scan.stuck import count_columns, present
 from contactfpga_hdl.util.lowest import lowest
 
@@ -34,8 +35,8 @@ class ReversalScanner(wiring.Component):
     then. The guard column is driven to the selecting level in between, the guard row to the released one.
 
     Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
-    which it is driven; the row is offered three clocks later. The next row is not driven before this one is taken, and
-    the next frame does not begin before this one is packed.
+    which it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is
+    not driven before this one is taken, and the next frame does not begin before this one is packed.
 
     rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
     untouched sheet has one empty row. With ``report = "cells"`` all rows.
@@ -154,6 +155,8 @@ class ReversalScanner(wiring.Component):
             sheet.selected.eq(0),
             sheet.guard.eq(0),
         ]
+        moves = moves_sample(derived)
+        moved = SampleAt(m, derived, self.moves, self.clocks, turn.begins) if moves else None
         with m.FSM(name="turn"):
             with m.State("LISTEN"):
                 m.d.comb += [
@@ -195,9 +198,13 @@ class ReversalScanner(wiring.Component):
                     sheet.selected.eq(Mux(checks.selects, 0, Const(1, self.skin.rows) << turn.y)),
                     sheet.guard.eq(checks.selects),
                 ]
+                sampled = due[0].eq(~checks.selects)
+                if moved is not None:
+                    with m.If(clock == moved.clock):
+                        m.d.sync += sampled
                 with m.If(clock == settle):
                     m.d.sync += [sheet.selected.eq(0), sheet.guard.eq(0), clock.eq(0)]
-                    m.d.sync += [due[0].eq(~checks.selects), checks.checked[0].eq(checks.selects)]
+                    m.d.sync += [*([sampled] if moved is None else []), checks.checked[0].eq(checks.selects)]
                     with m.If(turn.todo.any()):
                         m.next = "CHARGE"
                     with m.Else():

@@ -7,10 +7,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from contactfpga.console import drawn_sheet, terminal
+from contactfpga.console import drawn_settling, drawn_sheet, terminal
 from contactfpga.console.live import Room
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.zones.settling import Settling
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
@@ -82,6 +85,15 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
     scale = drawn_sheet.scales(zones, left.width, left.height)[0]
     drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
     return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+
+
+def settling_view(found: Settling, skin: Skin, room: Room) -> RenderableType:
+    """What a measurement of settle times found up to now."""
+    wide = 2 * skin.columns <= room.width
+    drawing = drawn_settling.draw(found, Derived(skin).clocks_per_us, skin.mask, wide, room.unicode)
+    known = int((found.clocks > 0).sum())
+    below = f"{drawing.legend}\n{known} of {skin.rows * skin.columns - len(skin.mask)} cells measured"
+    return Group(_styled(drawing), Text(terminal.wrapped(below, room.width)))
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:

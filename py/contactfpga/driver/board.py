@@ -13,6 +13,7 @@ from contactfpga.driver.subscription import Events, Subscription, checked, frame
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import SAMPLE_AT
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import Faults
@@ -195,13 +196,24 @@ class Board:
     # ---- commands
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
-        """Have the board do something: 1, test its lines. Returns the first complete frame scanned after it took the
-        command; where answers were lost it may have taken it twice.
+        """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame
+        scanned after it took the command; where answers were lost it may have taken it twice.
 
         ``value`` is the command's, ``timeout`` in seconds. Raises :class:`NoSuchCommand` where the board does not take
         it, ValueError for numbers that no command has, and as :meth:`read` does.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
+
+    def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
+        """From the next frame on sample the columns this many clocks of the board after a row is selected, in place of
+        the settle time, which 0 is: to measure how long the sheet takes (``contactfpga wire --settle``). Returns the
+        first frame that is. Until it is set to 0 again, or the board restarts, what takes longer does not read pressed.
+
+        More than the settle time counts as that, and so does what is too early for the board: less than 2 clocks, or
+        than columns on shift registers take. Raises as :meth:`command` does; boards with ``report = "cells"`` and
+        ``scan = "raster"`` or ``"reversal"`` take it.
+        """
+        return self.command(SAMPLE_AT, clocks, timeout)
 
     def __iter__(self) -> Iterator[Zones]:
         """Every frame, forever; a recording ends."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.inputs.values import shown, whole
-from contactfpga.skin.derived import SELF_TEST
+from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
 from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, digits, last_byte, pulses, seal
 from contactfpga.wire.hello import HEARD_DIGITS
 from contactfpga.wire.protocol import REQUEST_HELLO, may_number
@@ -15,7 +15,10 @@ KIND_COMMAND = 10
 WHAT_DIGITS, VALUE_DIGITS = 1, 3
 MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * VALUE_DIGITS) - 1
 
-COMMANDS = {SELF_TEST: ("self-test", "self_test = true")}
+COMMANDS = {
+    SELF_TEST: ("self-test", "self_test = true"),
+    SAMPLE_AT: ("sample at", 'report = "cells" and scan = "raster" or "reversal"'),
+}
 """Name of each command, and what has to be in the Skin of a board that takes it."""
 
 

@@ -99,6 +99,16 @@ class CompiledBoard:
         arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
         self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
 
+    def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
+        """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all
+        while one of ``rows`` pulls them, and each of ``columns``. Guard lines are the last."""
+        skin = self.skin
+        factors = (
+            np.array([given.get(line, 1.0) for line in range(lines)])
+            for given, lines in ((rows, skin.row_lines), (columns, skin.column_lines))
+        )
+        self._call("slow", *(each.ctypes.data_as(ctypes.c_void_p) for each in factors))
+
     def run(self, cycles: int) -> None:
         """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
         self._call("run", ctypes.c_uint64(cycles))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.skin import Skin
@@ -20,7 +22,8 @@ class VirtualBoard:
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
-    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none.
+    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
+    slow_rows, slow_columns: by line the factor by which it then takes longer.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
@@ -32,12 +35,18 @@ class VirtualBoard:
         scene: Source = None,
         cover: Cover | None = None,
         circuit: Circuit | None = None,
+        slow_rows: Mapping[int, float] | None = None,
+        slow_columns: Mapping[int, float] | None = None,
     ):
         self.skin = skin or Skin()
         self._scene = make_scene(self.skin, scene, cover)
         self._board = CompiledBoard(self.skin)
         if circuit is not None:
             self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
+        elif slow_rows or slow_columns:
+            raise ValueError("slow_rows and slow_columns are factors of a circuit's times; give the circuit")
+        if slow_rows or slow_columns:
+            self._board.slow(slow_rows or {}, slow_columns or {})
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""

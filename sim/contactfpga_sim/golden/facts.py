@@ -78,8 +78,18 @@ class Facts:
 
     @property
     def commands(self) -> bytes:
-        """Numbers of the commands that the board takes: 1 is the self-test."""
-        return b"\x01" if self.skin.self_test else b""
+        """Numbers of the commands that the board takes: 1 is the self-test, 2 moves the sample."""
+        return b"\x01" * self.skin.self_test + b"\x02" * self.samples_early
+
+    @property
+    def samples_early(self) -> bool:
+        """The board can sample a row's columns before the settle time is over."""
+        return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
+
+    @property
+    def first_sample(self) -> int:
+        """The earliest of its clocks in which a row's columns can be sampled, counted from 1."""
+        return max(2, self.load + self.column_shift)
 
     @functools.cached_property
     def clocks_per_us(self) -> int:

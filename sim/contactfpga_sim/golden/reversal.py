@@ -11,7 +11,7 @@ from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.reversal_guard import Checks
-from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
 
 RETRY_US = 2**16
 """A column that read stuck is driven again when the clock passes a multiple of this."""
@@ -19,10 +19,11 @@ RETRY_US = 2**16
 
 @dataclasses.dataclass(frozen=True)
 class Slot:
-    """A row is driven from cycle ``begin`` on; its columns are sampled in the last cycle in which it is."""
+    """A row is driven from cycle ``begin`` to cycle ``end``; its columns are sampled in the last one, or earlier."""
 
     row: int
     begin: int
+    end: int
     sample: int
 
     @property
@@ -194,8 +195,10 @@ class Scanner:
         counted = np.zeros_like(cells)
         handed = _Handed(facts, rows)
         begin = begun + max(4, facts.precharge - facts.project)
+        ahead = early_clocks(facts, self._requests, begun)
         for row in todo:
-            slot = Slot(row, begin, begin + facts.settle - 1)
+            end = begin + facts.settle - 1
+            slot = Slot(row, begin, end, end - ahead)
             self.slots.append(slot)
             cells[row] = self._read(slot)
             if cells[row].any():
@@ -209,9 +212,9 @@ class Scanner:
         if not todo:
             handed.nothing(begun + 1)
         else:
-            self._listens = self.slots[-1].sample + 2
+            self._listens = self.slots[-1].end + 2
             if self.checks:
-                self._listen_after(*self.checks.after(self.slots[-1].sample))
+                self._listen_after(*self.checks.after(self.slots[-1].end))
         return counted
 
     def _read(self, slot: Slot) -> np.ndarray:
@@ -279,10 +282,10 @@ class Reversal(ScanRule):
         scanner, facts = Scanner(play), play.facts
         while not scanner.begun or scanner.begun[-1] <= play.cycles:
             scanner.frame()
-        slots = [(slot.begin, slot.sample, slot.row) for slot in scanner.slots]
+        slots = [(slot.begin, slot.end, slot.row) for slot in scanner.slots]
         if scanner.checks:
             slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.checks.slots])
-        driven = [change for begin, sample, row in slots for change in ((begin, 1 << row), (sample + 1, 0))]
+        driven = [change for begin, end, row in slots for change in ((begin, 1 << row), (end + 1, 0))]
         return Scanned(scanner.contact, driven, scanner.begun)
 
 

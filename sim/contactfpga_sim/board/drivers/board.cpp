@@ -5,7 +5,9 @@
 // rows can be let go and are read. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
 // bits can be flipped, and a moment kept and returned to.
 #include <algorithm>
+#include <cmath>
 #include <deque>
+#include <vector>
 
 #define ROW_LINES (ROWS + GUARD)
 #define COLUMN_LINES (COLUMNS + GUARD)
@@ -32,7 +34,9 @@ public:
     Word stuck = 0;
     // A column with capacitance goes a share of its way a clock: to the level that a pressed switch pulls it to, or back
     // to 0. It reads pressed above the threshold. Share and level depend on how many columns are pulled at once.
+    // A row, or a column, may be slower than the others by a factor.
     bool slow = false;
+    std::vector<double> row_factor, column_factor;
     double press_share[COLUMN_LINES + 1], pulled[COLUMN_LINES + 1], release_share = 1, threshold = 0.5;
 
     Matrix() {
@@ -66,6 +70,8 @@ public:
     uint64_t fights = 0;
     Word levels(Word driven, Word columns_driven) {
         Word reads = 0;
+        if (driven)
+            selected_ = lowest(driven);
         for (; driven; driven &= driven - 1)
             reads |= closed_[lowest(driven)];
         fights += (reads & columns_driven) != 0;
@@ -88,6 +94,13 @@ private:
     uint8_t row_end_[ROW_LINES], column_end_[COLUMN_LINES];
     Word closed_[ROW_LINES];  // by a row's line, the lines of the columns that it reaches through closed switches
     double volts_[COLUMN_LINES] = {};
+    unsigned selected_ = 0;  // the line that is driven, or was last
+
+    double share(double usual, bool pull, unsigned column) const {
+        if (row_factor.empty())
+            return usual;
+        return -std::expm1(std::log1p(-usual) / (column_factor[column] * (pull ? row_factor[selected_] : 1)));
+    }
 
     void solder() {
         for (unsigned row = 0; row < ROW_LINES; row++)
@@ -113,7 +126,7 @@ private:
             if (columns_driven >> column & 1 && !pull)
                 volts_[column] = 0;
             volts_[column] +=
-                ((pull ? pulled[together] : 0) - volts_[column]) * (pull ? press_share[together] : release_share);
+                ((pull ? pulled[together] : 0) - volts_[column]) * share(pull ? press_share[together] : release_share, pull, column);
             reads |= Word{volts_[column] > threshold} << column;
         }
         return reads;
@@ -382,6 +395,15 @@ EXPORT void board_settle(
     }
     matrix.release_share = release_share;
     matrix.threshold = threshold;
+}
+EXPORT void board_slow(Board *board, const double *row_factor, const double *column_factor) {
+    Matrix &matrix = board->matrix;
+    matrix.row_factor.resize(ROW_LINES);
+    matrix.column_factor.resize(COLUMN_LINES);
+    for (unsigned row = 0; row < ROW_LINES; row++)
+        matrix.row_factor[line_of_row[row]] = row_factor[row];
+    for (unsigned column = 0; column < COLUMN_LINES; column++)
+        matrix.column_factor[line_of_column[column]] = column_factor[column];
 }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 
