@@ -12,6 +12,7 @@ from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.golden.self_test import SelfTest
 
 RETRY_US = 2**16
 """A column that read stuck is driven again when the clock passes a multiple of this."""
@@ -52,6 +53,7 @@ class Scanner:
         self._rests = False
         self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
         self.checks = Checks(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
+        self.test = SelfTest(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
 
     def frame(self) -> None:
         """The next frame."""
@@ -69,7 +71,7 @@ class Scanner:
             told=begun + 3,
             slots=0,
             alone=frozenset(todo),
-            faults=self.checks.word if self.checks else 0,
+            faults=self._word,
         )
         self.begun.append(begun)
         self._rests = not todo
@@ -87,7 +89,7 @@ class Scanner:
         touched or a frame is wanted."""
         project = self._facts.project
         if not self._rests:
-            return max(self._listens + project + 1, self._packed)
+            return self._after_tests(max(self._listens + project + 1, self._packed))
         begin = self.begun[-1] + 1
         while True:
             wanted = max(self._wanted(), self._packed, begin)
@@ -95,14 +97,48 @@ class Scanner:
             until = min(wanted, check)
             self._rest(begin, until)
             touched = self._first_touched(begin - 2, until - 2)
+            test = self._test_asked(begin, until if touched is None else touched + 1)
+            if test is not None:
+                until, touched = test, None
+                self._held = [entry for entry in self._held if entry[0] <= until]
             self._watch(begin, until if touched is None else touched + 2)
             if touched is not None:
-                return max(self._wake(touched) + project, self._packed)
-            if not self.checks or wanted < check:
+                return self._after_tests(max(self._wake(touched) + project, self._packed))
+            if test is not None:
+                self._test_at(test)
+            elif not self.checks or wanted < check:
                 return wanted
-            self._listen_after(*self.checks.at_rest(check))
-            self._stages.watch(self._listens)
+            else:
+                self._listen_after(*self.checks.at_rest(check))
+                self._stages.watch(self._listens)
+            self._watch(until + 1, self._listens + project)
             begin = self._listens + project + 1
+
+    def _after_tests(self, begin: int) -> int:
+        """A frame would begin in this cycle, but slots of the self-test that are wanted by then come before."""
+        while self._test_asked(begin, begin) is not None:
+            self._test_at(begin)
+            begin = self._listens + self._facts.project + 1
+        return begin
+
+    def _test_asked(self, begin: int, until: int) -> int | None:
+        """The first cycle from ``begin`` to ``until`` in which a slot of the self-test can begin and is wanted."""
+        begin = max(begin, self._packed)
+        asked = self.test.asked(until) if self.test and begin <= until else None
+        return None if asked is None else max(asked, begin)
+
+    def _test_at(self, cycle: int) -> None:
+        assert self.test is not None
+        sample = self.test.slot(cycle)
+        self._listens = sample + 4
+        self._stages.tell(sample + 3, self._word)
+
+    @property
+    def _word(self) -> int:
+        """What is told of lines."""
+        joined = self.test is not None and self.test.joined
+        checked = self._facts.fault_bits - 1 if joined else 0
+        return (self.checks.word if self.checks else 0) | joined << checked
 
     def _watch(self, begin: int, end: int) -> None:
         """The sheet rests in these cycles; without guard lines that is told now and then."""
@@ -124,7 +160,7 @@ class Scanner:
         if guard_is_stuck:
             self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
         self._listens = checked + 2
-        self._stages.tell(checked + 3, self.checks.word if self.checks else 0)
+        self._stages.tell(checked + 3, self._word)
 
     def _wanted(self) -> int:
         """The first cycle in which a frame is, though nothing is touched."""
@@ -283,6 +319,8 @@ class Reversal(ScanRule):
         if scanner.checks:
             slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.checks.slots])
         driven = [change for begin, sample, row in slots for change in ((begin, 1 << row), (sample + 1, 0))]
+        if scanner.test:
+            driven = sorted(driven + scanner.test.discharged)
         return Scanned(scanner.contact, driven, scanner.begun)
 
 

@@ -280,7 +280,8 @@ public:
         Matrix matrix;
         Sender sender;
         Reader reader;
-        uint64_t cycle, levels, row_levels;
+        uint64_t cycle;
+        Word levels, row_levels;
         bool line;
     };
     Moment moment() const { return {state.words(), matrix, sender, reader, cycle, levels_, row_levels(), line_}; }
@@ -294,7 +295,7 @@ public:
 #endif
     }
     bool same(const Moment &moment) const { return reader.same(moment.reader) && state.words() == moment.words; }
-    uint64_t row_levels() const {
+    Word row_levels() const {
 #if REVERSAL
         return row_levels_;
 #else
@@ -304,14 +305,8 @@ public:
 #endif
 
 private:
-<<<<<<< HEAD
-    Clocked model_;
     Word levels_ = 0, driven_ = 0, charged_ = 0;
     bool line_ = true, contact_ = false, alive_ = false;
-=======
-    uint64_t levels_ = 0, driven_ = 0, charged_ = 0;
-    bool line_ = true, contact_ = false;
->>>>>>> flips
 
     void watch(Word driven) {
         auto &top = model_.top;
