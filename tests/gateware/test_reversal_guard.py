@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import any_skin, small, touches
+from reversal import FAST, any_skin, small, touches
 from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.record import Stimulus
 from contactfpga_sim.golden import Timeline, predict
@@ -117,6 +117,13 @@ def test_any_skin_with_guard_lines_is_the_golden_models_in_every_clock(rng, soon
     skin, cycles = any_skin(rng).replace(guard=True, fail_safe=True, alive=True), 6000
     timeline = any_life(rng, skin, cycles)
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+@pytest.mark.campaign
+def test_the_compiled_board_of_the_reference_sheet_is_the_golden_models_in_every_clock(rng):
+    skin, cycles = FAST.replace(guard=True), 60_000
+    timeline = any_life(rng, skin, cycles)
+    assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 1000
 
 
 def test_frames_come_between_reports_of_faults_and_tell_of_both():

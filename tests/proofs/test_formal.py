@@ -30,6 +30,8 @@ LONG = {
     "zones are divided, 2x2, 1 fraction bit",
     "backlog keeps each item, 18 items",
     "pins never meet, 2x1, shortest times",
+    "pins never meet, 2x1, guard lines, row2col, shortest times",
+    "whole lines are not told, 3x2",
     "frames of a line reversal, 8x2",
     "a closed switch is reported, 8x4",
     "the next frame in time, 8x2, long times",

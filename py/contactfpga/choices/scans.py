@@ -75,9 +75,11 @@ def _check_reversal(skin: Skin) -> None:
 
 
 def _reversal_frame_clocks(derived: Derived) -> int:
-    """All rows are touched, and each waits until the one before it is debounced, labelled and counted."""
+    """All rows are touched, and each waits until the one before it is debounced, labelled and counted; then guard lines
+    are checked."""
     handed = derived.debounce_clocks + 2 * (derived.label_row_clocks + derived.open_zones) + 16
-    return derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed)
+    checked = max(derived.project_clocks, derived.row_clocks) + 1 if derived.skin.guard else 0
+    return derived.project_clocks + 4 + derived.skin.rows * (derived.row_clocks + handed) + checked
 
 
 def _raster_min_row_clocks(derived: Derived) -> int:

@@ -149,6 +149,8 @@ _PIN_BUGS = (
         lambda listens, inside: listens & ~inside["inverts"]),
 )  # fmt: skip
 _WHOLE_BUGS = (
+    Bug("the next frame without a check", ReversalScanner, "checked",
+        lambda checked, inside: Mux(inside["turn_state"] == SELECT, 0, checked)),
     Bug("rows are read too early", ReversalScanner, "clock",
         lambda clock, inside: clock + (inside["starts"] & inside["of_rows"])),
     Bug("told by a stuck guard column", ReversalScanner, "checks_rows",
@@ -156,8 +158,6 @@ _WHOLE_BUGS = (
     Bug("columns are told by the rows' check", ReversalScanner, "checks_columns",
         lambda _, inside: inside["checked"][1]),
     Bug("rows only", ReversalScanner, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
-    Bug("the next frame without a check", ReversalScanner, "checked",
-        lambda checked, inside: Mux(inside["turn_state"] == SELECT, 0, checked)),
 )  # fmt: skip
 CASES = (
     Case("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),
