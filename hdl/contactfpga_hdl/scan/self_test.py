@@ -27,7 +27,7 @@ class SelfTest(wiring.Component):
     asks (out): a slot is wanted.
     begin (in): high for a clock in which one is; the scan drives nothing from the next clock but one on.
     ends (out): high for a clock, its last one.
-    rows, columns (in): lines that read released, from synchronizers. Rows that are masked whole are missing.
+    rows, columns (in): lines that read released, from synchronizers; rows that are masked whole never do.
     discharges (out): all lines are driven to the selecting level, from the second clock after ``begin`` on for the
     projection time.
     alone (out): rows, then columns, that are driven to the released level, after a gap of a clock for the settle time.
@@ -129,7 +129,7 @@ class SelfTest(wiring.Component):
         with m.If(judges):
             m.d.sync += [
                 self.slots.payload.rows.eq(rows),
-                self.slots.payload.columns.eq(self.columns),
+                self.slots.payload.columns.eq(columns),
                 found.eq(bad | found & ~first),
                 self.joined.eq(bad | Mux(number == len(line), found, self.joined)),
             ]
