@@ -113,7 +113,8 @@ class ReversalScanner(wiring.Component):
         """All pins come from registers; at power-up none is driven."""
         skin = self.skin
         m.submodules.precharge = precharge = Precharge(skin)
-        driven, begun = Signal(), Signal()
+        driven = Signal()
+        begun = Signal()
         m.d.sync += [driven.eq(~sheet.listens), begun.eq(turn.begins)]
         selected, drive, stuck = sheet.selected, driven.replicate(skin.rows), sheet.pressed
         inverted, charged = Const(0, 1), precharge.pins

@@ -69,7 +69,9 @@ class SelfTest(wiring.Component):
     def _drive(self, m: Module, line: Value) -> Value:
         """All pins come from registers. Returns what is high when the levels of a slot are there."""
         project, settle = self.derived.project_clocks, self.derived.settle_clocks
-        clock, drives, judges = Signal(range(max(project, settle, SEEN + 1))), Signal(), Signal()
+        clock = Signal(range(max(project, settle, SEEN + 1)))
+        drives = Signal()
+        judges = Signal()
         driven = checked_rows(self.skin) | anywhere(self.skin) << self.skin.rows
         m.d.sync += [clock.eq(0), self.discharges.eq(0), self.alone.eq(Mux(drives, line & driven, 0))]
         m.d.comb += self.ends.eq(judges)
@@ -102,7 +104,10 @@ class SelfTest(wiring.Component):
     def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
         """Which slot is next. One that goes out is kept until then."""
         waits = self.slots.valid
-        wanted, tells, over, starts = Signal(), Signal(), Signal(), Signal()
+        wanted = Signal()
+        tells = Signal()  # slots go out
+        over = Signal()
+        starts = Signal()
         m.d.comb += [
             over.eq(Mux(tells, waits & self.slots.ready, judges)),
             starts.eq(wanted & (over | ~self.asks & ~waits)),
