@@ -169,7 +169,9 @@ def test_a_whole_sheet_says_nothing_but_what_is_pressed(bench, rng):
 
 
 def test_a_bridged_diode_is_not_told_while_nobody_presses(bench):
-    test, bit = self_test(bench, small(rows=2, columns=2, self_test=True), np.zeros((2, 2), bool), Shorts(bridged=((1, 0),)))
+    test, bit = self_test(
+        bench, small(rows=2, columns=2, self_test=True), np.zeros((2, 2), bool), Shorts(bridged=((1, 0),))
+    )
     assert (test.findings, bit) == ((), 0)
 
 

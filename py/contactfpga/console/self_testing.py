@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
         answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
         print(json.dumps(answer), flush=True)
         return min(faults, 1)
-    for finding in end:
-        _say(finding)
+    for said in end:
+        _say(said)
     return min(faults, 1)
 
 

@@ -62,7 +62,9 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
 class Stages:
     """The stages after the scan: rows are handed over, records leave, frames are packed; all noted in a trace."""
 
-    def __init__(self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told, link: Link):
+    def __init__(
+        self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told, link: Link
+    ):
         self._facts = facts
         self._reported = reported
         self._link = link

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from contactfpga_sim.golden.facts import Facts
@@ -16,7 +18,7 @@ COMMAND = 1
 class SelfTest:
     """Slot after slot: no line, each row, each column. After power-up at once, after a command as they go out."""
 
-    def __init__(self, facts: Facts, timeline: Timeline, requests: list[Request], stages: Stages):
+    def __init__(self, facts: Facts, timeline: Timeline, requests: Sequence[Request], stages: Stages):
         self.discharged: list[tuple[int, int]] = []
         """(cycle, rows) of every change of the rows that are driven to the selecting level."""
         self.joined = False

@@ -66,7 +66,7 @@ def one_line(proof: Proof, **changes: Any) -> None:
     alone = Signal()
     m.d.comb += alone.eq(tested.released.any())
     with m.If(tested.tests_1):
-        proof.claim((tested.released & (tested.released - 1) == 0))
+        proof.claim(tested.released & (tested.released - 1) == 0)
         proof.claim(~alone | (tested.driven == tested.released))
         proof.claim(~(alone & proof.before(tested.discharges)))
     discharged, driven = Signal(range(derived.project_clocks + 2)), Signal(range(derived.settle_clocks + 2))
@@ -142,7 +142,7 @@ def shown(proof: Proof, **changes: Any) -> None:
 
 
 def _shown_lemmas(tested: Tested, alone_1: Signal, alone_2: Signal) -> None:
-    proof, inside, derived = tested.proof, tested.sheet.inside, tested.sheet.dut.derived
+    proof, inside = tested.proof, tested.sheet.inside
     slot, clock, asks = inside["test.slot_state"], inside["test.clock"], inside["test.asks"]
     number = inside["test.number"]
     proof.lemma((slot == REST) | asks)
