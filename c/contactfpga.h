@@ -44,13 +44,14 @@ extern "C" {
 typedef enum {
     CONTACTFPGA_NOTHING = 0,
     CONTACTFPGA_FRAME,
-    CONTACTFPGA_HELLO
+    CONTACTFPGA_HELLO,
+    CONTACTFPGA_FAULTS /* what the board says of its lines has changed: contactfpga_row_open and so on */
 } contactfpga_event;
 
 typedef enum { CONTACTFPGA_MOMENTS = 0, CONTACTFPGA_CELLS = 1, CONTACTFPGA_BARYCENTER = 2 } contactfpga_report;
 
 /* Bits of a frame's flags. */
-enum { CONTACTFPGA_OVERFLOW = 1, CONTACTFPGA_MISMATCH = 2, CONTACTFPGA_FAULT = 4 };
+enum { CONTACTFPGA_OVERFLOW = 1, CONTACTFPGA_MISMATCH = 2, CONTACTFPGA_FAULT = 4, CONTACTFPGA_MOTION = 8 };
 
 /* Why packets were refused. */
 enum {
@@ -72,6 +73,8 @@ typedef struct {
     bool on_change;       /* frames come when cells change, and as a keep-alive; else all the time */
     bool ghosts;          /* the sheet has no diodes */
     bool plane;           /* else a cylinder */
+    bool guard;           /* it has guard lines, and names faults */
+    bool self_test;       /* it can test its lines */
     uint16_t zone_capacity;
     double pitch_x_mm, pitch_y_mm, radius_mm;
     uint8_t fingerprint[8];
@@ -101,8 +104,8 @@ typedef struct {
 
 /* What was counted since contactfpga_init; the names are those of the Python driver's board.stats. */
 typedef struct {
-    uint32_t frames, lost, unexplained, overwritten, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, before_hello,
-        unknown_kinds, foreign_version, skin_changes, restarts, bytes;
+    uint32_t frames, lost, unexplained, overwritten, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, fault_reports,
+        before_hello, unknown_kinds, foreign_version, skin_changes, restarts, bytes;
 } contactfpga_stats;
 
 /* Widths of a sheet's fields on the wire. */
@@ -121,7 +124,7 @@ typedef struct {
     contactfpga_hello draft; /* the hello that is being collected */
     uint32_t draft_crc, draft_fields;
     uint16_t draft_bytes;
-    uint8_t trailer[10];
+    uint8_t lines[28]; /* the last report of faults, in digits of seven bits */
     uint16_t length; /* bytes of the packet so far */
     bool overlong, begun, damage;
     bool met, known, forgot, timed, before; /* of the time line: see contactfpga__explain */
@@ -148,6 +151,13 @@ static inline bool contactfpga_zone_at(const contactfpga_reader *reader, uint16_
 /* Whether a cell of the last frame is pressed, with CONTACTFPGA_CELLS; else, and outside the sheet, false. */
 static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t row, uint8_t column);
 
+/* Whether the board's last report says that a row or a column is open before its far end, that a column (the guard column
+ * counts as the one after the last) read pressed while no row was driven, or that the self-test found joined lines. */
+static inline bool contactfpga_row_open(const contactfpga_reader *reader, uint8_t row);
+static inline bool contactfpga_column_open(const contactfpga_reader *reader, uint8_t column);
+static inline bool contactfpga_column_stuck(const contactfpga_reader *reader, uint8_t column);
+static inline bool contactfpga_lines_joined(const contactfpga_reader *reader);
+
 /* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Its area must not be 0. */
 static inline void contactfpga_barycenter_mm(
     const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm);
@@ -171,6 +181,7 @@ enum {
     CONTACTFPGA__KIND_HELLO = 4,
     CONTACTFPGA__KIND_REQUEST = 5,
     CONTACTFPGA__KIND_ZONES = 5,
+    CONTACTFPGA__KIND_FAULTS = 9,
     CONTACTFPGA__SHEET = 1,
     CONTACTFPGA__STATE = 2,
     CONTACTFPGA__PITCH = 3,
@@ -178,6 +189,7 @@ enum {
     CONTACTFPGA__FINGERPRINT = 5,
     CONTACTFPGA__RATES = 6,
     CONTACTFPGA__NAME = 7,
+    CONTACTFPGA__COMMANDS = 8,
     CONTACTFPGA__CHECK = 255,
     CONTACTFPGA__STATE_DIGITS = 16,
     CONTACTFPGA__LONGEST_HELLO = 8192
@@ -333,6 +345,7 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
         hello->rows = value[0], hello->columns = value[1], hello->connectivity = value[2], hello->report = value[3];
         hello->fraction_bits = value[4], hello->on_change = value[5] == 1;
         hello->zone_capacity = (uint16_t)(value[6] | value[7] << 8), hello->ghosts = value[8] == 1;
+        hello->guard = value[9] & 1;
         odd = (uint32_t)(value[3] > 2 || value[5] > 1 || value[8] > 1) << CONTACTFPGA__ODD_SHEET;
         break;
     case CONTACTFPGA__STATE:
@@ -352,6 +365,7 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
     case CONTACTFPGA__RATES:
         hello->clock_hz = contactfpga__word(value), hello->baud = contactfpga__word(value + 4);
         break;
+    case CONTACTFPGA__COMMANDS: hello->self_test = length && memchr(value, 1, length); break;
     case CONTACTFPGA__NAME: {
         size_t kept = length < sizeof hello->name - 1 ? length : sizeof hello->name - 1;
         reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_NAME);
@@ -432,6 +446,7 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
     reader->stats.hellos++;
     if (reader->greeted && !contactfpga__same_sheet(&reader->hello, hello)) {
         reader->stats.skin_changes++;
+        memset(reader->lines, 0, sizeof reader->lines);
         contactfpga__restart_time(reader);
     }
     if (reader->met) {
@@ -440,6 +455,7 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
         int64_t end_us = (int64_t)((hello->epoch + UINT64_C(1)) * CONTACTFPGA__EPOCH_US);
         if (forgot || hello->sent < reader->next || end_us <= reader->last_us - CONTACTFPGA__BEGUN_US) {
             reader->stats.restarts++;
+            memset(reader->lines, 0, sizeof reader->lines);
             reader->before = false;
             reader->last_us = -1;
             first = 0;
@@ -571,7 +587,7 @@ static inline int contactfpga__read_frame(
     frame->cells = (uint16_t)contactfpga__bits(trailer, 35, w->area);
     frame->zones = (uint16_t)contactfpga__bits(trailer, 35u + w->area, w->zones);
     frame->overwritten = contactfpga__bits(trailer, 35u + w->area + w->zones, w->overwritten);
-    frame->flags = last & 7;
+    frame->flags = last & 15;
     uint16_t expected = cells ? reader->hello.rows : frame->zones;
     uint16_t carried = expected < w->max_items ? expected : w->max_items;
     bool overflow = frame->flags & CONTACTFPGA_OVERFLOW;
@@ -581,6 +597,42 @@ static inline int contactfpga__read_frame(
     if (!(frame->flags & CONTACTFPGA_MISMATCH) && (frame->cells > w->cells || !contactfpga__adds_up(reader, frame)))
         return CONTACTFPGA_CONTENT;
     return CONTACTFPGA__FINE;
+}
+
+/* ---- faults ---- */
+
+static inline unsigned contactfpga__line_bits(const contactfpga_hello *hello) {
+    return (hello->guard ? hello->rows + 2u * hello->columns + 1 : 0) + hello->self_test;
+}
+
+/* Whether bytes are a word of so many bits in digits of seven. */
+static inline int contactfpga__check_word(const uint8_t *data, size_t length, unsigned bits) {
+    if (length != (bits + 6) / 7) return CONTACTFPGA_LENGTH;
+    for (size_t i = 0; i < length; i++)
+        if (!(data[i] & 0x80)) return CONTACTFPGA_CONTENT;
+    return bits % 7 && (data[length - 1] & 0x7F) >> bits % 7 ? CONTACTFPGA_CONTENT : CONTACTFPGA__FINE;
+}
+
+/* An unsealed packet of kind faults; slots of the self-test are checked and not kept. */
+static inline int contactfpga__take_faults(contactfpga_reader *reader, size_t length, contactfpga_event *event) {
+    const contactfpga_hello *hello = &reader->hello;
+    const uint8_t *data = reader->packet;
+    if (data[length - 1] & 1) {
+        if (length < 3 || !(data[0] & data[1] & 0x80)) return CONTACTFPGA_CONTENT;
+        return contactfpga__check_word(data + 2, length - 3, (unsigned)hello->rows + hello->columns);
+    }
+    int found = contactfpga__check_word(data, length - 1, contactfpga__line_bits(hello));
+    if (found != CONTACTFPGA__FINE) return found;
+    reader->stats.fault_reports++;
+    for (size_t i = 0; i + 1 < length; i++) {
+        if (reader->lines[i] != (data[i] & 0x7F)) *event = CONTACTFPGA_FAULTS;
+        reader->lines[i] = data[i] & 0x7F;
+    }
+    return found;
+}
+
+static inline bool contactfpga__line(const contactfpga_reader *reader, unsigned bit) {
+    return reader->lines[bit / 7] >> bit % 7 & 1;
 }
 
 /* ---- packets ---- */
@@ -637,6 +689,8 @@ static inline int contactfpga__take_packet(contactfpga_reader *reader, size_t le
         *event = CONTACTFPGA_HELLO;
         return found;
     }
+    if (kind == CONTACTFPGA__KIND_FAULTS && reader->greeted && contactfpga__line_bits(&reader->hello))
+        return contactfpga__take_faults(reader, length, event);
     if (kind < CONTACTFPGA__KIND_ZONES || kind > CONTACTFPGA__KIND_ZONES + 2) {
         reader->stats.unknown_kinds++;
         return CONTACTFPGA__FINE;
@@ -705,6 +759,25 @@ static inline bool contactfpga_pressed(const contactfpga_reader *reader, uint8_t
     if (reader->hello.report != CONTACTFPGA_CELLS || row >= reader->frame.items || column >= reader->hello.columns)
         return false;
     return contactfpga__bits(reader->packet + (size_t)row * reader->widths.item_bytes, column, 1);
+}
+
+static inline bool contactfpga_row_open(const contactfpga_reader *reader, uint8_t row) {
+    return reader->hello.guard && row < reader->hello.rows && contactfpga__line(reader, row);
+}
+
+static inline bool contactfpga_column_open(const contactfpga_reader *reader, uint8_t column) {
+    const contactfpga_hello *hello = &reader->hello;
+    return hello->guard && column < hello->columns && contactfpga__line(reader, (unsigned)hello->rows + column);
+}
+
+static inline bool contactfpga_column_stuck(const contactfpga_reader *reader, uint8_t column) {
+    const contactfpga_hello *hello = &reader->hello;
+    unsigned first = (unsigned)hello->rows + hello->columns;
+    return hello->guard && column <= hello->columns && contactfpga__line(reader, first + column);
+}
+
+static inline bool contactfpga_lines_joined(const contactfpga_reader *reader) {
+    return reader->hello.self_test && contactfpga__line(reader, contactfpga__line_bits(&reader->hello) - 1);
 }
 
 static inline void contactfpga_barycenter_mm(

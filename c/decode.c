@@ -10,8 +10,9 @@
 static contactfpga_reader reader;
 
 static void show_hello(const contactfpga_hello *hello) {
-    printf("hello %ux%u %u %u %u %u %u %u ", hello->rows, hello->columns, hello->connectivity,
-        hello->report, hello->fraction_bits, hello->on_change, hello->zone_capacity, hello->ghosts);
+    printf("hello %ux%u %u %u %u %u %u %u %u %u ", hello->rows, hello->columns, hello->connectivity,
+        hello->report, hello->fraction_bits, hello->on_change, hello->zone_capacity, hello->ghosts, hello->guard,
+        hello->self_test);
     printf("%.17g %.17g %.17g ", hello->pitch_x_mm, hello->pitch_y_mm, hello->plane ? 0.0 : hello->radius_mm);
     for (int i = 0; i < 8; i++) printf("%02x", hello->fingerprint[i]);
     printf(" %" PRIu32 " %" PRIu32 " %" PRIu64 " %" PRIu32 " %" PRIu32 " %u %s\n", hello->clock_hz, hello->baud,
@@ -30,6 +31,17 @@ static void show_frame(const contactfpga_frame *frame) {
     printf("\n");
 }
 
+static void show_faults(const contactfpga_hello *hello) {
+    printf("faults");
+    for (uint8_t row = 0; row < hello->rows; row++)
+        if (contactfpga_row_open(&reader, row)) printf(" row:%u", row);
+    for (uint8_t column = 0; column < hello->columns; column++)
+        if (contactfpga_column_open(&reader, column)) printf(" column:%u", column);
+    for (uint8_t column = 0; column <= hello->columns; column++)
+        if (contactfpga_column_stuck(&reader, column)) printf(" stuck:%u", column);
+    printf(contactfpga_lines_joined(&reader) ? " joined\n" : "\n");
+}
+
 int main(void) {
     const contactfpga_stats *stats = &reader.stats;
     int byte;
@@ -38,6 +50,7 @@ int main(void) {
         contactfpga_event event = contactfpga_push(&reader, (uint8_t)byte);
         if (event == CONTACTFPGA_HELLO) show_hello(&reader.hello);
         if (event == CONTACTFPGA_FRAME) show_frame(&reader.frame);
+        if (event == CONTACTFPGA_FAULTS) show_faults(&reader.hello);
     }
     printf("stats");
     printf(" frames=%" PRIu32 " lost=%" PRIu32 " unexplained=%" PRIu32 " overwritten=%" PRIu32, stats->frames,
@@ -45,8 +58,9 @@ int main(void) {
     printf(" framing=%" PRIu32 " crc=%" PRIu32 " length=%" PRIu32 " kind=%" PRIu32 " content=%" PRIu32 " noise=%" PRIu32,
         stats->damaged[CONTACTFPGA_FRAMING], stats->damaged[CONTACTFPGA_CRC], stats->damaged[CONTACTFPGA_LENGTH],
         stats->damaged[CONTACTFPGA_KIND], stats->damaged[CONTACTFPGA_CONTENT], stats->damaged[CONTACTFPGA_NOISE]);
-    printf(" resynchronized=%" PRIu32 " hellos=%" PRIu32 " before_hello=%" PRIu32 " unknown_kinds=%" PRIu32,
-        stats->resynchronized, stats->hellos, stats->before_hello, stats->unknown_kinds);
+    printf(" resynchronized=%" PRIu32 " hellos=%" PRIu32 " fault_reports=%" PRIu32 " before_hello=%" PRIu32
+           " unknown_kinds=%" PRIu32,
+        stats->resynchronized, stats->hellos, stats->fault_reports, stats->before_hello, stats->unknown_kinds);
     printf(" foreign_version=%" PRIu32 " skin_changes=%" PRIu32 " restarts=%" PRIu32
            " bytes=%" PRIu32 "\n",
         stats->foreign_version, stats->skin_changes, stats->restarts, stats->bytes);

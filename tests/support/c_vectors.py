@@ -19,6 +19,7 @@ SKINS = {
     "barycenters": Skin(rows=5, columns=32, report="barycenter", barycenter_bits=8, name="elbow", settle_us=12.0),
     "cells on a cylinder": Skin(rows=4, columns=11, report="cells", surface="cylinder", radius_mm=40.0),
     "one cell": Skin(rows=1, columns=1, send="on_change"),
+    "faults": Skin(rows=3, columns=4, guard=True),
     "overflow": Skin(rows=8, columns=8, zone_capacity=2, connectivity=4),
 }
 
@@ -36,7 +37,8 @@ def _stream(skin: Skin, seed: int) -> str:
     bits = skin.barycenter_bits if known.divided else 0
     lines.append(
         f"hello {skin.rows}x{skin.columns} {skin.connectivity} {report} {bits} {int(skin.send == 'on_change')} "
-        f"{skin.zone_capacity} {int(skin.diodes == 'none')} {skin.pitch_x_mm:.17g} {skin.pitch_y_mm:.17g} "
+        f"{skin.zone_capacity} {int(skin.diodes == 'none')} {int(skin.guard)} "
+        f"{int(skin.self_test)} {skin.pitch_x_mm:.17g} {skin.pitch_y_mm:.17g} "
         f"{skin.radius_mm or 0:.17g} {known.fingerprint.hex()} {skin.clock_hz} {skin.baud} {sent} {epoch} {heard} "
         f"{stuck} {skin.name}"
     )
@@ -45,6 +47,9 @@ def _stream(skin: Skin, seed: int) -> str:
         lines.append(_packet(data))
         told = (2**22 + 100 * index, (sent + index) % 256, flags, heard % 8, cells, zones, 0)
         lines.append(" ".join(map(str, ("frame", *told, *words))))
+    if skin.guard:
+        lines += [_packet(wire.report(1 << 1 | 1 << 3 + 2 | 1 << 3 + 4 + 4)), "faults row:1 column:2 stuck:4"]
+        lines += [_packet(wire.report(0)), "faults"]
     return "\n".join(lines) + "\n"
 
 

@@ -13,7 +13,7 @@ from contactfpga_sim.golden.request import request
 __all__ = ["check", "crc16", "request"]  # some tests take apart what others take whole
 
 HELLO, ZONES, CELLS, BARYCENTERS, REQUEST, FAULTS, COMMAND = 4, 5, 6, 7, 5, 9, 10
-FLAGS = {"overflow": 1, "mismatch": 2, "fault": 4}
+FLAGS = {"overflow": 1, "mismatch": 2, "fault": 4, "motion": 8}
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 255
 EPOCH_US = 2**22
 
