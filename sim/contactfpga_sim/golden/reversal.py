@@ -9,6 +9,7 @@ import numpy as np
 from contactfpga_sim.golden import debounce, reversal_guard
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
+from contactfpga_sim.golden.handed import Handed
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
@@ -228,7 +229,7 @@ class Scanner:
         """Drives the rows and fills in ``cells``; returns (R, C) bool: what counts, debounced."""
         facts = self._facts
         counted = np.zeros_like(cells)
-        handed = _Handed(facts, rows)
+        handed = Handed(facts, rows)
         begin = begun + max(4, facts.precharge - facts.project)
         for row in todo:
             slot = Slot(row, begin, begin + facts.settle - 1)
@@ -258,45 +259,6 @@ class Scanner:
     def _set_contact(self, cycle: int, level: int) -> None:
         if level != (self.contact[-1][1] if self.contact else 0):
             self.contact.append((cycle, level))
-
-
-class _Handed:
-    """Which rows of a frame are offered: where zones are found those that were driven, each with an empty one after it
-    whose neighbor is not; otherwise all."""
-
-    def __init__(self, facts: Facts, rows: Rows):
-        self.taken = 0
-        """The cycle in which the last one was taken."""
-        self._facts = facts
-        self._rows = rows
-        self._place = 0
-        self._nothing = np.zeros(facts.columns, bool)
-
-    def driven(self, row: int, cells: np.ndarray, offered: int, following: int | None) -> None:
-        if self._facts.zones:
-            self._offer(row, cells, offered, True, following is None)
-            if following is not None and following != row + 1:
-                self._offer(row + 1, self._nothing, self.taken + 1, False, False)
-            return
-        self._all_until(row, offered)
-        self._offer(row, cells, max(offered, self.taken + 1), True, row == self._facts.rows - 1)
-        if following is None:
-            self._all_until(self._facts.rows, offered)
-
-    def nothing(self, offered: int) -> None:
-        if self._facts.zones:
-            self._offer(0, self._nothing, offered, False, True)
-        else:
-            self._all_until(self._facts.rows, offered)
-
-    def _all_until(self, end: int, offered: int) -> None:
-        while self._place < end:
-            last = self._place == self._facts.rows - 1
-            self._offer(self._place, self._nothing, max(offered, self.taken + 1), False, last)
-
-    def _offer(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> None:
-        self.taken = self._rows.take(place, cells, offered, alone, last)
-        self._place = place + 1
 
 
 class Reversal(ScanRule):
