@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import SAMPLE_AT, Derived
+from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
 from contactfpga_hdl.dual import Dual
 from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
@@ -92,6 +92,9 @@ class Top(wiring.Component):
         self._watch_faults(m, scan, packer)
         if "faults" in link.signature.members:
             m.d.comb += link.faults.eq(scan.faults)
+        if self.skin.self_test:
+            wiring.connect(m, scan.slots, link.slots)
+            m.d.comb += scan.command.eq(request.command & (request.what == SELF_TEST))
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),

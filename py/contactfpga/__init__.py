@@ -27,6 +27,7 @@ from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.suspicion import Suspicion
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zone, Zones
@@ -53,6 +54,7 @@ __all__ = [
     "PortNotFound",
     "ReadTimeout",
     "ReplayEnded",
+    "SelfTest",
     "SelfTestSlot",
     "Sheet",
     "Silence",

@@ -6,6 +6,7 @@ import math
 from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
 
+from contactfpga.driver import self_test
 from contactfpga.driver.link import Link
 from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
@@ -19,6 +20,7 @@ from contactfpga.wire.command import Command
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.zone import Zones
 
 QUEUE = 16_384
@@ -214,6 +216,22 @@ class Board:
         ``scan = "raster"`` or ``"reversal"`` take it.
         """
         return self.command(SAMPLE_AT, clocks, timeout)
+
+    def self_test(self, timeout: float = 2.0) -> SelfTest:
+        """Have the board drive each of its lines alone, and return what that says of them (:class:`SelfTest`).
+
+        Diodes show only while their switch is pressed: do it again and again, and put the results together with
+        :func:`contactfpga.zones.self_test.merged`. The scan goes on between its slots. ``timeout`` in seconds. Raises
+        :class:`NoSuchCommand` where the board has none, and as :meth:`read` does. Without the board's Skin its mask is
+        not known, so lines that do not rise cannot be told from absent ones.
+        """
+        slots = self_test.run(self._link, checked(timeout))
+        try:
+            mask = frozenset(self.skin.mask)
+        except ContactFPGAError:
+            mask = None
+        sheet = self.sheet
+        return SelfTest(slots, sheet.rows, sheet.columns, self.hello.guard, mask)
 
     def __iter__(self) -> Iterator[Zones]:
         """Every frame, forever; a recording ends."""

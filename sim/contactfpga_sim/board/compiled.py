@@ -16,6 +16,7 @@ from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
+from contactfpga_sim.sheet.shorts import Shorts
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
@@ -89,6 +90,15 @@ class CompiledBoard:
             )
         )
         self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
+
+    def join(self, shorts: Shorts | None) -> None:
+        """From the next cycle on these lines are joined and these diodes bridged, and all others whole. Rows at the
+        supply and columns with strong pulls are the slow model's only."""
+        self._call("part")
+        shorts = shorts or Shorts()
+        for kind, pairs in enumerate((shorts.rows, shorts.columns, shorts.crossed, shorts.bridged)):
+            for one, other in pairs:
+                self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 
     def settle(self, line: Line) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none."""
@@ -193,6 +203,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "BIT_CLOCKS": Derived(skin).bit_clocks,
             "PRECHARGE": int(skin.precharge_us > 0),
             "REVERSAL": int(skin.reads_rows),
+            "KEEPS": Derived(skin).settle_clocks + 1 if skin.self_test else 0,
             "PROBES": int(netlist is None),
             "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),

@@ -93,6 +93,12 @@ class Stages(Protocol):
     def watch(self, cycle: int) -> None:
         """In a cycle an untouched sheet was looked at, for a scan that waits."""
 
+    def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
+        """A slot of the self-test, which read these lines as bits, goes out, from a cycle on."""
+
+    def slot_over(self, cycle: int) -> int | None:
+        """The cycle in which it went out, if that is not after ``cycle``; all before must have been said."""
+
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
 

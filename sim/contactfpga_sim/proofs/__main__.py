@@ -26,6 +26,7 @@ from contactfpga_sim.proofs import (
     reversal_time,
     scan,
     seek,
+    self_test,
     streams,
     uart,
 )
@@ -42,6 +43,7 @@ CASES: tuple[Case, ...] = (
     *reversal_guard.CASES,
     *reversal_reach.CASES,
     *reversal_time.CASES,
+    *self_test.CASES,
     *label.CASES,
     *records.CASES,
     *label_serial.CASES,

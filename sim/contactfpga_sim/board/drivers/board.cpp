@@ -2,7 +2,8 @@
 // Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and
 // COLUMN_CHAINS, 0 for direct lines; PROBES is 0 for a netlist, which has the pins only; DIVIDED is 1 where items are
 // apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns can be driven, REVERSAL where
-// rows can be let go and are read. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
+// rows can be let go and are read. KEEPS: clocks for which columns that a self-test discharged stay so when they are let
+// go, 0 where there is no self-test. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
 // bits can be flipped, and a moment kept and returned to.
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,7 @@
 
 #include "clocked.h"
 #include "shift.h"
+#include "shorts.h"
 #ifdef STATE
 #include "state.h"
 #endif
@@ -59,23 +61,34 @@ public:
 
     static Word driven(Word row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROW_LINES); }
 
-    // Of the columns that are driven those to the released level, where `level` is that of all but the guard column, the
+    // Of the columns that are driven those to the released level, where `level` is that of all but a guard column, the
     // last one, which is driven to the other one.
     static Word feeding(Word driven, bool level) {
-        return driven & (level == COL2ROW ? mask(COLUMN_LINES - 1) : ~mask(COLUMN_LINES - 1));
+        return driven & (level == COL2ROW ? mask(COLUMNS) : ~mask(COLUMNS));
     }
 
-    // Once a clock, with the columns that are driven to the released level; `fights` counts the clocks in which one meets
-    // a row that is driven to the other level.
+    Shorts<ROW_LINES, COLUMN_LINES> shorts;
+
+    // Once a clock, with the rows that are driven to the selecting level, those that are driven to the other one, and the
+    // columns that are driven to the released level or held at the selecting one; `fights` counts the clocks in which
+    // driven lines meet at different levels.
     uint64_t fights = 0;
-    Word levels(Word driven, Word columns_driven) {
-        Word reads = 0;
-        if (driven)
-            selected_ = lowest(driven);
-        for (; driven; driven &= driven - 1)
-            reads |= closed_[lowest(driven)];
-        fights += (reads & columns_driven) != 0;
-        reads |= stuck;
+    Word levels(Word selected, Word rows_released, Word columns_driven, Word columns_held) {
+        Word reads = 0, lifted = columns_driven;
+        if (selected)
+            selected_ = lowest(selected);
+        if (shorts.any) {
+            const Lines feeding{rows_released, columns_driven & ~stuck};
+            const Lines low = shorts.followers(closed_, {selected, columns_held}, true);
+            lifted_ = shorts.followers(closed_, feeding, false);
+            fights += ((low.rows & feeding.rows) | (low.columns & feeding.columns)) != 0;
+            reads = low.columns, lifted = lifted_.columns;
+        } else {
+            for (; selected; selected &= selected - 1)
+                reads |= closed_[lowest(selected)];
+            fights += (reads & columns_driven) != 0;
+        }
+        reads |= stuck | columns_held | keep(columns_held, lifted);
         if (slow)
             reads = settled(reads, columns_driven);
         return (COL2ROW ? ~reads : reads) & mask(COLUMN_LINES);
@@ -84,7 +97,9 @@ public:
     // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
     Word row_levels(Word levels, Word rows_driven, Word columns_driven) const {
         Word touched = 0;
-        for (unsigned line = 0; line < ROW_LINES; line++)
+        if (shorts.any)
+            touched = lifted_.rows;
+        else for (unsigned line = 0; line < ROW_LINES; line++)
             touched |= Word{(closed_[line] & columns_driven & ~stuck) != 0} << line;
         return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROW_LINES));
     }
@@ -100,6 +115,20 @@ private:
         if (row_factor.empty())
             return usual;
         return -std::expm1(std::log1p(-usual) / (column_factor[column] * (pull ? row_factor[selected_] : 1)));
+    }
+
+    Lines lifted_ = {};          // with shorts, to the released level
+    Word kept_ = 0, kept_for_ = 0;  // columns that were discharged, and clocks for which they stay so
+
+    Word keep(Word held, Word lifted) {
+        if (KEEPS && held) {
+            kept_ = held, kept_for_ = KEEPS;
+            return 0;
+        }
+        if (!kept_for_)
+            return 0;
+        kept_for_--;
+        return kept_ &= ~lifted;
     }
 
     void solder() {
@@ -230,7 +259,7 @@ class Board {
     auto &columns() { return model_.top.p_columns; }
 #endif
 
-#if GUARD && REVERSAL && PROBES
+#if (GUARD || KEEPS) && REVERSAL && PROBES
     Word columns_driven() {
         const auto &top = model_.top;
         return Matrix::feeding(static_cast<Word>(get(top.p_columns__drive)), get(top.p_columns__level));
@@ -239,6 +268,12 @@ class Board {
     Word columns_driven() { return static_cast<Word>(get(model_.top.p_columns__drive)); }
 #else
     Word columns_driven() { return 0; }
+#endif
+
+#if KEEPS && PROBES
+    Word columns_held() { return static_cast<Word>(get(model_.top.p_columns__drive)) & ~columns_driven(); }
+#else
+    Word columns_held() { return 0; }
 #endif
 
 #if REVERSAL
@@ -272,7 +307,7 @@ public:
 #endif
             model_.settle();
             const Word driven = Matrix::driven(rows()) & rows_driven();
-            const Word levels = read(matrix.levels(driven, columns_driven()));
+            const Word levels = read(matrix.levels(driven, rows_driven() & ~driven, columns_driven(), columns_held()));
             const bool rows_change = put_rows();
             if (levels != levels_ || rows_change) {
                 // Lines enter flip-flops only, so the second evaluation changes nothing but what those take.
@@ -293,7 +328,8 @@ public:
         Matrix matrix;
         Sender sender;
         Reader reader;
-        uint64_t cycle, levels, row_levels;
+        uint64_t cycle;
+        Word levels, row_levels;
         bool line;
     };
     Moment moment() const { return {state.words(), matrix, sender, reader, cycle, levels_, row_levels(), line_}; }
@@ -307,7 +343,7 @@ public:
 #endif
     }
     bool same(const Moment &moment) const { return reader.same(moment.reader) && state.words() == moment.words; }
-    uint64_t row_levels() const {
+    Word row_levels() const {
 #if REVERSAL
         return row_levels_;
 #else
@@ -384,6 +420,11 @@ EXPORT void board_stick(Board *board, const uint8_t *columns) {
 }
 EXPORT void board_cut(Board *board, const uint8_t *row_ends, const uint8_t *column_ends) {
     board->matrix.cut(row_ends, column_ends);
+}
+EXPORT void board_part(Board *board) { board->matrix.shorts = {}; }
+EXPORT void board_join(Board *board, unsigned kind, unsigned one, unsigned other) {
+    const uint8_t *lines[] = {line_of_row, line_of_column};
+    board->matrix.shorts.join(kind, lines[kind == COLUMN_PAIR][one], lines[kind != ROW_PAIR][other]);
 }
 EXPORT void board_settle(
     Board *board, const double *press_share, const double *pulled, double release_share, double threshold) {
