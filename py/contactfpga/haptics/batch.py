@@ -21,9 +21,7 @@ def centers(surface: Surface, wrenches: Floats) -> Floats:
         return _on_cylinder(surface, fx, fy, fz, mx, my, mz)
 
 
-def _on_cylinder(
-    surface: Cylinder, fx: Floats, fy: Floats, fz: Floats, mx: Floats, my: Floats, mz: Floats
-) -> Floats:
+def _on_cylinder(surface: Cylinder, fx: Floats, fy: Floats, fz: Floats, mx: Floats, my: Floats, mz: Floats) -> Floats:
     radius = surface.radius_m
     across = mz / radius
     inward = fx * fx + fy * fy - across * across

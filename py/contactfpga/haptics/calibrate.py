@@ -32,7 +32,7 @@ class Calibration:
 
 
 def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
-    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions that none of them has; a moment counts over ``length_m``."""
+    """Rank of (m, 6) wrenches, and (6 - rank, 6) directions that none has; moments count over ``length_m``."""
     scaled = np.atleast_2d(loads) / np.array([1, 1, 1, length_m, length_m, length_m])
     _, values, turned = np.linalg.svd(scaled)
     rank = int((values > SEEN * values[0]).sum())
@@ -48,7 +48,9 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     read, known = np.atleast_2d(np.asarray(readings, float)), np.atleast_2d(np.asarray(loads, float))
     count = len(cells.units)
     if read.shape != (len(known), count) or known.shape[1] != 6:
-        raise HapticsError(f"readings are {read.shape} and loads {known.shape}; each load needs {count} readings and 6 numbers")
+        raise HapticsError(
+            f"readings are {read.shape} and loads {known.shape}; each load needs {count} readings and 6 numbers"
+        )
     if len(known) < count + 1:
         raise HapticsError(f"{len(known)} loads are too few; {count} units and their zeros take at least {count + 1}")
     deviations = np.concatenate([read - cells.zeros, np.ones((len(read), 1))], axis=1)
@@ -85,10 +87,12 @@ def _rms(rest: Floats) -> float:
 def _advice(cells: LoadCells, rank: int, missing: tuple[str, ...], residual_n: float) -> str:
     if rank < cells.rank:
         return (
-            f"the loads have rank {rank}, the units see {cells.rank}: nothing had {'; '.join(missing)}. Hang a weight from "
-            "three points that lie on no line, in several poses"
+            f"the loads have rank {rank}, the units see {cells.rank}: nothing had {'; '.join(missing)}. Hang a "
+            "weight from three points that lie on no line, in several poses"
         )
     quiet = max(unit.sigma_n for unit in cells.units) * np.sqrt(len(cells.units))
     if residual_n > 3 * quiet:
-        return f"the loads are off by {residual_n:.3g} N, more than noise is: look for a load that was written down wrong"
+        return (
+            f"the loads are off by {residual_n:.3g} N, more than noise is: look for a load that was written down wrong"
+        )
     return "the loads suffice"

@@ -114,5 +114,10 @@ class _Solver:
         settings.verbose = False
         sparse = self._sparse
         return self._clarabel.DefaultSolver(
-            sparse.csc_matrix(np.triu(square)), slope, sparse.csc_matrix(self._sides), self._start, self._cones, settings
+            sparse.csc_matrix(np.triu(square)),
+            slope,
+            sparse.csc_matrix(self._sides),
+            self._start,
+            self._cones,
+            settings,
         ).solve()

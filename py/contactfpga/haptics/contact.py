@@ -52,7 +52,13 @@ class Contact:
     __slots__ = ("_intervals", "_number", "force_n", "frame", "normal_n", "touch")
 
     def __init__(
-        self, touch: Touch, force_n: Vector, normal_n: float, frame: str, intervals: Callable[[], list[Interval]], number: int
+        self,
+        touch: Touch,
+        force_n: Vector,
+        normal_n: float,
+        frame: str,
+        intervals: Callable[[], list[Interval]],
+        number: int,
     ):
         self.touch = touch
         self.force_n = force_n
@@ -202,4 +208,3 @@ class Contacts(Sequence[Contact]):
 def _push(normal: Vector, force: Vector) -> float:
     push = -(normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2])
     return push if push > 0 else 0.0
-

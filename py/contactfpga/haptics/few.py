@@ -1,7 +1,7 @@
 """One contact in closed form, two with the exact interval of each push.
 
-In plain Python, for numpy takes several times as long for a few numbers. Both correct the wrench to the nearest one that
-contacts at these places can exert: a single force has no moment about its point, two have none about the line through
+In plain Python, for numpy takes several times as long for a few numbers. Both correct the wrench to the nearest one
+that contacts at these places can exert: a single force has no moment about its point, two have none about the line through
 both. What is corrected away, over its variance, is chi-square.
 """
 
@@ -175,7 +175,9 @@ def _solution(
         chi2 = _chi2(wrench, touches, forces)
     freedom = (6 if noise is None else noise.rank) - rank
     covariance = _covariance(wrench, touches, null)
-    return Solution(PURE_FORCE, forces, lambda: intervals, rank, null, chi2, freedom, touches, wrench, covariance, beyond)
+    return Solution(
+        PURE_FORCE, forces, lambda: intervals, rank, null, chi2, freedom, touches, wrench, covariance, beyond
+    )
 
 
 def _chi2(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> float | None:

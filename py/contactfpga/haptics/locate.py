@@ -1,4 +1,4 @@
-"""Finer than the pitch: where a contact lies, from the center of pressure, barycenters, cells and closings, and how sure.
+"""Finer than the pitch: where a contact lies, from center of pressure, barycenter, cells and closings, and how sure.
 
 All places are on the sheet laid flat, in m: column 0 at x = 0, row 0 at y = 0.
 """
@@ -86,7 +86,9 @@ class Locator:
         unit = min(self._pitch_x, self._pitch_y)
         reach = max(0.05, round(self._reach.reach_m(force_n) / unit * 50) / 50)
         found = resolution.static(reach, self._pitch_x / unit, self._pitch_y / unit, 96)
-        return Place(x_m, y_m, found.barycenter_95 * unit, np.eye(2) * (found.barycenter_rms * unit) ** 2 / 2, "barycenter")
+        return Place(
+            x_m, y_m, found.barycenter_95 * unit, np.eye(2) * (found.barycenter_rms * unit) ** 2 / 2, "barycenter"
+        )
 
     def locate(
         self,
@@ -104,7 +106,9 @@ class Locator:
             center: from :meth:`center`, if this contact is the only one.
         """
         if not cells:
-            raise HapticsError("there is no pressed cell; a contact that closes no switch has its center of pressure alone")
+            raise HapticsError(
+                "there is no pressed cell; a contact that closes no switch has its center of pressure alone"
+            )
         x = self._pitch_x * sum(column for _, column in cells) / len(cells)
         y = self._pitch_y * sum(row for row, _ in cells) / len(cells)
         coarse = self.barycenter(x, y, force_n)

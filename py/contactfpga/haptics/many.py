@@ -119,6 +119,7 @@ def _solution(system: System, forces: list[Vector], model: str, frictionless: bo
     known = model == PURE_FORCE_WITH_KNOWN_DIRECTION
     matrix = system.pushes() if known else system.matrix()
     rank, null = _spaces(system, matrix)
+
     def intervals() -> list[Interval]:
         return cones.intervals(system, forces, frictionless)
 
@@ -135,9 +136,7 @@ def _solution(system: System, forces: list[Vector], model: str, frictionless: bo
 
     chi2, freedom = system.chi2(system.wrench - system.matrix() @ np.ravel(forces)), system.freedom(rank)
     null_space = null.T.tolist()
-    return Solution(
-        model, forces, intervals, rank, null_space, chi2, freedom, system.touches, system.given, covariance
-    )
+    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, system.touches, system.given, covariance)
 
 
 def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:

@@ -27,7 +27,7 @@ class Reach:
         self.model = model
         farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
         self._distances = np.linspace(0, farthest, STEPS)
-        forces = []
+        forces: list[float] = []
         for distance in self._distances:
             force = cover.force_n(model, float(distance))
             # In a layer a force far away presses no more, and just before that takes more than any arm has.

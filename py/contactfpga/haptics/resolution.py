@@ -1,6 +1,6 @@
 """How near a barycenter comes to the contact when nothing else is known, and what the set of consistent places gains.
 
-A contact at a random place closes the switches within its reach. Both are computed by going through all places of a cell.
+A contact at a random place closes the switches within its reach. Both are computed from all places of a cell.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import dataclasses
 import functools
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contactfpga.haptics.answer import Floats
 
@@ -35,7 +36,9 @@ def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: i
     places = (np.arange(fineness) + 0.5) / fineness - 0.5
     x, y = (axis.ravel() for axis in np.meshgrid(places * pitch_x, places * pitch_y))
     columns, rows = (int(np.ceil(reach / pitch + 0.5)) for pitch in (pitch_x, pitch_y))
-    cells = [(column * pitch_x, row * pitch_y) for row in range(-rows, rows + 1) for column in range(-columns, columns + 1)]
+    cells = [
+        (column * pitch_x, row * pitch_y) for row in range(-rows, rows + 1) for column in range(-columns, columns + 1)
+    ]
     closed = np.stack([(x - cx) ** 2 + (y - cy) ** 2 <= reach * reach for cx, cy in cells])
     count = closed.sum(axis=0)
     hit = count > 0
@@ -49,7 +52,7 @@ def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: i
     return Static(_rms(errors), float(np.quantile(errors, 0.95)), _rms(gained), float(1 - hit.mean()))
 
 
-def _of_sets(closed: Floats, all_x: Floats, all_y: Floats, x: Floats, y: Floats) -> Floats:
+def _of_sets(closed: NDArray[np.bool_], all_x: Floats, all_y: Floats, x: Floats, y: Floats) -> Floats:
     """Distance of each place to the middle of those that close the same switches, also those across a cell's rim: a
     pattern is the same wherever it lies, so places are taken from its first switch."""
     first = closed.argmax(axis=0)

@@ -53,11 +53,14 @@ class Plane:
         torsion = mz - (x * fy - y * fx)
         spread = None
         if wrench.covariance is not None:
-            slopes = np.array([[h, 0, -x, 0, -1, 0], [0, h, -y, 1, 0, 0]]) / fz
+            slopes = self.slopes(fz, x, y)
             spread = slopes @ wrench.covariance @ slopes.T
-        return Center(
-            (x, y, h), (0.0, 0.0, 1.0), -fz, math.hypot(fx, fy), torsion, wrench.force_n, (x, y), spread
-        )
+        return Center((x, y, h), (0.0, 0.0, 1.0), -fz, math.hypot(fx, fy), torsion, wrench.force_n, (x, y), spread)
+
+    def slopes(self, fz: float, x_m: float, y_m: float) -> Floats:
+        """(2, 6): how the center of pressure changes with the wrench."""
+        h = self.height_m
+        return np.array([[h, 0, -x_m, 0, -1, 0], [0, h, -y_m, 1, 0, 0]]) / fz
 
     def place(self, x_m: float, y_m: float) -> tuple[Vector, Vector]:
         """Point and outward normal at a place of the surface laid flat."""
@@ -94,12 +97,12 @@ class Cylinder:
         point = (radius * normal[0], radius * normal[1], z)
         spread = None
         if wrench.covariance is not None:
-            slopes = self._slopes(wrench, push, normal, z)
+            slopes = self.slopes(wrench, push, normal, z)
             spread = slopes @ wrench.covariance @ slopes.T
         sideways = math.hypot(across, fz)
         return Center(point, normal, -push, sideways, torsion, wrench.force_n, (radius * angle, z), spread)
 
-    def _slopes(self, wrench: Wrench, push: float, normal: Vector, z: float) -> Floats:
+    def slopes(self, wrench: Wrench, push: float, normal: Vector, z: float) -> Floats:
         """(2, 6): how arc length and z change with the wrench."""
         (fx, fy, _), (mx, my, mz) = wrench.force_n, wrench.moment_nm
         radius, square = self.radius_m, fx * fx + fy * fy
@@ -132,7 +135,9 @@ def read(values: Any, name: str = "surface") -> Surface:
     """The surface that a table describes; raises :class:`HapticsError`."""
     if not isinstance(values, dict) or values.get("kind") not in KINDS:
         kind = values.get("kind") if isinstance(values, dict) else values
-        raise HapticsError(f"{name} is {shown(kind)}; its kind must be 'plane', with height_m, or 'cylinder', with radius_m")
+        raise HapticsError(
+            f"{name} is {shown(kind)}; its kind must be 'plane', with height_m, or 'cylinder', with radius_m"
+        )
     made, length = KINDS[values["kind"]]
     for key in values:
         if key not in ("kind", length):

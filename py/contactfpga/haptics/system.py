@@ -10,7 +10,8 @@ import numpy as np
 
 from contactfpga.haptics.answer import Floats, HapticsError, Vector
 from contactfpga.haptics.contact import Touch
-from contactfpga.haptics.wrench import Noise, Wrench
+from contactfpga.haptics.vectors import turning
+from contactfpga.haptics.wrench import Wrench
 
 SAME_M = 1e-9
 """Points nearer to each other than this are one."""
@@ -19,8 +20,8 @@ SAME_M = 1e-9
 class System:
     """A wrench, where it is exerted, and how its parts are weighed.
 
-    Without noise a newton counts as much as a newton times the contacts' mean distance, about their barycenter: then the
-    answer hangs neither on the frame nor on the unit of length.
+    Without noise a newton counts as much as a newton times the contacts' mean distance, about their barycenter: then
+    the answer hangs neither on the frame nor on the unit of length.
     """
 
     def __init__(self, wrench: Wrench, touches: Sequence[Touch]):
@@ -80,7 +81,7 @@ class System:
         """A matrix to wrenches with moments about the contacts' barycenter and over their distance, for its rank."""
         x, y, z = np.mean(self.points, axis=0)
         moved = np.array(matrix)
-        moved[3:] -= np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ moved[:3]
+        moved[3:] -= turning((x, y, z)) @ moved[:3]
         moved[3:] /= self.length_m
         return moved
 
@@ -94,7 +95,7 @@ class System:
         if self.noise.rank == 6:
             covariance = np.array(self.noise.covariance)
             covariance[3:, 3:] += more
-            self.weight = np.linalg.inv(covariance)
+            self.weight = np.asarray(np.linalg.inv(covariance), float)
         else:
             self.noise = self.noise.widened(more)
             self.weight = self.noise.information

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactfpga.haptics.answer import HapticsError, direction, matrix, number, positive, vector
-from contactfpga.haptics.units import LoadCells, Unit
+from contactfpga.haptics.unit import Unit
 from contactfpga.haptics.wrench import Bumper
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
+
+if TYPE_CHECKING:
+    from contactfpga.haptics.units import LoadCells
 
 MAX_UNITS = 64
 KEYS = ("frame", "zero_gravity_m_s2", "matrix", "bumper", "unit")
@@ -20,8 +23,8 @@ UNIT_KEYS = ("point_m", "axis", "gain_n", "zero", "sigma_n", "range", "preload_n
 BUMPER_KEYS = ("mass_kg", "center_m", "inertia_kg_m2")
 
 
-def load(path: str | Path) -> LoadCells:
-    """The units in a file. Raises :class:`HapticsError`, OSError."""
+def load(path: str | Path) -> dict[str, Any]:
+    """What :class:`LoadCells` is made of, from a file. Raises :class:`HapticsError`, OSError."""
     values = tomlfile.load(path, HapticsError)
     try:
         return read(values)
@@ -29,8 +32,8 @@ def load(path: str | Path) -> LoadCells:
         raise HapticsError(f"{path}: {error}") from None
 
 
-def read(values: dict[str, Any]) -> LoadCells:
-    """The units that the tables describe."""
+def read(values: dict[str, Any]) -> dict[str, Any]:
+    """The same from tables."""
     _known(values, KEYS, "the file")
     given = values.get("unit")
     if not isinstance(given, list) or not given:
@@ -44,7 +47,7 @@ def read(values: dict[str, Any]) -> LoadCells:
     gravity = vector("zero_gravity_m_s2", values.get("zero_gravity_m_s2", (0, 0, 0)), "m/s2")
     found = matrix("matrix", values["matrix"], 6, len(units)) if "matrix" in values else None
     bumper = _bumper(values["bumper"]) if "bumper" in values else None
-    return LoadCells(units, frame=frame, bumper=bumper, zero_gravity_m_s2=gravity, matrix=found)
+    return {"units": units, "frame": frame, "bumper": bumper, "zero_gravity_m_s2": gravity, "matrix": found}
 
 
 def _unit(values: Any, name: str) -> Unit:

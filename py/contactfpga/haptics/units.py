@@ -10,30 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga.haptics import table
 from contactfpga.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.haptics.unit import Unit
+from contactfpga.haptics.vectors import turning
 from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
 from contactfpga.inputs.values import shown
 
 COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
-
-
-@dataclasses.dataclass(frozen=True)
-class Unit:
-    """One unit. It pushes the bumper along its axis, and reads how hard."""
-
-    point_m: Vector
-    axis: Vector
-    """Unit vector."""
-    gain_n: float = 1.0
-    """Newtons per step of its reading."""
-    zero: float = 0.0
-    """Its reading while nothing touches."""
-    sigma_n: float = 0.05
-    """Standard deviation of its noise."""
-    range: tuple[float, float] | None = None
-    """Readings at its ends: a unit that reads one of them is saturated. None: it has none."""
-    preload_n: float | None = None
-    """What a spring presses it with while nothing touches. None: not known, and whether it lifts is not told."""
 
 
 class LoadCells:
@@ -84,20 +68,20 @@ class LoadCells:
     @classmethod
     def load(cls, path: str | Path) -> LoadCells:
         """The units in a TOML file. Raises :class:`HapticsError`, OSError."""
-        from contactfpga.haptics import table
-
-        return table.load(path)
+        return cls(**table.load(path))
 
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
         """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
         inertia are taken out; without, it has to be at rest as when its zeros were read."""
         read = np.array(readings, float)
         if read.shape != self.zeros.shape:
-            raise HapticsError(f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each")
+            raise HapticsError(
+                f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
+            )
         deviations = read - self.zeros
         values = self.matrix @ deviations
-        if motion is not None and self.bumper is not None:
-            values = values + self.bumper.wrench(motion) - self._weight
+        if motion is not None and self.bumper is not None and self._weight is not None:
+            values = values + (self.bumper.wrench(motion) - self._weight)
         fx, fy, fz, mx, my, mz = values.tolist()
         if not math.isfinite(fx + fy + fz + mx + my + mz):
             raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
@@ -121,7 +105,9 @@ class LoadCells:
     def _read(self, readings: Sequence[float] | Floats) -> Floats:
         read = np.asarray(readings, float)
         if read.ndim == 0 or read.shape[-1] != len(self.units):
-            raise HapticsError(f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each")
+            raise HapticsError(
+                f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
+            )
         if not np.isfinite(read).all():
             raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
         return read
@@ -129,14 +115,14 @@ class LoadCells:
     @functools.cached_property
     def singular_values(self) -> Floats:
         """Of the (6, n) matrix in N and Nm, largest first."""
-        return np.linalg.svd(self.geometry, compute_uv=False)
+        return np.asarray(np.linalg.svd(self.geometry, compute_uv=False), float)
 
     @functools.cached_property
     def _seen(self) -> tuple[Floats, int, Vector, float]:
         """Left singular vectors about the units' barycenter with moments over their distance; rank; place; distance."""
         x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
         moved = np.array(self.matrix)
-        moved[3:] -= np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ moved[:3]
+        moved[3:] -= turning((x, y, z)) @ moved[:3]
         spread = np.array([unit.point_m for unit in self.units]) - (x, y, z)
         length = float(np.sqrt((spread**2).sum() / len(spread))) or 1.0
         moved[3:] /= length
@@ -155,7 +141,7 @@ class LoadCells:
         vectors, rank, (x, y, z), length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] *= length
-        lost[3:] += np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ lost[:3]
+        lost[3:] += turning((x, y, z)) @ lost[:3]
         lost[np.abs(lost) < 1e-12] = 0.0
         return np.asarray((lost / np.linalg.norm(lost, axis=0)).T)
 
@@ -168,9 +154,8 @@ class LoadCells:
         """(3,): standard deviations in N of the force of a single contact at a known point."""
         if self.rank < 6:
             raise HapticsError(f"the units see {self.rank} of 6 components; not all of a force is known at any point")
-        x, y, z = point_m
-        exerts = np.concatenate([np.eye(3), [[0, -z, y], [z, 0, -x], [-y, x, 0]]])
-        return np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts)))
+        exerts = np.concatenate([np.eye(3), turning(point_m)])
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts))))
 
     def lifting_n(self, point_m: Vector, along: Vector) -> float:
         """The force in N, along the unit vector ``along`` at this point, from which on a unit is lifted; infinite where
@@ -200,7 +185,7 @@ class LoadCells:
         for number, unit in enumerate(self.units):
             if varies[number] > 3 * unit.sigma_n:
                 raise HapticsError(
-                    f"unit {number} varies by {varies[number]:.3g} N, and its noise is {unit.sigma_n:g} N; something moves"
+                    f"unit {number} varies by {varies[number]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
                 )
         units = [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, read.mean(axis=0))]
         gravity = self.zero_gravity_m_s2 if gravity_m_s2 is None else gravity_m_s2

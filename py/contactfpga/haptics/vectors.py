@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contactfpga.haptics.answer import Vector
+import numpy as np
+
+from contactfpga.haptics.answer import Floats, Vector
 
 
 def dot(first: Sequence[float], second: Sequence[float]) -> float:
@@ -22,6 +24,12 @@ def cross(first: Sequence[float], second: Sequence[float]) -> Vector:
 def minus(vector: Vector) -> Vector:
     """The opposite."""
     return -vector[0], -vector[1], -vector[2]
+
+
+def turning(point: Sequence[float]) -> Floats:
+    """(3, 3): from a force at the point to its moment."""
+    x, y, z = point
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def solve_symmetric(matrix: Sequence[Sequence[float]], wanted: Vector) -> Vector:

@@ -1,0 +1,25 @@
+"""`contactfpga haptics`: forces at contacts, from pressure units; a file per topic."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.commands.haptics import contacts, place, wrench
+
+HELP = "Compute forces at contacts from pressure units, and where to put these."
+EXTRA = "haptics"
+
+TOPICS = {"contacts": contacts, "wrench": wrench, "place": place}
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topics, each with its flags."""
+    commands = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC")
+    for name, topic in TOPICS.items():
+        topic.add_flags(commands.add_parser(name, help=topic.HELP, description=topic.HELP))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    status: int = TOPICS[args.topic].run(args)
+    return status
