@@ -16,6 +16,12 @@ from contactfpga.haptics.system import System
 DETERMINED = 1e-9
 """A push that the null space changes by no more than this share is known."""
 
+SMALLEST = 1e-7
+"""Weight of the forces' own size against the wrench."""
+
+TOLERANCE = 1e-10
+"""Of Clarabel's answers, as a share."""
+
 
 def frame(normal: Vector) -> Floats:
     """(3, 3): columns inward, and two along the surface."""
@@ -48,13 +54,14 @@ def intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> l
 
 
 def nearest(system: System) -> Floats:
-    """(3k,): the forces in the cones whose wrench is nearest; of equal ones that with the least along the surface."""
+    """(3k,): the forces in the cones whose wrench is nearest; of equal ones the smallest."""
     basis, firsts = _basis(system.touches, False)
     matrix = system.root @ system.matrix() @ basis
     square = matrix.T @ matrix
-    sideways = np.ones(len(square))
-    sideways[firsts] = 1e-3
-    square += np.diag(1e-9 * float(np.trace(square)) * sideways)
+    # Of equal ones the smallest forces, and those along the surface count most.
+    sizes = np.ones(len(square))
+    sizes[firsts] = 0.1
+    square += np.diag(SMALLEST * float(np.trace(square)) / len(square) * sizes)
     size = max(1e-12, float(np.abs(system.wrench[:3]).max()))
     wanted = matrix.T @ (system.root @ system.wrench) / size
     scale = float(np.abs(square).max())
@@ -112,6 +119,7 @@ class _Solver:
     def _run(self, square: Floats, slope: Floats) -> Any:
         settings = self._clarabel.DefaultSettings()
         settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
         sparse = self._sparse
         return self._clarabel.DefaultSolver(
             sparse.csc_matrix(np.triu(square)),

@@ -65,4 +65,4 @@ def _all(place: Axes, ratings: list[Rating]) -> None:
         place.plot(errors, forces, "os^Dv"[number % 5], ms=4, color=style.PALETTE[number], label=kind)
     place.set(xlabel="error of the place, mm", ylabel="smallest force seen, N", xlim=(0, None), ylim=(0, None))
     place.set_title("all that were tried", loc="left")
-    place.legend(loc="upper left")
+    place.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))

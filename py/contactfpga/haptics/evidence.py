@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from contactfpga.haptics.locate import Place
 
 
+ROUNDING = 1e-4
+"""Share by which the table of forces may be off."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Closing:
     """A switch that closed, and the push at that instant: the contact lies on the circle of that push's reach."""
@@ -70,7 +74,7 @@ class Known:
         farther = self.reach.closing_n(distance + step_m / 2)
         within = np.minimum(farther - needed, needed)
         sigma = np.sqrt(self.force_sigma_n**2 + (self.spread * needed) ** 2 + (within / 1.7) ** 2)
-        return needed, np.maximum(sigma, 1e-9)
+        return needed, np.maximum(sigma, ROUNDING * needed)
 
     def _open(self) -> list[tuple[int, int]]:
         """Open switches that the contact might have closed: those around the pressed ones."""

@@ -1,7 +1,7 @@
 """One contact in closed form, two with the exact interval of each push.
 
 In plain Python, for numpy takes several times as long for a few numbers. Both correct the wrench to the nearest one
-that contacts at these places can exert: a single force has no moment about its point, two have none about the line through
+that contacts at these places can exert: a force has no moment about its point, two have none about the line through
 both. What is corrected away, over its variance, is chi-square.
 """
 

@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
+from contactfpga.cover import medium
 from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.sense import Model, Sheet
 from contactfpga.haptics.answer import Floats, HapticsError
 
 STEPS = 512
 """Entries of the table; between them it is straight."""
+
+LARGEST_N = 1e4
 
 
 class Reach:
@@ -27,25 +30,31 @@ class Reach:
         self.model = model
         farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
         self._distances = np.linspace(0, farthest, STEPS)
-        forces: list[float] = []
-        for distance in self._distances:
-            force = cover.force_n(model, float(distance))
-            # In a layer a force far away presses no more, and just before that takes more than any arm has.
-            if isinstance(force, NoSolution) or force > 1e4 or (forces and force <= forces[-1]):
-                break
-            forces.append(force)
-        if len(forces) < 2:
+        if model.contact == "point":
+            spread = medium.spread(model.within, self._distances / cover.thickness_m)
+            found = cover.switch.closing_pa * cover.thickness_m**2 / np.maximum(spread, 1e-30)
+        else:
+            found = np.array([_force(cover.force_n(model, float(distance))) for distance in self._distances])
+        # In a layer a force far away presses no more, and just before that takes more than any arm has.
+        grows = np.concatenate([[True], found[1:] > found[:-1]]) & (found < LARGEST_N)
+        count = STEPS if grows.all() else int(grows.argmin())
+        if count < 2:
             raise HapticsError(f"model is '{model}'; no force closes a switch under this cover")
-        self._distances = self._distances[: len(forces)]
-        # Between entries a root of the force is straighter than the force.
-        self._roots = np.array(forces) ** 0.25
+        self._distances = self._distances[:count]
+        forces = found[:count]
+        # Over a half-space this root is straight in the distance's square, and nearly so in a layer.
+        self._squares = self._distances**2
+        self._roots = forces**0.4
 
     def closing_n(self, distance_m: Floats) -> Floats:
         """Force in N that closes a switch at each distance; 1e9 where none does."""
-        roots = np.interp(distance_m, self._distances, self._roots)
-        square = roots * roots
-        return np.where(distance_m > self._distances[-1], 1e9, square * square)
+        roots = np.interp(distance_m * distance_m, self._squares, self._roots)
+        return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
 
     def reach_m(self, force_n: float) -> float:
         """How far the force closes switches; 0 where it does not even close the one below it."""
-        return float(np.interp(math.sqrt(math.sqrt(max(0.0, force_n))), self._roots, self._distances, left=0.0))
+        return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
+
+
+def _force(found: float | NoSolution) -> float:
+    return math.inf if isinstance(found, NoSolution) else found
