@@ -15,6 +15,8 @@ from contactfpga.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH
 
 SEEDS = st.integers(0, 2**32 - 1)
 MU = 0.5
+FACETS = 96
+"""Of the cones of linear programs: 0.05 % wider than friction's."""
 
 
 def random_bumper(rng, count=7):
@@ -36,7 +38,7 @@ def solved(points, normals, loaded, friction=MU, **how):
     return contacts(loaded, [touch(*pair, friction) for pair in zip(points, normals)], **how)
 
 
-def facets(normal, friction, count=256):
+def facets(normal, friction, count=FACETS):
     """Rows A of A f <= 0 that hold a force within a cone of many facets, which touches friction's from outside."""
     first = np.cross(normal, [0.3, 0.5, 0.8])
     first /= np.linalg.norm(first)
@@ -53,9 +55,9 @@ def oracle(points, normals, six, friction):
         for axis in range(3):
             force = np.eye(3)[axis]
             equal[:, 3 * number + axis] = [*force, *np.cross(point, force)]
-    rows = np.zeros((256 * count, 3 * count))
+    rows = np.zeros((FACETS * count, 3 * count))
     for number, normal in enumerate(normals):
-        rows[256 * number : 256 * (number + 1), 3 * number : 3 * number + 3] = facets(normal, friction)
+        rows[FACETS * number : FACETS * (number + 1), 3 * number : 3 * number + 3] = facets(normal, friction)
     found = []
     for number, normal in enumerate(normals):
         cost = np.zeros(3 * count)
@@ -96,7 +98,7 @@ def test_two_pushes_without_friction_are_found_exactly(seed):
 
 
 @given(SEEDS, st.sampled_from([0.1, 0.5, 1.2]))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_intervals_of_two_are_those_of_linear_programs(seed, friction):
     rng = np.random.default_rng(seed)
     points, normals = scattered(rng, 2)
@@ -105,7 +107,7 @@ def test_intervals_of_two_are_those_of_linear_programs(seed, friction):
     found = solved(points, normals, loaded, friction)
     assert not found.beyond_friction
     for one, force, (low, high) in zip(found, forces, oracle(points, normals, loaded.array, friction)):
-        push = -one.force_n @ np.array(one.normal)
+        push = -np.array(one.force_n) @ one.normal
         least, largest = one.interval_n
         assert least - 1e-6 <= -force @ np.array(one.normal) <= (np.inf if largest is None else largest) + 1e-6
         assert least - 1e-6 <= push <= (np.inf if largest is None else largest) + 1e-6
@@ -304,7 +306,8 @@ def test_cones_agree_with_the_exact_intervals_of_two():
         loaded = exerted(points, [in_cone(rng, normal, 0.4, rng.uniform(1, 30)) for normal in normals])
         exact, cones = solved(points, normals, loaded), solved(points, normals, loaded, cones=True)
         for one, other in zip(exact, cones):
-            assert other.interval_n == pytest.approx(one.interval_n, rel=1e-4, abs=1e-4)
+            pairs = [(low, np.inf if high is None else high) for low, high in (one.interval_n, other.interval_n)]
+            assert pairs[1] == pytest.approx(pairs[0], rel=1e-4, abs=1e-4)
 
 
 def test_without_the_solvers_the_extra_is_named(monkeypatch):

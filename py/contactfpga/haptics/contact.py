@@ -142,11 +142,12 @@ class Contacts(Sequence[Contact]):
         self.beyond_friction = solution.beyond_friction
         """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
         Intervals then hold for pushes with any friction."""
-        pairs = enumerate(zip(touches, solution.forces_n))
-        self._contacts = tuple(
-            Contact(touch, force, _push(touch.normal, force), wrench.frame, self._intervals, number)
-            for number, (touch, force) in pairs
-        )
+        made = []
+        for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
+            nx, ny, nz = touch.normal
+            push = -(nx * force[0] + ny * force[1] + nz * force[2])
+            made.append(Contact(touch, force, push if push > 0 else 0.0, wrench.frame, self._intervals, number))
+        self._contacts = tuple(made)
 
     def _intervals(self) -> list[Interval]:
         return self._kept_intervals
@@ -203,8 +204,3 @@ class Contacts(Sequence[Contact]):
     def __repr__(self) -> str:
         chi2 = "" if self.chi2 is None else f", chi2 {self.chi2:.2f}"
         return "\n".join([f"<Contacts: {len(self)}, {self.model}, rank {self.rank}{chi2}", *map(str, self)]) + ">"
-
-
-def _push(normal: Vector, force: Vector) -> float:
-    push = -(normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2])
-    return push if push > 0 else 0.0

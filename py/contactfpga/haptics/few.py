@@ -96,25 +96,18 @@ def _about_line(
     rest = dot(along, moment) - dot(lever, force)
     chi2 = None
     if wrench.noise is not None:
-        ff, fm, mm = wrench.noise.blocks
-        with_force = [dot(fm[axis], along) - dot(ff[axis], lever) for axis in range(3)]
-        with_moment = [
-            dot(mm[axis], along) - (fm[0][axis] * lever[0] + fm[1][axis] * lever[1] + fm[2][axis] * lever[2])
-            for axis in range(3)
-        ]
-        variance = dot(along, with_moment) - dot(lever, with_force)
+        (lx, ly, lz), (ux, uy, uz) = lever, along
+        sides = np.array((-lx, -ly, -lz, ux, uy, uz))
+        gx, gy, gz, nx, ny, nz = (wrench.noise.covariance @ sides).tolist()
+        variance = ux * nx + uy * ny + uz * nz - lx * gx - ly * gy - lz * gz
         if touches[0].point_sigma_m or touches[1].point_sigma_m:
             pair = _split(force, moment, middle, along, length)
             for touch, each in zip(touches, pair):
                 side = cross(along, each)
                 variance += touch.point_sigma_m**2 * dot(side, side)
         share = rest / variance
-        force = (force[0] - share * with_force[0], force[1] - share * with_force[1], force[2] - share * with_force[2])
-        moment = (
-            moment[0] - share * with_moment[0],
-            moment[1] - share * with_moment[1],
-            moment[2] - share * with_moment[2],
-        )
+        force = (force[0] - share * gx, force[1] - share * gy, force[2] - share * gz)
+        moment = (moment[0] - share * nx, moment[1] - share * ny, moment[2] - share * nz)
         chi2 = rest * share
     first, second = _split(force, moment, middle, along, length)
     return first, second, chi2

@@ -33,13 +33,19 @@ class Line:
         self.push, self.more = -dot(self.normal, self.start), -dot(self.normal, self.along)
 
     def force(self, squeeze: float) -> Vector:
+        """At this squeeze."""
         (x, y, z), (ax, ay, az) = self.start, self.along
         return x + squeeze * ax, y + squeeze * ay, z + squeeze * az
 
     def pushes(self, allowed: Range) -> Interval:
-        ends = [self.push + self.more * end if abs(self.more) > ROUNDING else self.push for end in allowed]
-        least, largest = max(0.0, min(ends)), max(0.0, *ends)
-        return least, (None if math.isinf(largest) else largest)
+        """Least and largest push."""
+        push, more = self.push, self.more
+        if abs(more) <= ROUNDING:
+            push = max(0.0, push)
+            return push, push
+        first, second = push + more * allowed[0], push + more * allowed[1]
+        least, largest = (first, second) if first < second else (second, first)
+        return max(0.0, least), None if largest == math.inf else max(0.0, largest)
 
     def pushing(self) -> Range | None:
         """Squeezes at which the contact does not pull."""
