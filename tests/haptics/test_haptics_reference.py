@@ -159,7 +159,9 @@ def test_three_closings_give_the_place_exactly():
     cells = [(0, 0), (0, 1), (1, 0)]
     forces = [foam.force_n(model, np.hypot(5e-3 * column - 1.2e-3, 5e-3 * row - 0.7e-3)) for row, column in cells]
     assert all(near(*pair) for pair in zip(forces, ("5.004595", "13.397579", "17.993643")))
-    place = Locator(lattice(5.0), Reach(foam, model)).locate(cells, 18.0, [Closing(*c, f) for c, f in zip(cells, forces)])
+    place = Locator(lattice(5.0), Reach(foam, model)).locate(
+        cells, 18.0, [Closing(*c, f) for c, f in zip(cells, forces)]
+    )
     assert (place.x_m, place.y_m) == pytest.approx((1.2e-3, 0.7e-3), abs=2e-6)
     assert place.method == "closings"
 
@@ -169,7 +171,7 @@ def lattice(pitch_mm, lines=16):
         rows=lines,
         columns=lines,
         connectivity=8,
-        report="zones",
+        report="moments",
         barycenter_bits=0,
         zone_capacity=8,
         pitch_x_mm=pitch_mm,

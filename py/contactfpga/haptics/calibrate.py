@@ -12,6 +12,9 @@ from contactfpga.haptics.units import COMPONENTS, LoadCells
 SEEN = 1e-6
 """Share of the largest load below which a direction was not loaded."""
 
+NOISE = 5.0
+"""Times its noise that a combination of readings must have varied to count as loaded."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Calibration:
@@ -53,17 +56,12 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
         )
     if len(known) < count + 1:
         raise HapticsError(f"{len(known)} loads are too few; {count} units and their zeros take at least {count + 1}")
-    deviations = np.concatenate([read - cells.zeros, np.ones((len(read), 1))], axis=1)
-    start = np.concatenate([cells.matrix, np.zeros((6, 1))], axis=1)
-    sizes = np.abs(deviations).max(axis=0)
-    sizes[sizes == 0] = 1.0
-    rest = known - deviations @ start.T
-    # The smallest correction: what the loads do not show stays as it was.
-    correction = np.linalg.lstsq(deviations / sizes, rest, rcond=SEEN)[0].T / sizes
-    found = start + correction
-    matrix = found[:, :count]
-    zeros = cells.zeros - np.linalg.lstsq(matrix, found[:, count], rcond=None)[0]
-    after = known - deviations @ found.T
+    deviations = read - cells.zeros
+    rest = known - deviations @ cells.matrix.T
+    matrix = cells.matrix + _correction(cells, deviations - deviations.mean(axis=0), rest - rest.mean(axis=0))
+    offset = (known - deviations @ matrix.T).mean(axis=0)
+    zeros = cells.zeros - np.linalg.lstsq(matrix, offset, rcond=None)[0]
+    after = known - deviations @ matrix.T - offset
     points = np.array([unit.point_m for unit in cells.units])
     length = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum() / len(points))) or 1.0
     rank, open_ones = rank_of(known, length)
@@ -74,6 +72,14 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     )
     off = _rms(after)
     return Calibration(better, rank, missing, off, _rms(rest), _advice(cells, rank, missing, off))
+
+
+def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
+    """(6, n): the smallest change of the matrix that explains the rest; readings that only noise moved change nothing."""
+    sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
+    left, values, turned = np.linalg.svd(deviations / sigma, full_matrices=False)
+    moved = values > NOISE * np.sqrt(len(deviations))
+    return np.asarray((left[:, moved].T @ rest / values[moved, None]).T @ turned[moved] / sigma)
 
 
 def _named(wrench: Floats) -> list[str]:

@@ -145,10 +145,10 @@ def _place(found: Posterior, closings: bool, center: bool) -> Place:
 def closed(before: Zones, after: Zones) -> tuple[int, int] | None:
     """(row, column) of the one switch that closed between two frames, or None where that is not all that happened.
 
-    Exact sums tell: a cell more changes area, sum of columns and sum of rows by its own. Needs ``report = "zones"``.
+    Exact sums tell: a cell more changes area, sum of columns and sum of rows by its own. Needs ``report = "moments"``.
     """
     if before.frame.barycenters is not None or after.frame.barycenters is not None:
-        raise HapticsError('the board sends barycenters; only `report = "zones"` or "cells" has the exact sums')
+        raise HapticsError('the board sends barycenters; only `report = "moments"` or "cells" has the exact sums')
     more, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))
     inside = 0 <= x < after.sheet.columns and 0 <= y < after.sheet.rows
     return (y, x) if more == 1 and inside else None

@@ -89,12 +89,12 @@ def radius_95(covariance: Floats) -> float:
     second, first = (math.sqrt(max(0.0, value)) for value in np.linalg.eigvalsh(covariance))
     if first == 0:
         return 0.0
-    second = max(second, 1e-6 * first)
     angles = (np.arange(256) + 0.5) * math.pi / 256
-    inverse = (np.cos(angles) / first) ** 2 + (np.sin(angles) / second) ** 2
+    # Along each direction of the distribution made round, its extent in ours.
+    extents = (first * np.cos(angles)) ** 2 + (second * np.sin(angles)) ** 2
     low, high = first, 3 * first
     while high - low > 1e-9 * first:
         middle = (low + high) / 2
-        outside = float((np.exp(-0.5 * middle * middle * inverse) / inverse).mean()) / (first * second)
+        outside = float(np.exp(-0.5 * middle * middle / extents).mean())
         low, high = (middle, high) if outside > 0.05 else (low, middle)
     return (low + high) / 2

@@ -129,13 +129,13 @@ def rate(task: Task, layout: Layout) -> Rating | None:
     sees_friction = cells.rank == 6
     places = task.places()
     pushes = _wrenches(places, 0.0 if not sees_friction else task.friction)
-    readings = task.force_n * np.linalg.lstsq(cells.matrix, pushes.T, rcond=1e-9)[0]
-    if not np.allclose(cells.matrix @ readings, task.force_n * pushes.T, atol=1e-6 * task.force_n):
+    borne = task.force_n * np.linalg.lstsq(cells.geometry, pushes.T, rcond=1e-9)[0]
+    if not np.allclose(cells.geometry @ borne, task.force_n * pushes.T, atol=1e-6 * task.force_n):
         return None
-    bears = float(np.abs(readings).max())
+    bears = float(np.abs(borne).max())
     sigma = task.noise * bears
     noise = Noise(sigma**2 * cells.geometry @ cells.geometry.T + _weight(task, sees_friction))
-    errors = np.sqrt(np.einsum("nai,ij,naj->n", task.slopes, noise.covariance, task.slopes))
+    errors = np.sqrt(((task.slopes @ noise.covariance) * task.slopes).sum(axis=(1, 2)))
     seen = _seen(pushes, noise).reshape(len(places), -1).max(axis=1)
     force = _force_n(noise, places, sees_friction)
     return Rating(layout, bears, sigma, float(errors.max()), force, float(seen.max()), seen, errors)
@@ -165,7 +165,7 @@ def _wrenches(places: list[tuple[Vector, Vector]], friction: float) -> Floats:
 
 def _seen(pushes: Floats, noise: Noise) -> Floats:
     """(m,): newtons at which each push raises the alarm of a wrench without a zone."""
-    felt = np.einsum("mi,ij,mj->m", pushes, noise.information, pushes)
+    felt = ((pushes @ noise.information) * pushes).sum(axis=1)
     slanted = np.linalg.norm(pushes[:, :3], axis=1)
     return np.asarray(slanted * np.sqrt(ALARM[noise.rank - 1] / np.maximum(felt, 1e-30)))
 

@@ -136,12 +136,12 @@ class LoadCells:
 
     @property
     def unseen(self) -> Floats:
-        """(6 - rank, 6): wrenches about the link's origin, each of length 1 in N and Nm, that change no reading."""
-        # What changes no reading does no work with any unit: the wrenches are those at right angles to the columns.
-        vectors, rank, (x, y, z), length = self._seen
+        """(6 - rank, 6): sums of a wrench's components, about the link's origin, that no unit reads: each row's inner
+        product with the wrench. As a motion the row is one that no unit resists."""
+        vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
-        lost[3:] *= length
-        lost[3:] += turning((x, y, z)) @ lost[:3]
+        lost[3:] /= length
+        lost[:3] += turning(place) @ lost[3:]
         lost[np.abs(lost) < 1e-12] = 0.0
         return np.asarray((lost / np.linalg.norm(lost, axis=0)).T)
 

@@ -5,9 +5,15 @@ from __future__ import annotations
 import argparse
 
 from contactfpga.commands.haptics import contacts, place, wrench
+from contactfpga.console import interrupt
+from contactfpga.haptics.answer import HapticsError
+from contactfpga.inputs import files
 
 HELP = "Compute forces at contacts from pressure units, and where to put these."
 EXTRA = "haptics"
+
+BAD_INPUT = 2
+"""Exit status: scripts tell a file that cannot be used from a failure."""
 
 TOPICS = {"contacts": contacts, "wrench": wrench, "place": place}
 
@@ -21,5 +27,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    status: int = TOPICS[args.topic].run(args)
-    return status
+    try:
+        status: int = TOPICS[args.topic].run(args)
+        return status
+    except (HapticsError, OSError) as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+        interrupt.failed(HapticsError(files.told(error)) if isinstance(error, OSError) else error)
+        return BAD_INPUT
