@@ -105,7 +105,7 @@ def test_zones_become_places_on_the_outside():
     found = solve.touched(zones([(1, 2, 4)]), Plane(0.005), 0.7)
     assert found == [Touch((0.010, 0.020, 0.005), (0.0, 0.0, 1.0), 0.7, found[0].point_sigma_m)]
     assert found[0].point_sigma_m == pytest.approx(5e-3 / np.sqrt(12))
-    (round_link,) = solve.touched(zones([(1, 2, 4)], radius_mm=38.0), Cylinder(0.043))
+    (round_link,) = solve.touched(zones([(1, 2, 4)], surface="cylinder", radius_mm=38.0), Cylinder(0.043))
     angle = 10 / 38
     assert round_link.point_m == pytest.approx((0.043 * np.cos(angle), 0.043 * np.sin(angle), 0.020))
     loaded = Wrench((0.0, 0.0, -6.0), (-0.12, 0.06, 0.0))

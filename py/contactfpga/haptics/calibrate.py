@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from contactfpga.haptics.answer import Floats, HapticsError
-from contactfpga.haptics.units import COMPONENTS, LoadCells
+from contactfpga.haptics.units import COMPONENTS, LoadCells, reduced
 
 SEEN = 1e-6
 """Share of the largest load below which a direction was not loaded."""
@@ -65,7 +65,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     points = np.array([unit.point_m for unit in cells.units])
     length = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum() / len(points))) or 1.0
     rank, open_ones = rank_of(known, length)
-    missing = tuple(" with ".join(_named(one)) for one in open_ones)
+    missing = tuple(" with ".join(_named(one)) for one in reduced(open_ones))
     units = [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(cells.units, zeros)]
     better = LoadCells(
         units, frame=cells.frame, bumper=cells.bumper, zero_gravity_m_s2=cells.zero_gravity_m_s2, matrix=matrix
@@ -75,7 +75,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
-    """(6, n): the smallest change of the matrix that explains the rest; readings that only noise moved change nothing."""
+    """(6, n): the smallest change of the matrix that explains the rest; what only noise moved changes nothing."""
     sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
     left, values, turned = np.linalg.svd(deviations / sigma, full_matrices=False)
     moved = values > NOISE * np.sqrt(len(deviations))

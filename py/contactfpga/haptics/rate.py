@@ -129,7 +129,7 @@ def rate(task: Task, layout: Layout) -> Rating | None:
     sees_friction = cells.rank == 6
     places = task.places()
     pushes = _wrenches(places, 0.0 if not sees_friction else task.friction)
-    borne = task.force_n * np.linalg.lstsq(cells.geometry, pushes.T, rcond=1e-9)[0]
+    borne = task.force_n * np.linalg.pinv(cells.geometry, rcond=1e-9) @ pushes.T
     if not np.allclose(cells.geometry @ borne, task.force_n * pushes.T, atol=1e-6 * task.force_n):
         return None
     bears = float(np.abs(borne).max())

@@ -11,8 +11,8 @@ from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.sense import Model, Sheet
 from contactfpga.haptics.answer import Floats, HapticsError
 
-STEPS = 512
-"""Entries of the table; between them it is straight."""
+STEPS, PATCH_STEPS = 512, 160
+"""Entries of the table, of a point and of a patch, which takes longer; between them it is straight."""
 
 LARGEST_N = 1e4
 
@@ -29,7 +29,8 @@ class Reach:
     def __init__(self, cover: Sheet, model: Model, farthest_m: float | None = None):
         self.model = model
         farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
-        self._distances = np.linspace(0, farthest, STEPS)
+        steps = STEPS if model.contact == "point" else PATCH_STEPS
+        self._distances = np.linspace(0, farthest, steps)
         if model.contact == "point":
             spread = medium.spread(model.within, self._distances / cover.thickness_m)
             found = cover.switch.closing_pa * cover.thickness_m**2 / np.maximum(spread, 1e-30)
@@ -37,7 +38,7 @@ class Reach:
             found = np.array([_force(cover.force_n(model, float(distance))) for distance in self._distances])
         # In a layer a force far away presses no more, and just before that takes more than any arm has.
         grows = np.concatenate([[True], found[1:] > found[:-1]]) & (found < LARGEST_N)
-        count = STEPS if grows.all() else int(grows.argmin())
+        count = steps if grows.all() else int(grows.argmin())
         if count < 2:
             raise HapticsError(f"model is '{model}'; no force closes a switch under this cover")
         self._distances = self._distances[:count]

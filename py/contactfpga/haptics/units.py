@@ -148,7 +148,7 @@ class LoadCells:
     @property
     def cannot_see(self) -> list[str]:
         """:attr:`unseen` in words: the components that each of them is made of."""
-        return [_in_words(wrench) for wrench in self.unseen]
+        return [_in_words(one) for one in reduced(self.unseen)]
 
     def noise_at(self, point_m: Vector) -> Floats:
         """(3,): standard deviations in N of the force of a single contact at a known point."""
@@ -191,6 +191,24 @@ class LoadCells:
         gravity = self.zero_gravity_m_s2 if gravity_m_s2 is None else gravity_m_s2
         matrix = self.matrix if self.calibrated else None
         return LoadCells(units, frame=self.frame, bumper=self.bumper, zero_gravity_m_s2=gravity, matrix=matrix)
+
+
+def reduced(rows: Floats) -> Floats:
+    """Rows that span the same space, each with a leading 1 that the others lack, so that they name few components."""
+    found = np.array(rows)
+    done = 0
+    for column in range(found.shape[1]):
+        if done == len(found):
+            break
+        largest = done + int(np.abs(found[done:, column]).argmax())
+        if abs(found[largest, column]) < 1e-9:
+            continue
+        found[[done, largest]] = found[[largest, done]]
+        found[done] /= found[done, column]
+        others = np.arange(len(found)) != done
+        found[others] -= found[others, column : column + 1] * found[done]
+        done += 1
+    return found
 
 
 def _in_words(wrench: Floats) -> str:

@@ -218,7 +218,7 @@ def bound_m(case: Case, one: Pressed) -> float:
         known += np.outer(slope, slope) / (case.force_sigma_n**2 + (case.spread * needed) ** 2)
     if np.linalg.cond(known) > 1e4:
         return math.nan
-    return radius_95(np.linalg.inv(known))
+    return radius_95(np.asarray(np.linalg.inv(known), float))
 
 
 def _rms(errors: list[float]) -> float:
