@@ -22,9 +22,9 @@ def named(case):
 
 @pytest.mark.parametrize("case", coverage.RIGHT, ids=named)
 def test_the_stated_radius_covers_the_contact(case):
-    """In 95 +- 2 % of contacts; of these few, chance adds 4 %."""
-    found = coverage.run(case, 60, seed=3)
-    assert found.covered >= 0.86
+    """In 95 +- 2 % of contacts; of these few, chance takes up to 10 % more."""
+    found = coverage.run(case, 36, seed=3)
+    assert found.covered >= 0.85
     if not np.isnan(found.theory_m):
         assert found.radius_m <= 1.5 * found.theory_m
 
@@ -38,14 +38,14 @@ def test_the_stated_radius_covers_the_contact_in_95_of_100(case):
 
 def test_closings_alone():
     """Pitch 5: 0.15 mm without noise, 0.4 mm with 0.5 N of noise and thresholds spread by 10 %."""
-    assert coverage.run(QUIET, 40).rms_m < 0.15e-3
-    noisy = coverage.run(dataclasses.replace(QUIET, spread=0.1, force_sigma_n=0.5), 60)
+    assert coverage.run(QUIET, 16).rms_m < 0.15e-3
+    noisy = coverage.run(dataclasses.replace(QUIET, spread=0.1, force_sigma_n=0.5), 36)
     assert noisy.rms_m < 0.4e-3 < noisy.barycenter_m
 
 
 def test_a_wrong_contact_is_noticed_and_never_worse_than_twice_the_barycenter():
     wrong = dataclasses.replace(QUIET, spread=0.02, force_sigma_n=0.1, true=coverage.PATCH)
-    found = coverage.run(wrong, 30)
+    found = coverage.run(wrong, 16)
     assert found.disagreed > 0.5
     assert found.rms_m < 2 * found.barycenter_m
 

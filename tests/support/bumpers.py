@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from contactfpga.haptics import LoadCells, Touch, Unit, Wrench
+from contactfpga.haptics import LoadCells, Touch, Unit, Wrench, contacts
 
 DEGREE = np.pi / 180
 
@@ -60,3 +60,23 @@ def in_cone(rng, normal, friction, push):
     across = np.cross(normal, direction(rng))
     across /= np.linalg.norm(across)
     return -push * normal + friction * push * np.sqrt(rng.random()) * across
+
+
+def random_bumper(rng, count=7):
+    points = rng.normal(0, 0.05, (count, 3))
+    return LoadCells(units(points, [direction(rng) for _ in range(count)], 0.03))
+
+
+def scattered(rng, count):
+    """Places on a cylinder, not too near to each other, with their normals."""
+    while True:
+        places = [on_cylinder(rng.uniform(0, 360), rng.uniform(0, 0.15)) for _ in range(count)]
+        points, normals = np.array([p for p, _ in places]), np.array([n for _, n in places])
+        gaps = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(count)
+        if gaps.min() > 0.01:
+            return points, normals
+
+
+def solved(points, normals, loaded, friction=0.5, **how):
+    """The contacts at these places."""
+    return contacts(loaded, [touch(*pair, friction) for pair in zip(points, normals)], **how)

@@ -20,6 +20,10 @@ ROUNDING = 1e-4
 """Share by which the table of forces may be off."""
 
 
+CERTAIN = 10.0
+"""Standard deviations beyond a threshold at which nothing is left to chance."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Closing:
     """A switch that closed, and the push at that instant: the contact lies on the circle of that push's reach."""
@@ -58,7 +62,8 @@ class Known:
                 _one_side((self.force_n - needed) / sigma, chance, misfit)
         for cell in self._open():
             needed, sigma = self._needed(cell, x, y, step_m)
-            _one_side((needed - self.force_n) / sigma, chance, misfit)
+            if float(needed.min()) - self.force_n < CERTAIN * float(sigma.max()):
+                _one_side((needed - self.force_n) / sigma, chance, misfit)
         if self.center is not None:
             off = self._from_center(x, y)
             chance -= 0.5 * off

@@ -10,7 +10,7 @@ import numpy as np
 
 from contactfpga.haptics.answer import Floats
 
-SIDE = 44
+SIDE = 36
 """Points of the grid along each axis."""
 
 LEVELS = 12

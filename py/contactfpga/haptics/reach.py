@@ -11,7 +11,7 @@ from contactfpga.cover.answer import NoSolution
 from contactfpga.cover.sense import Model, Sheet
 from contactfpga.haptics.answer import Floats, HapticsError
 
-STEPS, PATCH_STEPS = 512, 160
+STEPS, PATCH_STEPS = 512, 240
 """Entries of the table, of a point and of a patch, which takes longer; between them it is straight."""
 
 LARGEST_N = 1e4

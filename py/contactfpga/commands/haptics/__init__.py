@@ -9,7 +9,7 @@ from contactfpga.console import interrupt
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.inputs import files
 
-HELP = "Compute forces at contacts from pressure units, and where to put these."
+HELP = "Compute forces at contacts from pressure units."
 EXTRA = "haptics"
 
 BAD_INPUT = 2
