@@ -101,11 +101,10 @@ def test_covariance_and_chi2_are_those_of_many_trials(count, sigma):
     assert result.freedom == freedom
     assert np.mean(chi2) == pytest.approx(freedom, rel=0.12)
     assert np.mean(np.array(chi2) > {1: 3.841, 3: 7.815}[freedom]) == pytest.approx(0.05, abs=0.02)
-    if sigma == 0:
-        keep = np.eye(3 * count) - sum((np.outer(n, n) for n in result.null_space), np.zeros((3 * count,) * 2))
-        spread = keep @ np.cov(np.transpose(found)) @ keep
-        stated = result.covariance_n2
-        assert np.sqrt(np.diag(spread)) == pytest.approx(np.sqrt(np.diag(stated)), rel=0.1, abs=2e-3)
+    keep = np.eye(3 * count) - sum((np.outer(n, n) for n in result.null_space), np.zeros((3 * count,) * 2))
+    spread = keep @ np.cov(np.transpose(found)) @ keep
+    stated = result.covariance_n2
+    assert np.sqrt(np.diag(spread)) == pytest.approx(np.sqrt(np.diag(stated)), rel=0.1, abs=2e-3)
 
 
 def test_a_place_that_is_unsure_raises_no_alarm():
@@ -181,3 +180,19 @@ def test_three_units_on_a_plane_find_pushes():
 def test_contacts_at_one_place_are_refused():
     with pytest.raises(HapticsError, match="contacts 0 and 1 both lie at"):
         contacts(wrench([1] * 6), [touch((0, 0, 0), (0, 0, 1))] * 2)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.002])
+def test_chi2_of_units_that_see_no_friction(sigma):
+    """Three units on a plane: of three components one push takes one."""
+    rng = np.random.default_rng(9)
+    cells, normal = flat(), np.array([0, 0, 1.0])
+    chi2 = []
+    for _ in range(1000):
+        point = np.array([0.02, -0.03, 0.0])
+        moved = point + sigma * rng.standard_normal(3) * [1, 1, 0]
+        six = exerted(moved, -12 * normal).array + cells.geometry @ rng.normal(0, 0.05, 3)
+        found = contacts(wrench(six, cells.noise), [touch(point, normal, 0.5, sigma)])
+        chi2.append(found.chi2)
+    assert found.freedom == 2
+    assert np.mean(chi2) == pytest.approx(2, rel=0.12)

@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from bumpers import exerted, hexapod, on_cylinder
 
-from contactfpga.haptics import Closing, Cylinder, HapticsError, Place, Plane, Touch, closed, contacts, solve
+from contactfpga.haptics import Closing, Cylinder, HapticsError, Locator, Place, Plane, Touch, closed, contacts, solve
 from contactfpga.haptics.posterior import radius_95
 from contactfpga.haptics.wrench import Wrench
 from contactfpga.skin import Skin
@@ -113,3 +114,15 @@ def test_zones_become_places_on_the_outside():
     assert one.normal_n == pytest.approx(6)
     with pytest.raises(HapticsError, match="surface is missing"):
         contacts(loaded, zones([(1, 2, 4)]))
+
+
+def test_the_center_of_pressure_on_the_sheet_under_the_foam():
+    """The force enters 5 mm outside of the sheet, at 200 degrees, which a sheet around the link has at its own arc."""
+    sheet = Skin(rows=16, columns=24, pitch_x_mm=9.9, pitch_y_mm=5.0, surface="cylinder", radius_mm=38.0).sheet
+    finder = Locator(sheet, coverage.reach_of(coverage.POINT))
+    cells = hexapod(60, 0.05)
+    point, normal = on_cylinder(200, 0.04, 0.043)
+    place = finder.center(Cylinder(0.043).center(exerted(point, -12 * normal, cells.noise)))
+    assert (place.x_m, place.y_m) == pytest.approx((0.038 * np.radians(200), 0.04))
+    outside = Cylinder(0.043).center(exerted(point, -12 * normal, cells.noise)).covariance_m2
+    assert place.covariance_m2[0, 0] == pytest.approx(outside[0, 0] * (38 / 43) ** 2)

@@ -15,6 +15,7 @@ import numpy as np
 from contactfpga.haptics.answer import Floats, Vector
 from contactfpga.haptics.contact import PURE_FORCE, Interval, Solution, Touch
 from contactfpga.haptics.squeeze import Line, both, least_sideways
+from contactfpga.haptics.system import System
 from contactfpga.haptics.vectors import cross, dot, minus, solve_symmetric
 from contactfpga.haptics.wrench import Wrench
 
@@ -167,28 +168,25 @@ def _solution(
     if noise is not None and chi2 is None:
         chi2 = _chi2(wrench, touches, forces)
     freedom = (6 if noise is None else noise.rank) - rank
-    covariance = _covariance(wrench, touches, null)
+    covariance = _covariance(wrench, touches, forces)
     return Solution(
         PURE_FORCE, forces, lambda: intervals, rank, null, chi2, freedom, touches, wrench, covariance, beyond
     )
 
 
 def _chi2(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> float | None:
-    from contactfpga.haptics.system import System
-
     system = System(wrench, touches)
     system.places_widen(np.ravel(forces))
     rest = system.wrench - system.matrix() @ np.ravel(forces)
     return system.chi2(rest)
 
 
-def _covariance(wrench: Wrench, touches: Sequence[Touch], null: list[list[float]]) -> Callable[[], Floats | None]:
+def _covariance(wrench: Wrench, touches: Sequence[Touch], forces: list[Vector]) -> Callable[[], Floats | None]:
     def found() -> Floats | None:
-        from contactfpga.haptics.system import System
-
         if wrench.noise is None:
             return None
         system = System(wrench, touches)
+        system.places_widen(np.ravel(forces))
         matrix = system.matrix()
         return np.asarray(np.linalg.pinv(matrix.T @ system.weight @ matrix, rcond=1e-12, hermitian=True))
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -73,9 +74,23 @@ class Locator:
         :class:`HapticsError` where the wrench has no noise."""
         if center.covariance_m2 is None:
             raise HapticsError("the wrench has no covariance; a place needs one to say how sure it is")
-        radius = posterior.radius_95(center.covariance_m2)
-        x, y = center.sheet_m[0] - origin_m[0], center.sheet_m[1] - origin_m[1]
-        return Place(x, y, radius, center.covariance_m2, "center of pressure")
+        x, spread = center.sheet_m[0], center.covariance_m2
+        if self._sheet.radius_mm is not None:
+            x, spread = self._inside(center)
+        place = (x - origin_m[0], center.sheet_m[1] - origin_m[1])
+        return Place(*place, posterior.radius_95(spread), spread, "center of pressure")
+
+    def _inside(self, center: Center) -> tuple[float, Floats]:
+        """Arc length on the sheet, which lies under the foam, and the covariance there. Of the turns around the link
+        that one is taken that is nearest to the sheet's middle."""
+        assert self._sheet.radius_mm is not None
+        assert center.covariance_m2 is not None
+        share = 1e-3 * self._sheet.radius_mm / math.hypot(center.point_m[0], center.point_m[1])
+        around = 2 * math.pi * 1e-3 * self._sheet.radius_mm
+        x = share * center.sheet_m[0]
+        middle = self._pitch_x * (self._sheet.columns - 1) / 2
+        scale = np.diag([share, 1.0])
+        return x + around * round((middle - x) / around), scale @ center.covariance_m2 @ scale
 
     def barycenter(self, x_m: float, y_m: float, force_n: float | None = None) -> Place:
         """By a zone's barycenter. Without force it is as unsure as a barycenter can be."""
