@@ -18,12 +18,14 @@ from contactfpga.haptics.surface import Cylinder
 def draw(path: Path, task: Task, ratings: list[Rating]) -> Path:
     """The best arrangement, the smallest force it sees everywhere, and all others beside it."""
     with matplotlib.rc_context(style.SETTINGS):
-        figure = style.new(6.2)
+        figure = style.new(5.6)
         grid = figure.add_gridspec(2, 2, width_ratios=(2, 3))
         _units(figure.add_subplot(grid[0, 0], projection="3d"), task, ratings[0])
-        _map(figure, figure.add_subplot(grid[0, 1]), task, ratings[0].seen_by_place, "smallest force seen, N")
+        _seen(figure, figure.add_subplot(grid[0, 1]), task, ratings[0].seen)
         _map(figure, figure.add_subplot(grid[1, 1]), task, 1e3 * ratings[0].errors_m, "error of the place, mm")
-        _all(figure.add_subplot(grid[1, 0]), ratings)
+        others = figure.add_subplot(grid[1, 0])
+        _all(others, ratings)
+        figure.legend(*others.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         return style.save(figure, path)
 
 
@@ -57,6 +59,20 @@ def _map(figure: Figure, place: Axes, task: Task, values: Floats, name: str) -> 
     place.set_title(name, loc="left")
 
 
+def _seen(figure: Figure, place: Axes, task: Task, seen: Floats) -> None:
+    """By place; around a cylinder that makes no difference, so there by direction instead."""
+    first, second = task.size_m
+    if not isinstance(task.surface, Cylinder) or seen.shape[1] == 1:
+        _map(figure, place, task, seen.max(axis=1), "smallest force seen, N")
+        return
+    shown = seen.reshape(ALONG, TURNS, -1).max(axis=1)[:, 1:]
+    extent = (0.0, 360.0, 1e3 * first, 1e3 * second)
+    image = place.imshow(shown, origin="lower", extent=extent, aspect="auto", cmap="cividis")
+    figure.colorbar(image, ax=place)
+    place.set(xlabel="drag, degrees: 0 around the link, 90 along it", ylabel="along it, mm")
+    place.set_title("smallest force seen, N", loc="left")
+
+
 def _all(place: Axes, ratings: list[Rating]) -> None:
     kinds = list(dict.fromkeys(rating.layout.name.rpartition(",")[0] or rating.layout.name for rating in ratings))
     for number, kind in enumerate(kinds):
@@ -65,4 +81,3 @@ def _all(place: Axes, ratings: list[Rating]) -> None:
         place.plot(errors, forces, "os^Dv"[number % 5], ms=4, color=style.PALETTE[number], label=kind)
     place.set(xlabel="error of the place, mm", ylabel="smallest force seen, N", xlim=(0, None), ylim=(0, None))
     place.set_title("all that were tried", loc="left")
-    place.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))

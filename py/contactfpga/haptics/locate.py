@@ -18,7 +18,7 @@ from contactfpga.haptics.evidence import Closing, Known
 from contactfpga.haptics.posterior import Box, Posterior
 from contactfpga.haptics.reach import Reach
 from contactfpga.haptics.surface import Center
-from contactfpga.skin.sheet import Sheet
+from contactfpga.skin import sheet as sheets
 from contactfpga.zones.zone import Zones
 
 HELPS_FROM = 0.8
@@ -53,7 +53,7 @@ class Locator:
         force_sigma_n: standard deviation of the forces that are given.
     """
 
-    def __init__(self, sheet: Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
+    def __init__(self, sheet: sheets.Sheet, reach: Reach, spread: float = 0.0, force_sigma_n: float = 0.0):
         if not (0 <= spread < 1 and 0 <= force_sigma_n < 1e6):
             raise HapticsError(f"spread is {spread} and force_sigma_n {force_sigma_n}; give 0 to 1, and 0 N or above")
         self._sheet = sheet

@@ -106,8 +106,8 @@ class Rating:
     """Standard deviation of the force at a known place."""
     seen_n: float
     """Smallest force that is told from none, in any direction that friction allows."""
-    seen_by_place: Floats
-    """The same by place."""
+    seen: Floats
+    """(places, directions): the same by place, and by direction: straight, then with friction all around."""
     errors_m: Floats
     """``place_m`` by place."""
 
@@ -136,7 +136,7 @@ def rate(task: Task, layout: Layout) -> Rating | None:
     sigma = task.noise * bears
     noise = Noise(sigma**2 * cells.geometry @ cells.geometry.T + _weight(task, sees_friction))
     errors = np.sqrt(((task.slopes @ noise.covariance) * task.slopes).sum(axis=(1, 2)))
-    seen = _seen(pushes, noise).reshape(len(places), -1).max(axis=1)
+    seen = _seen(pushes, noise).reshape(len(places), -1)
     force = _force_n(noise, places, sees_friction)
     return Rating(layout, bears, sigma, float(errors.max()), force, float(seen.max()), seen, errors)
 
@@ -155,7 +155,8 @@ def _weight(task: Task, sees_friction: bool) -> Floats:
 def _wrenches(places: list[tuple[Vector, Vector]], friction: float) -> Floats:
     """(m, 6): pushes of 1 N at each place, straight and with friction in every direction."""
     points, normals = (np.array(each) for each in zip(*places))
-    first = np.cross(normals, np.where(np.abs(normals[:, 2:]) > 0.5, [[1.0, 0, 0]], [[0, 0, 1.0]]))
+    # Around a cylinder, and then along it.
+    first = np.cross(np.where(np.abs(normals[:, 2:]) > 0.5, [[1.0, 0, 0]], [[0, 0, 1.0]]), normals)
     second = np.cross(normals, first)
     turns = [2 * math.pi * step / SLANTS for step in range(SLANTS)] if friction else []
     forces = [-normals] + [-normals + friction * (math.cos(turn) * first + math.sin(turn) * second) for turn in turns]

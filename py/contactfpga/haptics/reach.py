@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import medium
+from contactfpga.cover import medium, sense
 from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.sense import Model, Sheet
 from contactfpga.haptics.answer import Floats, HapticsError
 
 STEPS, PATCH_STEPS = 512, 240
@@ -26,7 +25,7 @@ class Reach:
         farthest_m: largest distance asked; None: four times the foam's thickness.
     """
 
-    def __init__(self, cover: Sheet, model: Model, farthest_m: float | None = None):
+    def __init__(self, cover: sense.Sheet, model: sense.Model, farthest_m: float | None = None):
         self.model = model
         farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
         steps = STEPS if model.contact == "point" else PATCH_STEPS
