@@ -42,7 +42,6 @@ def _units(place: Axes, task: Task, rating: Rating) -> None:
     place.set_title(rating.layout.name, loc="left", fontsize=style.NORMAL)
     place.set_box_aspect(np.ptp(points, axis=0) + 0.3 * float(np.ptp(points, axis=0).max()))
     place.set(xlabel="x, mm", ylabel="y, mm", zlabel="z, mm")
-    place.tick_params(labelsize=7)
     place.locator_params(nbins=3)
 
 

@@ -54,7 +54,8 @@ def _show(found: Contacts, asked_center: bool) -> None:
     for number, one in enumerate(found):
         low, high = one.interval_n
         upper = "no limit" if high is None else f"{high:.4g} N"
-        x, y, z = one.force_n
+        # What is rounding is shown as 0.
+        x, y, z = (round(part, 9) + 0.0 for part in one.force_n)
         terminal.say(
             f"contact {number}: pushes {one.normal_n:.4g} N, from {low:.4g} N to {upper} as friction allows; force "
             f"({x:.4g}, {y:.4g}, {z:.4g}) N",
