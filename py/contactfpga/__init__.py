@@ -21,6 +21,8 @@ from contactfpga.errors import (
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Event, Track, Tracks
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zone, Zones
@@ -35,6 +37,7 @@ __all__ = [
     "BoardClosed",
     "BoardSilent",
     "ContactFPGAError",
+    "Event",
     "Hello",
     "MissingExtra",
     "MissingTool",
@@ -49,6 +52,9 @@ __all__ = [
     "SkinMismatch",
     "Stats",
     "Subscription",
+    "Track",
+    "Tracker",
+    "Tracks",
     "VersionMismatch",
     "Zone",
     "Zones",
