@@ -4,7 +4,7 @@ import numpy as np
 
 from contactfpga import Skin, Zones
 from contactfpga.wire.protocol import Frame
-from contactfpga_sim.golden import zones as found_in
+from contactfpga_sim import golden
 
 SKIN = Skin()
 FINGER = 9
@@ -41,7 +41,7 @@ def moments(time_us, sums, flags=(), skin=SKIN, total=None, before=None):
 
 def pressed(time_us, cells, flags=(), skin=SKIN):
     """The frame of (rows, columns) bool cells, by the golden model's zones."""
-    return moments(time_us, found_in.zones(cells, skin.connectivity), flags, skin)
+    return moments(time_us, golden.zones(cells, skin.connectivity), flags, skin)
 
 
 def run(tracker, frames):

@@ -132,7 +132,7 @@ def test_contacts_that_stay_apart_are_those_of_the_best_assignment_by_brute_forc
     tracker, before, names = Tracker(), None, None
     for number in range(60):
         order = rng.sample(range(count), count)
-        spots = [(homes[one][0] + rng.uniform(-0.9, 0.9), homes[one][1] + rng.uniform(-0.9, 0.9)) for one in order]
+        spots = [(homes[one][0] + rng.uniform(-0.6, 0.6), homes[one][1] + rng.uniform(-0.6, 0.6)) for one in order]
         tracks = tracker.update(frame(number * 10_000, spots))
         now = [(track.zone.x_mm, track.zone.y_mm) for track in tracks.active]
         if before is not None:

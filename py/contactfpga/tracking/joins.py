@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, across, radius_mm
+from contactfpga.tracking.spot import Member, Spot, across, place, radius_mm
 from contactfpga.zones.zone import Zone
 
 Apart = Callable[[Spot, Zone], float]
@@ -50,7 +50,7 @@ def parted(
     pairs: Pairs, lost: list[Spot], free: list[Zone], merges: dict[Spot, list[Spot]], apart: Apart, gate_mm: float
 ) -> dict[Spot, list[Zone]]:
     """Which new zones come out of which spot: where it was, and of what it lost in area; of a spot with several
-    contacts, where it was. They are taken from ``free``, and a lost spot that lies in several is taken from ``lost``."""
+    contacts, where it was. They are taken from ``free``; a lost spot that lies in several is taken from ``lost``."""
     found: dict[Spot, list[Zone]] = {}
     left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
     for zone in list(free):
@@ -58,9 +58,9 @@ def parted(
         for spot in left:
             count = 1 + len(found.get(spot, ()))
             lost_area = spot.zone.area_mm2 >= left[spot] + zone.area_mm2 / 2
-            if (lost_area or count < len(spot.members)) and (distance := apart(spot, zone)) < least:
-                if distance <= gate_mm + radius_mm(spot.zone.area_mm2):
-                    best, least = spot, distance
+            reach = min(least, gate_mm + radius_mm(spot.zone.area_mm2))
+            if (lost_area or count < len(spot.members)) and (distance := apart(spot, zone)) <= reach:
+                best, least = spot, distance
         if best is not None:
             found.setdefault(best, []).append(zone)
             left[best] += zone.area_mm2
@@ -77,11 +77,11 @@ def parted(
 
 def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: float | None) -> None:
     """Put the contacts of all these into this zone, each where it would be."""
-    assert zone.x_mm is not None and zone.y_mm is not None
+    x, y = place(zone)
     for one in (spot, *others):
         ahead_x, ahead_y = one.ahead(time_us)
         for member in one.members:
-            member.dx, member.dy = across(ahead_x + member.dx - zone.x_mm, around_mm), ahead_y + member.dy - zone.y_mm
+            member.dx, member.dy = across(ahead_x + member.dx - x, around_mm), ahead_y + member.dy - y
             member.vx, member.vy = member.vx + one.vx, member.vy + one.vy
     spot.members += [member for other in others for member in other.members]
     spot.members.sort(key=_rank)
@@ -104,8 +104,8 @@ def shared_out(spot: Spot, zones: list[Zone], time_us: int, around_mm: float | N
     ahead_x, ahead_y = spot.ahead(time_us)
 
     def distance(member: Member, zone: Zone) -> float:
-        assert zone.x_mm is not None and zone.y_mm is not None
-        return math.hypot(across(zone.x_mm - ahead_x - member.dx, around_mm), zone.y_mm - ahead_y - member.dy)
+        x, y = place(zone)
+        return math.hypot(across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy)
 
     costs = [[distance(member, zone) for zone in zones] for member in spot.members]
     far = 1 + math.fsum(map(math.fsum, costs))  # whoever can have a zone has one
@@ -121,13 +121,13 @@ def shared_out(spot: Spot, zones: list[Zone], time_us: int, around_mm: float | N
 
 def piece(spot: Spot, zone: Zone, members: list[Member], time_us: int, around_mm: float | None) -> Spot:
     """What becomes of a spot in one of the zones that it came apart into."""
-    assert zone.x_mm is not None and zone.y_mm is not None
+    x, y = place(zone)
     ahead_x, ahead_y = spot.ahead(time_us)
     made = Spot(zone, time_us, members)
     made.born_us = spot.born_us
     made.vx, made.vy = spot.vx + members[0].vx, spot.vy + members[0].vy
     for one in members:
-        one.dx, one.dy = across(ahead_x + one.dx - zone.x_mm, around_mm), ahead_y + one.dy - zone.y_mm
+        one.dx, one.dy = across(ahead_x + one.dx - x, around_mm), ahead_y + one.dy - y
     if len(members) == 1:
         members[0].area_mm2 = zone.area_mm2
     made.center()

@@ -38,22 +38,6 @@ class Member:
 class Spot:
     """A zone over time."""
 
-    __slots__ = (
-        "born_us",
-        "from_x",
-        "from_y",
-        "fx",
-        "fy",
-        "members",
-        "seen_us",
-        "small_us",
-        "vx",
-        "vy",
-        "x",
-        "y",
-        "zone",
-    )
-
     def __init__(self, zone: Zone, time_us: int, members: list[Member]):
         self.members = members
         """The one that it goes by comes first."""
@@ -65,10 +49,8 @@ class Spot:
 
     def place(self, zone: Zone, time_us: int) -> None:
         """Put it there, as a zone that grew or shrank by a whole contact is not the place it moved to."""
-        assert zone.x_mm is not None and zone.y_mm is not None
-        self.zone, self.seen_us = zone, time_us
-        self.x = self.fx = self.from_x = zone.x_mm
-        self.y = self.fy = self.from_y = zone.y_mm
+        self.zone, self.seen_us, self.held = zone, time_us, False
+        self.x, self.y = self.fx, self.fy = self.from_x, self.from_y = place(zone)
 
     def ahead(self, time_us: int) -> tuple[float, float]:
         """Where it would be then."""
@@ -77,10 +59,10 @@ class Spot:
 
     def follow(self, zone: Zone, time_us: int, around_mm: float | None) -> None:
         """Go on in this zone: a filter of second order that fades with time, however often frames come."""
-        assert zone.x_mm is not None and zone.y_mm is not None
+        x, y = place(zone)
         seconds = (time_us - self.seen_us) / 1e6
         ahead_x, ahead_y = self.ahead(time_us)
-        off_x, off_y = across(zone.x_mm - ahead_x, around_mm), zone.y_mm - ahead_y
+        off_x, off_y = across(x - ahead_x, around_mm), y - ahead_y
         smooth_s = min(max((time_us - self.born_us) / 2e6, SETTLING_S), SMOOTH_S)
         fade = math.exp(-seconds / smooth_s)
         self.fx, self.fy = ahead_x + (1 - fade * fade) * off_x, ahead_y + (1 - fade * fade) * off_y
@@ -88,7 +70,8 @@ class Spot:
             gain = (1 - fade) * (1 - fade) / seconds
             self.vx += gain * off_x
             self.vy += gain * off_y
-        self.zone, self.seen_us, self.x, self.y = zone, time_us, zone.x_mm, zone.y_mm
+        self.zone, self.seen_us, self.held = zone, time_us, False
+        self.x, self.y = x, y
         if len(self.members) == 1:
             self.members[0].area_mm2 = zone.area_mm2
         else:
@@ -134,13 +117,18 @@ class Spot:
         best = min(self.members, key=without)
         return best if abs(total - best.area_mm2 - area) < abs(total - area) else None
 
-    def track(self, time_us: int) -> Track:
+    def track(self) -> Track:
         """As users see it."""
         first = self.members[0]
         merged = tuple(one.id for one in self.members[1:]) if len(self.members) > 1 else ()
-        return Track(
-            first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.seen_us != time_us, merged
-        )
+        return Track(first.id, self.zone, first.since_us, self.seen_us, self.vx, self.vy, self.held, merged)
+
+
+def place(zone: Zone) -> tuple[float, float]:
+    """Where a zone is; in a frame without ``mismatch`` each one is somewhere."""
+    assert zone.x_mm is not None
+    assert zone.y_mm is not None
+    return zone.x_mm, zone.y_mm
 
 
 def across(dx_mm: float, around_mm: float | None) -> float:

@@ -8,7 +8,7 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking import joins
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, across
+from contactfpga.tracking.spot import Member, Spot, across, place
 from contactfpga.tracking.tracks import Event, Kind, Tracks
 from contactfpga.zones.zone import Zone, Zones
 
@@ -61,10 +61,10 @@ class Tracker:
         self._events = []
         restarted = self._restart(zones)
         self._time_us = zones.time_us
-        unsure: list[Zone] = []
-        if "mismatch" not in zones.flags:
-            unsure = self._step(zones)
-        active = sorted((spot.track(self._time_us) for spot in self._spots), key=lambda track: track.id)
+        for spot in self._spots:
+            spot.held = True  # until a zone of this frame is its own
+        unsure = [] if "mismatch" in zones.flags else self._step(zones)
+        active = sorted((spot.track() for spot in self._spots), key=lambda track: track.id)
         return Tracks(self._time_us, tuple(active), tuple(self._events), tuple(unsure), restarted)
 
     # ---- one frame
@@ -129,8 +129,8 @@ class Tracker:
         return self._gate_mm if self._distance(spot.x, spot.y, zone) <= self._gate_mm else math.inf
 
     def _distance(self, x: float, y: float, zone: Zone) -> float:
-        assert zone.x_mm is not None and zone.y_mm is not None
-        return math.hypot(across(zone.x_mm - x, self._around_mm), zone.y_mm - y)
+        zone_x, zone_y = place(zone)
+        return math.hypot(across(zone_x - x, self._around_mm), zone_y - y)
 
     def _apart(self, spot: Spot, zone: Zone) -> float:
         """From where a spot would be to a zone, in mm."""
