@@ -68,14 +68,15 @@ def test_two_fingers_that_meet_and_part_keep_their_ids_and_sides():
     assert (both.id, both.merged) == (1, (2,))
 
 
-def test_fast_fingers_that_cross_keep_their_ids():
-    """At 2 m/s they are past each other before anyone could turn around."""
-    places = [(2 + n * 0.2, 14 - n * 0.2) for n in range(60)]
+def test_fingers_that_pass_side_by_side_keep_their_ids():
+    """On lanes 1.4 cells apart: back on its own side, each would lie farther from where it came."""
+    places = [(2 + n * 0.1, 14 - n * 0.1) for n in range(120)]
     frames = [
-        frame(n * MS, [(one, 5), (other, 5)] if abs(one - other) >= 4 else [((one + other) / 2, 5, 18)])
+        frame(n * MS, [(one, 4), (other, 5.4)] if abs(one - other) >= 3 else [((one + other) / 2, 4.7, 18)])
         for n, (one, other) in enumerate(places)
     ]
     said = run(Tracker(), frames)
+    assert [kind for kind, _ in events(said) if kind not in ("move", "down")] == ["merge", "split"]
     assert ids(said[0]) == [1, 2]
     assert ids(said[-1]) == [2, 1]
 

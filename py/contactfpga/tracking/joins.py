@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, across, place, radius_mm
+from contactfpga.tracking.spot import PASSING_S, Member, Spot, across, place, radius_mm
 from contactfpga.zones.zone import Zone
 
 Apart = Callable[[Spot, Zone], float]
@@ -89,7 +89,7 @@ def join(spot: Spot, others: list[Spot], zone: Zone, time_us: int, around_mm: fl
     spot.vx = math.fsum(member.area_mm2 * member.vx for member in spot.members) / total
     spot.vy = math.fsum(member.area_mm2 * member.vy for member in spot.members) / total
     spot.place(zone, time_us)
-    spot.small_us = None
+    spot.joined_us, spot.small_us = time_us, None
     spot.center()
 
 
@@ -102,15 +102,24 @@ def shared_out(spot: Spot, zones: list[Zone], time_us: int, around_mm: float | N
     """The zones a spot came apart into, each with its contacts: one each as far as they go, the rest where they are
     nearest; none for a zone that begins a contact."""
     ahead_x, ahead_y = spot.ahead(time_us)
+    passed_s = (time_us - spot.joined_us) / 1e6
 
-    def distance(member: Member, zone: Zone) -> float:
+    def distance(member: Member, zone: Zone, seconds: float) -> float:
         x, y = place(zone)
-        return math.hypot(across(x - ahead_x - member.dx, around_mm), y - ahead_y - member.dy)
+        moved_x, moved_y = member.dx + member.vx * seconds, member.dy + member.vy * seconds
+        return math.hypot(across(x - ahead_x - moved_x, around_mm), y - ahead_y - moved_y)
 
-    costs = [[distance(member, zone) for zone in zones] for member in spot.members]
-    far = 1 + math.fsum(map(math.fsum, costs))  # whoever can have a zone has one
+    # Either they came together and went back, or they went on past each other.
+    ways = []
+    for seconds in (0.0, passed_s) if 0 < passed_s <= PASSING_S and len(spot.members) > 1 else (0.0,):
+        costs = [[distance(member, zone, seconds) for zone in zones] for member in spot.members]
+        far = 1 + math.fsum(map(math.fsum, costs))  # whoever can have a zone has one
+        chosen = assign(costs, far)
+        total = math.fsum(line[column] for line, column in zip(costs, chosen) if column is not None)
+        ways.append((total, costs, chosen))
+    _, costs, chosen = min(ways, key=lambda way: way[0])
     found: list[list[Member]] = [[] for _ in zones]
-    for member, line, column in zip(spot.members, costs, assign(costs, far)):
+    for member, line, column in zip(spot.members, costs, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
         members.sort(key=_rank)

@@ -15,8 +15,8 @@ and frames follow one another so fast that the jump alone would be meters per se
 COAST_S = 0.05
 """How far ahead a speed is believed."""
 
-PASSING_S = 0.05
-"""Over how long two contacts in one zone go on past each other as they came."""
+PASSING_S = 0.5
+"""How long two contacts in one zone may take to pass each other."""
 
 
 @dataclasses.dataclass(slots=True)
@@ -28,10 +28,10 @@ class Member:
     area_mm2: float
     """When it was last seen alone."""
     dx: float = 0.0
-    """Where it is believed to be, from the spot's barycenter, in mm; 0 while it is alone."""
+    """Where it came into the spot, from its barycenter, in mm; 0 while it is alone."""
     dy: float = 0.0
     vx: float = 0.0
-    """How fast, in mm/s, beside the spot's own speed; it fades."""
+    """How fast it came, in mm/s, beside the spot's own speed."""
     vy: float = 0.0
 
 
@@ -42,7 +42,7 @@ class Spot:
         self.members = members
         """The one that it goes by comes first."""
         self.vx = self.vy = 0.0
-        self.born_us = time_us
+        self.born_us = self.joined_us = time_us
         self.small_us: int | None = None
         """Since when it is no larger than it would be without one of its contacts."""
         self.place(zone, time_us)
@@ -74,17 +74,6 @@ class Spot:
         self.x, self.y = x, y
         if len(self.members) == 1:
             self.members[0].area_mm2 = zone.area_mm2
-        else:
-            self._pass(seconds)
-
-    def _pass(self, seconds: float) -> None:
-        """Its contacts move against each other; their common barycenter is the zone's."""
-        fade = math.exp(-seconds / PASSING_S)
-        for one in self.members:
-            one.dx += one.vx * PASSING_S * (1 - fade)
-            one.dy += one.vy * PASSING_S * (1 - fade)
-            one.vx, one.vy = one.vx * fade, one.vy * fade
-        self.center()
 
     def center(self) -> None:
         """Shift its contacts so that their barycenter is the zone's."""
