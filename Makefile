@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures arm-page settle-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures arm-page settle-page tracking-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -101,6 +101,9 @@ arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md an
 
 settle-page: $(VENV)/.stamp-sim ## turn the knobs of the sheet's circuit, and write docs/settle.md and its pictures
 	$(PY) -m contactfpga_sim.pages.settle_page docs/settle.md docs/images
+
+tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
+	$(PY) -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

@@ -36,20 +36,29 @@ class Room:
 
 Render = Callable[[Zones, Room], RenderableType]
 
+Take = Callable[[Zones], None]
+"""Gets every frame, also those that are not shown."""
 
-def show(board: Board, args: argparse.Namespace, render: Render) -> int:
+
+def _ignore(zones: Zones) -> None:
+    pass
+
+
+def show(board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore) -> int:
     """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends."""
     console = terminal.console()
     if args.once:
-        console.print(render(board.next(args.timeout), _room(console, endless=True)))
+        zones = board.next(args.timeout)
+        take(zones)
+        console.print(render(zones, _room(console, endless=True)))
         return 0
     if not terminal.of().live:
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
             terminal.say(what, sys.stderr, hang=2)
-        return _last(board, args, console, render)
+        return _last(board, args, console, render, take)
     with Live(console=console, auto_refresh=False) as live:
-        for zones in _paced(board, args.timeout):
+        for zones in _paced(board, args.timeout, take):
             live.update(render(zones, _room(console)), refresh=True)
     return 0
 
@@ -59,11 +68,11 @@ def _room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _last(board: Board, args: argparse.Namespace, console: Console, render: Render) -> int:
+def _last(board: Board, args: argparse.Namespace, console: Console, render: Render, take: Take) -> int:
     """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
     zones = None
     try:
-        for zones in _paced(board, args.timeout):  # noqa: B007
+        for zones in _paced(board, args.timeout, take):  # noqa: B007
             pass
     finally:
         if zones is not None:
@@ -71,7 +80,7 @@ def _last(board: Board, args: argparse.Namespace, console: Console, render: Rend
     return 0
 
 
-def _paced(board: Board, timeout: float) -> Iterator[Zones]:
+def _paced(board: Board, timeout: float, take: Take) -> Iterator[Zones]:
     """One frame every REFRESH_US of device time, not faster than that in real time.
 
     A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.
@@ -86,6 +95,7 @@ def _paced(board: Board, timeout: float) -> Iterator[Zones]:
             if skipped is not None:
                 yield skipped  # the last frame is shown in any case
             return
+        take(zones)
         if 0 <= zones.time_us - shown_us < REFRESH_US:
             skipped = zones
             continue
