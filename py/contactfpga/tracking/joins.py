@@ -17,6 +17,10 @@ Pairs = list[tuple[Spot, Zone]]
 MOST = 0.75
 """Part of the areas that a zone must have to be made of several spots, or several zones of one spot."""
 
+REACH = 1.5
+"""A zone comes out of another, or goes into it, within the gate and so many radii of the larger one: a foot is long.
+One of several contacts comes out within so many gates of where it would be."""
+
 
 def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_mm: float) -> dict[Spot, list[Spot]]:
     """Which lost spots are now in the zone of another one. They are taken from ``lost``; a new zone that several make
@@ -28,14 +32,14 @@ def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_
         for other, zone in pairs:
             distance = apart(spot, zone)
             grown = zone.area_mm2 >= area[other] + spot.zone.area_mm2 / 2
-            if grown and distance < least and distance <= gate_mm + radius_mm(zone.area_mm2):
+            if grown and distance < least and distance <= gate_mm + REACH * radius_mm(zone.area_mm2):
                 best, least = other, distance
         if best is not None:
             found.setdefault(best, []).append(spot)
             area[best] += spot.zone.area_mm2
             lost.remove(spot)
     for zone in list(free):
-        near = [spot for spot in lost if apart(spot, zone) <= gate_mm + radius_mm(zone.area_mm2)]
+        near = [spot for spot in lost if apart(spot, zone) <= gate_mm + REACH * radius_mm(zone.area_mm2)]
         if len(near) > 1 and zone.area_mm2 >= MOST * math.fsum(spot.zone.area_mm2 for spot in near):
             first = max(near, key=lambda spot: spot.zone.area_mm2)
             found[first] = [spot for spot in near if spot is not first]
@@ -47,10 +51,17 @@ def merged(pairs: Pairs, lost: list[Spot], free: list[Zone], apart: Apart, gate_
 
 
 def parted(
-    pairs: Pairs, lost: list[Spot], free: list[Zone], merges: dict[Spot, list[Spot]], apart: Apart, gate_mm: float
+    pairs: Pairs,
+    lost: list[Spot],
+    free: list[Zone],
+    merges: dict[Spot, list[Spot]],
+    apart: Apart,
+    expects: Callable[[Spot, Zone], bool],
+    gate_mm: float,
 ) -> dict[Spot, list[Zone]]:
     """Which new zones come out of which spot: where it was, and of what it lost in area; of a spot with several
-    contacts, where it was. They are taken from ``free``; a lost spot that lies in several is taken from ``lost``."""
+    contacts, where one of these would be. They are taken from ``free``, a lost spot that lies in several from
+    ``lost``."""
     found: dict[Spot, list[Zone]] = {}
     left = {spot: zone.area_mm2 for spot, zone in pairs if spot not in merges}
     for zone in list(free):
@@ -58,15 +69,16 @@ def parted(
         for spot in left:
             count = 1 + len(found.get(spot, ()))
             lost_area = spot.zone.area_mm2 >= left[spot] + zone.area_mm2 / 2
-            reach = min(least, gate_mm + radius_mm(spot.zone.area_mm2))
-            if (lost_area or count < len(spot.members)) and (distance := apart(spot, zone)) <= reach:
+            reach = min(least, gate_mm + REACH * radius_mm(spot.zone.area_mm2))
+            more = lost_area or (count < len(spot.members) and expects(spot, zone))
+            if more and (distance := apart(spot, zone)) <= reach:
                 best, least = spot, distance
         if best is not None:
             found.setdefault(best, []).append(zone)
             left[best] += zone.area_mm2
             free.remove(zone)
     for spot in list(lost):
-        near = [zone for zone in free if apart(spot, zone) <= gate_mm + radius_mm(spot.zone.area_mm2)]
+        near = [zone for zone in free if apart(spot, zone) <= gate_mm + REACH * radius_mm(spot.zone.area_mm2)]
         if len(near) > 1 and spot.zone.area_mm2 >= MOST * math.fsum(zone.area_mm2 for zone in near):
             found[spot] = near
             lost.remove(spot)
@@ -98,28 +110,49 @@ def _rank(member: Member) -> tuple[float, int]:
     return -member.area_mm2, member.id
 
 
-def shared_out(spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None) -> list[tuple[Zone, list[Member]]]:
-    """The zones a spot came apart into, each with its contacts: one each as far as they go, the rest where they are
-    nearest; none for a zone that begins a contact."""
-    ahead_x, ahead_y = spot.ahead(time_us)
+def _ways(spot: Spot, time_us: int) -> tuple[float, ...]:
+    """For how many seconds its contacts may have gone on against each other: not at all, when they came together and
+    went back, or since they came together, when they pass."""
     passed_s = (time_us - spot.joined_us) / 1e6
+    return (0.0, passed_s) if len(spot.members) > 1 and 0 < passed_s <= PASSING_S else (0.0,)
 
-    def distance(member: Member, zone: Zone, seconds: float) -> float:
-        x, y = place(zone)
-        moved_x, moved_y = member.dx + member.vx * seconds, member.dy + member.vy * seconds
-        return math.hypot(across(x - ahead_x - moved_x, around_mm), y - ahead_y - moved_y)
 
-    # Either they came together and went back, or they went on past each other.
+def _off(spot: Spot, member: Member, zone: Zone, seconds: float, time_us: int, around_mm: float | None) -> float:
+    """From where a contact of a spot would be, having gone on for so long, to a zone, in mm."""
+    x, y = place(zone)
+    ahead_x, ahead_y = spot.ahead(time_us)
+    dx, dy = member.dx + member.vx * seconds, member.dy + member.vy * seconds
+    return math.hypot(across(x - ahead_x - dx, around_mm), y - ahead_y - dy)
+
+
+def expected(spot: Spot, zone: Zone, time_us: int, around_mm: float | None, gate_mm: float) -> bool:
+    """Whether one of several contacts of a spot would be where a zone is new."""
+    return len(spot.members) > 1 and any(
+        _off(spot, one, zone, seconds, time_us, around_mm) <= REACH * gate_mm
+        for seconds in _ways(spot, time_us)
+        for one in spot.members
+    )
+
+
+def shared_out(
+    spot: Spot, zones: list[Zone], time_us: int, around_mm: float | None, gate_mm: float
+) -> list[tuple[Zone, list[Member]]]:
+    """The zones a spot came apart into, each with its contacts: one each where they would be, the largest with most
+    right to it, the rest where they are nearest; none for a zone that begins a contact."""
+    far = 1 + spot.area_mm2 * REACH * gate_mm  # more than any pairing costs: whoever can have a zone has one
     ways = []
-    for seconds in (0.0, passed_s) if 0 < passed_s <= PASSING_S and len(spot.members) > 1 else (0.0,):
-        costs = [[distance(member, zone, seconds) for zone in zones] for member in spot.members]
-        far = 1 + math.fsum(map(math.fsum, costs))  # whoever can have a zone has one
+    for seconds in _ways(spot, time_us):
+        off = [[_off(spot, one, zone, seconds, time_us, around_mm) for zone in zones] for one in spot.members]
+        costs = [
+            [one.area_mm2 * distance if distance <= REACH * gate_mm else math.inf for distance in line]
+            for one, line in zip(spot.members, off)
+        ]
         chosen = assign(costs, far)
-        total = math.fsum(line[column] for line, column in zip(costs, chosen) if column is not None)
-        ways.append((total, costs, chosen))
-    _, costs, chosen = min(ways, key=lambda way: way[0])
+        total = math.fsum(far if column is None else line[column] for line, column in zip(costs, chosen))
+        ways.append((total, off, chosen))
+    _, off, chosen = min(ways, key=lambda way: way[0])
     found: list[list[Member]] = [[] for _ in zones]
-    for member, line, column in zip(spot.members, costs, chosen):
+    for member, line, column in zip(spot.members, off, chosen):
         found[line.index(min(line)) if column is None else column].append(member)
     for members in found:
         members.sort(key=_rank)

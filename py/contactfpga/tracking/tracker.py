@@ -93,7 +93,7 @@ class Tracker:
         if lost:
             merges = joins.merged(pairs, lost, free, self._apart, self._gate_mm)
         if free and self._spots:
-            parts = joins.parted(pairs, lost, free, merges, self._apart, self._gate_mm)
+            parts = joins.parted(pairs, lost, free, merges, self._apart, self._expects, self._gate_mm)
         self._spots = [spot for spot in lost if self._held(spot, "overflow" in zones.flags)]
         for spot, zone in pairs:
             self._go_on(spot, zone, merges.get(spot), parts.get(spot))
@@ -136,6 +136,9 @@ class Tracker:
         """From where a spot would be to a zone, in mm."""
         return self._distance(*spot.ahead(self._time_us), zone)
 
+    def _expects(self, spot: Spot, zone: Zone) -> bool:
+        return joins.expected(spot, zone, self._time_us, self._around_mm, self._gate_mm)
+
     # ---- what becomes of a spot
 
     def _go_on(self, spot: Spot, zone: Zone, merged: list[Spot] | None, split: list[Zone] | None) -> None:
@@ -156,7 +159,7 @@ class Tracker:
 
     def _part(self, spot: Spot, zones: list[Zone]) -> None:
         first = spot.members[0].id
-        for zone, members in joins.shared_out(spot, zones, self._time_us, self._around_mm):
+        for zone, members in joins.shared_out(spot, zones, self._time_us, self._around_mm, self._gate_mm):
             if not members:
                 members = [self._begin(zone, (first,))]
             self._spots.append(joins.piece(spot, zone, members, self._time_us, self._around_mm))

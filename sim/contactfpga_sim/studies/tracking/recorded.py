@@ -1,5 +1,6 @@
 """Recordings of real sheets. Who touched them is not known, but zones of two frames that share most cells are one
-contact; trackers see barycenters and areas only."""
+contact, and one that comes out of another where it went in is the same again; trackers see barycenters and areas only.
+"""
 
 from __future__ import annotations
 
@@ -39,22 +40,57 @@ def histories(path: Path, every: int) -> list[list[Shown]]:
 
 
 def _linked(frames: np.ndarray, skin: Skin, step_us: float) -> Iterator[Shown]:
-    """Each zone goes on as the one of the frame before that it shares most cells with, the largest share first."""
-    before, names, fresh = np.zeros(frames.shape[1:], int), {}, 0
+    """The frames, with a name for each zone."""
+    linker = _Linker(frames.shape[1:])
     for number, cells in enumerate(frames):
         zones, labels = zones_of(cells, round(number * step_us), skin)
-        both = (before > 0) & (labels > 0)
-        shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
-        now: dict[int, int] = {}
-        for old, new in shares.T[np.argsort(-counts, kind="stable")].tolist():
-            if new not in now and names[old] not in now.values():
-                now[new] = names[old]
-        for new in range(1, labels.max(initial=0) + 1):
-            if new not in now:
-                now[new], fresh = fresh, fresh + 1
         truth: dict[int, Place] = {}
-        for new, name in now.items():
+        for new, name in linker.take(labels).items():
             y, x = np.nonzero(labels == new)
             truth[name] = float(x.mean() * skin.pitch_x_mm), float(y.mean() * skin.pitch_y_mm)
         yield Shown(zones, truth, ())
-        before, names = labels, now
+
+
+class _Linker:
+    """Names zones by the cells they share."""
+
+    def __init__(self, size: tuple[int, ...]):
+        self._before = np.zeros(size, int)
+        self._names: dict[int, int] = {}
+        self._inside: dict[int, dict[int, np.ndarray]] = {}
+        """By a name: the zones that went into its own, with their last cells."""
+        self._fresh = 0
+
+    def take(self, labels: np.ndarray) -> dict[int, int]:
+        """The name of each label: that of the zone of the frame before that it shares most cells with, the largest
+        share first; of a zone that went into another one, when it comes out again where it was; or a new one."""
+        before, both = self._before, (self._before > 0) & (labels > 0)
+        shares, counts = np.unique(np.stack([before[both], labels[both]]), axis=1, return_counts=True)
+        ranked = shares.T[np.argsort(-counts, kind="stable")].tolist()
+        now: dict[int, int] = {}
+        for old, new in ranked:
+            if new not in now and self._names[old] not in now.values():
+                now[new] = self._names[old]
+        self._remember(ranked, now)
+        for new in range(1, labels.max(initial=0) + 1):
+            if new not in now:
+                now[new] = self._again(labels == new, {self._names[old] for old, other in ranked if other == new})
+        self._before, self._names = labels, now
+        return now
+
+    def _remember(self, ranked: list[list[int]], now: dict[int, int]) -> None:
+        kept = {name: self._inside.get(name, {}) for name in now.values()}
+        for old, new in ranked:
+            name = self._names[old]
+            if name not in kept:  # its zone is another one's now, and so are those that went into it
+                kept[now[new]] |= {name: self._before == old, **self._inside.get(name, {})}
+        self._inside = kept
+
+    def _again(self, cells: np.ndarray, of: set[int]) -> int:
+        places = {(outer, name): int((cells & was).sum()) for outer in of for name, was in self._inside[outer].items()}
+        best = max(places, key=places.__getitem__, default=None)
+        if best is not None and places[best]:
+            del self._inside[best[0]][best[1]]
+            return best[1]
+        self._fresh += 1
+        return self._fresh - 1
