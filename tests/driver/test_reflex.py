@@ -50,9 +50,8 @@ def test_it_stops_within_a_scan_of_a_touch():
 
 def test_it_steps_every_millisecond():
     _, steps, _ = run(SendingPort(touch_s=0.1))
-    assert [b - a for a, b in itertools.pairwise(steps)] == [pytest.approx(0.001, abs=2 * SCAN_US / 1e6)] * (
-        len(steps) - 1
-    )
+    between = [b - a for a, b in itertools.pairwise(steps)]
+    assert between == [pytest.approx(0.001, abs=2 * SCAN_US / 1e6)] * (len(steps) - 1)
     assert len(steps) == pytest.approx(100, abs=2)
 
 
