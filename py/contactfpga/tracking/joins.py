@@ -9,6 +9,9 @@ from contactfpga.tracking.assignment import assign
 from contactfpga.tracking.spot import PASSING_S, Member, Spot, across, place, radius_mm
 from contactfpga.zones.zone import Zone
 
+FASTER = (1.0, 1.5, 2.0)
+"""How many times as fast as measured two may pass each other: a smoothed speed comes after the contact's."""
+
 Apart = Callable[[Spot, Zone], float]
 """From where a spot would be to a zone, in mm."""
 
@@ -111,10 +114,12 @@ def _rank(member: Member) -> tuple[float, int]:
 
 
 def _ways(spot: Spot, time_us: int) -> tuple[float, ...]:
-    """For how many seconds its contacts may have gone on against each other: not at all, when they came together and
-    went back, or since they came together, when they pass."""
+    """For how many seconds at their measured speeds its contacts may have gone on against each other: for none, when
+    they came together and went back, or since they came together, when they pass."""
     passed_s = (time_us - spot.joined_us) / 1e6
-    return (0.0, passed_s) if len(spot.members) > 1 and 0 < passed_s <= PASSING_S else (0.0,)
+    if len(spot.members) == 1 or not 0 < passed_s <= PASSING_S:
+        return (0.0,)
+    return 0.0, *(passed_s * faster for faster in FASTER)
 
 
 def _off(spot: Spot, member: Member, zone: Zone, seconds: float, time_us: int, around_mm: float | None) -> float:

@@ -8,7 +8,7 @@ import math
 from contactfpga.tracking.tracks import Track
 from contactfpga.zones.zone import Zone
 
-SETTLING_S, SMOOTH_S = 0.004, 0.02
+SETTLING_S, SMOOTH_S = 0.004, 0.015
 """Over how long a speed is smoothed: half the spot's age, within these. A barycenter jumps when a cell opens or closes,
 and frames follow one another so fast that the jump alone would be meters per second."""
 
