@@ -126,6 +126,12 @@ def test_breaks_have_their_closed_forms():
         assert turned.breaks_at == hold
 
 
+def test_two_fingers_share_a_zone_from_the_distance_that_the_page_says():
+    run = breaks.MEET.runs["`Tracker`"]
+    assert [run(22.0).told, run(20.0).told] == [(), ("merge",)]
+    assert "their middles are 20 mm apart or less" in PAGE.read_text(encoding="utf-8")
+
+
 def test_ten_thousand_frames_per_second_with_two_contacts():
     """Of processor time, so that nothing else counts; a slower machine decodes slower, too."""
     found = speed.measure(2, 2048)

@@ -145,7 +145,7 @@ CROSS = Study(
     amount="ids",
     values=tuple(float(value) for value in range(40, -2, -2)),
     runs=_runs(_crosses),
-    helps="nobody can tell two that pass head on from two that meet and go back",
+    helps="head on, only how long they share a zone tells passing from going back",
 )
 
 
