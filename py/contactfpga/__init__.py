@@ -24,6 +24,8 @@ from contactfpga.errors import (
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Event, Track, Tracks
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
@@ -42,6 +44,7 @@ __all__ = [
     "BoardClosed",
     "BoardSilent",
     "ContactFPGAError",
+    "Event",
     "Events",
     "Faults",
     "Hello",
@@ -64,6 +67,9 @@ __all__ = [
     "Stats",
     "Subscription",
     "Suspicion",
+    "Track",
+    "Tracker",
+    "Tracks",
     "VersionMismatch",
     "Watch",
     "Zone",
