@@ -73,11 +73,11 @@ LOCKSTEP = [
 def test_the_whole_board_is_the_golden_models_in_every_clock(rng, soon, fields):
     """Self-tests are asked for at any time: at the start, in frames, in each other, while switches are pressed."""
     skin = small(**fields, self_test=True)
-    cycles = 2250 * facts(skin).bit_clocks  # a hello is over, and slots go out
+    cycles = 2250 * facts(skin).bit_clocks  # hellos are over, and slots go out
     timeline = any_life(rng, skin, cycles)
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 150
-    assert slots_in(skin, expected.bytes) > 1
+    assert slots_in(skin, expected.bytes) > 3 or facts(skin).bit_clocks > 2  # slower lines are busy with hellos
 
 
 @pytest.mark.campaign
