@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -113,6 +113,12 @@ maker-page: $(VENV)/.stamp-sim ## write the tables of docs/maker.md and its sche
 
 safety-page: $(VENV)/.stamp-sim | compiler ## put every electrical fault into the sheet, and write docs/safety.md (some minutes)
 	$(PY) -m contactfpga_sim.pages.safety_page docs/safety.md
+
+haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of units, and write docs/haptics.md and its picture (some minutes)
+	$(PY) -m contactfpga_sim.pages.haptics_page docs/haptics.md docs/images
+
+tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
+	$(PY) -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

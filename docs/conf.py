@@ -19,6 +19,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 exclude_patterns = ["_build"]
 nitpicky = False
+suppress_warnings = ["ref.python"]  # types such as bytes are looked up among attributes of that name, too
 smartquotes = False  # would make a dash that no shell takes of the -- in --host-us
 
 

@@ -3,6 +3,8 @@
 from amaranth.lib import data
 
 from contactfpga.skin.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
+from contactfpga.wire.faults import SLOT_DIGITS
+from contactfpga.wire.framing import DIGIT_BITS
 
 
 def row_layout(derived: Derived) -> data.StructLayout:
@@ -64,6 +66,12 @@ def faults_layout(derived: Derived) -> data.StructLayout:
     skin = derived.skin
     lines = {"rows": skin.rows, "columns": skin.columns, "stuck": skin.column_lines} if skin.guard else {}
     return data.StructLayout(lines | ({"joined": 1} if skin.self_test else {}))
+
+
+def slots_layout(derived: Derived) -> data.StructLayout:
+    """A slot of the self-test: its number, and the rows and columns that read released."""
+    skin = derived.skin
+    return data.StructLayout({"number": DIGIT_BITS * SLOT_DIGITS, "rows": skin.rows, "columns": skin.columns})
 
 
 def summary_layout(derived: Derived) -> data.StructLayout:

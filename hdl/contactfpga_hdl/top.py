@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
+from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
 from contactfpga_hdl.dual import Dual
 from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
@@ -21,6 +21,7 @@ from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
 from contactfpga_hdl.scan.pins import column_pins, connect_lines, connect_pins, row_pins
+from contactfpga_hdl.scan.sample_at import moves_sample
 from contactfpga_hdl.units.ports import unit_pins
 from contactfpga_hdl.units.units import Units
 
@@ -96,6 +97,9 @@ class Top(wiring.Component):
         self._watch_faults(m, scan, packer, units)
         if "faults" in link.signature.members:
             m.d.comb += link.faults.eq(scan.faults)
+        if self.skin.self_test:
+            wiring.connect(m, scan.slots, link.slots)
+            m.d.comb += scan.command.eq(request.command & (request.what == SELF_TEST))
         m.d.comb += [
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
@@ -109,6 +113,8 @@ class Top(wiring.Component):
             link.asked.eq(request.received & request.hello),
             link.number.eq(request.number),
         ]
+        if moves_sample(self.derived):
+            m.d.comb += [scan.moves.eq(request.command & (request.what == SAMPLE_AT)), scan.clocks.eq(request.value)]
         if self.derived.scan.waits:
             m.d.comb += [
                 scan.packed.eq(_packed(packer)),

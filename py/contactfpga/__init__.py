@@ -24,9 +24,12 @@ from contactfpga.errors import (
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Event, Track, Tracks
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.suspicion import Suspicion
 from contactfpga.zones.units import UnitHistory, UnitSamples
 from contactfpga.zones.watch import Watch
@@ -42,6 +45,7 @@ __all__ = [
     "BoardClosed",
     "BoardSilent",
     "ContactFPGAError",
+    "Event",
     "Events",
     "Faults",
     "Hello",
@@ -54,6 +58,7 @@ __all__ = [
     "PortNotFound",
     "ReadTimeout",
     "ReplayEnded",
+    "SelfTest",
     "SelfTestSlot",
     "Sheet",
     "Silence",
@@ -63,6 +68,9 @@ __all__ = [
     "Stats",
     "Subscription",
     "Suspicion",
+    "Track",
+    "Tracker",
+    "Tracks",
     "UnitHistory",
     "UnitSamples",
     "VersionMismatch",

@@ -20,7 +20,7 @@ from contactfpga_sim.studies import pool
 from contactfpga_sim.studies.arm import report
 
 ROOT = Path(__file__).resolve().parents[2]
-LIMIT_S = 20
+LIMIT_S = 60
 
 pytestmark = pytest.mark.timeout(LIMIT_S)
 

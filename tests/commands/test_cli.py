@@ -202,6 +202,42 @@ def test_zones_of_a_recording_until_its_end(board, tmp_path, run):
     assert "30 frames" in out
 
 
+def recorded_touches(board, path):
+    """Two touches, one after the other, the second beside the first."""
+    parts = [board.hello()]
+    for moments in ([], [(4, 10, 6)], [(4, 10, 6), (4, 40, 30)], [(4, 12, 6), (4, 40, 30)], [(4, 40, 30)]):
+        board.moments = moments
+        parts += [board.frame() for _ in range(100)]
+    path.write_bytes(b"".join(parts))
+
+
+def test_zones_with_tracks_as_json_has_ids_and_events(board, tmp_path, run):
+    recorded_touches(board, tmp_path / "touches.rec")
+    status, out, errors = run("zones", "--tracks", "--json", f"replay://{tmp_path / 'touches.rec'}")
+    assert (status, errors) == (0, "")
+    frames = [json.loads(line) for line in out.splitlines()]
+    said = [(event["kind"], event["id"]) for one in frames for event in one["events"]]
+    assert said == [("down", 1), ("down", 2), ("move", 1), ("up", 1)]
+    assert [[track["id"] for track in frames[number]["tracks"]] for number in (50, 150, 250, 350, 499)] == [
+        *([], [1], [1, 2], [1, 2], [2]),
+    ]
+    assert all(one.keys() >= {"zones", "unsure", "restarted"} for one in frames)
+
+
+def test_zones_with_tracks_follows_frames_that_are_not_shown(board, tmp_path, run):
+    recorded_touches(board, tmp_path / "touches.rec")
+    status, out, _ = run("zones", "--tracks", f"replay://{tmp_path / 'touches.rec'}")
+    assert status == 0
+    (line,) = [line for line in out.splitlines() if "400" in line]
+    assert re.search(r"│ +2 │ +4 │ 400 │", line)
+
+
+def test_zones_without_tracks_has_no_ids(board, run):
+    status, out, _ = run("zones", "--once", "--json", "--timeout", 30, board.path)
+    assert status == 0
+    assert not json.loads(out).keys() & {"tracks", "events"}
+
+
 def test_zones_records(board, tmp_path, run):
     file = tmp_path / "frames.bin"
     run("zones", "--once", "--json", "--record", file, "--timeout", 30, board.path)

@@ -13,7 +13,7 @@ from terminals import OnTerminal
 
 from contactfpga import Skin, cli
 
-SKIN = Skin(rows=4, columns=4, report="cells", settle_us=20.0)
+SKIN = Skin(rows=4, columns=4, report="cells", settle_us=20.0, precharge_us=0.5)
 RATE_HZ = 2500.0
 
 

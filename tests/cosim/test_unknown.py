@@ -39,6 +39,7 @@ SKINS = {
     "cells": SMALL.replace(report="cells", diodes="row2col", send="on_change", keep_alive_ms=0.3),
     "precharge": SMALL.replace(diodes="row2col", precharge_us=0.5),
     "reversal": SMALL.replace(**REVERSAL),
+    "self-test": SMALL.replace(**REVERSAL, self_test=True),
     "reversal, cells": SMALL.replace(**REVERSAL, report="cells", diodes="row2col", send="on_change"),
 }
 

@@ -226,6 +226,20 @@ def test_a_board_that_lacks_a_command_says_what_to_do():
                 board.command(what, value)
 
 
+def test_the_sample_is_moved_by_a_command():
+    port = DirectPort(contactfpga.Skin(report="cells"))
+    with contactfpga.open(port) as board:
+        sequence = board.next().sequence
+        assert board.sample_at(17).sequence == sequence + 1
+        board.sample_at()
+        assert port.commanded == [(2, 17), (2, 0)]
+        with pytest.raises(ValueError, match="value of a command is -1"):
+            board.sample_at(-1)
+    with contactfpga.open(DirectPort(contactfpga.Skin())) as board:
+        with pytest.raises(contactfpga.NoSuchCommand, match='no sample at; build its Skin with report = "cells" and'):
+            board.sample_at(17)
+
+
 class Lossy(DirectPort):
     """Loses what the host sends, or its answers."""
 

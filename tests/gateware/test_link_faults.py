@@ -47,7 +47,8 @@ def predicted(skin, frames, changes, asked, cycles):
         told.change(cycle, word)
     link = Link(facts(skin), State(facts(skin), [], Heard([], [])), told)
     decided = [taken for taken, _ in decisions(skin, frames, None)]
-    for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[23::24])]):
+    period = facts(skin).hello_slots // facts(skin).row_lines
+    for cycle in sorted([0, *(cycle + 1 for cycle in asked), *(cycle + 1 for cycle in decided[period - 1 :: period])]):
         link.want_hello(cycle)
     overwritten = 0
     for frame, taken in zip(frames, decided, strict=True):

@@ -314,11 +314,13 @@ def predicted_times(skin):
     return [scan.time_us for scan in scans(facts(skin), Timeline([]), [], 5)]
 
 
-def test_a_request_while_columns_are_loaded_or_shifted_asks_for_the_next_frame(bench):
-    skin = skin_of((2, 1), (9, 1), settle_us=4.0, release_us=1.0)
+@pytest.mark.parametrize("report", ["moments", "cells"])
+def test_a_request_while_columns_are_loaded_or_shifted_asks_for_the_next_frame(bench, report):
+    """Where a command may move the sample, also one in the slot."""
+    skin = skin_of((2, 1), (9, 1), settle_us=4.0, release_us=1.0, report=report)
     t = times(skin)
     cells = [[0, 0]] * slots(skin, 8)
-    load = t.first + 2 * t.slot + t.settle - 1 - t.bit  # of frame 1
+    load = t.first + 2 * t.slot + (0 if report == "cells" else t.settle - 1 - t.bit)  # of frame 1
     strobe = load + t.bit + 2 + t.late
     for at, frame in ((load - 1, 1), (load, 2), (load + 1, 2), (strobe - 1, 2), (strobe, 2), (strobe + 1, 2)):
         tags = run(bench, skin, cells, requests={at}).tags

@@ -41,7 +41,9 @@ def loaded_by(module: str) -> set[str]:
     return set(run.stdout.split()) - sys.stdlib_module_names
 
 
-@pytest.mark.parametrize("module", ["contactfpga", project()["scripts"]["contactfpga"].partition(":")[0]])
+@pytest.mark.parametrize(
+    "module", ["contactfpga", "contactfpga.haptics", project()["scripts"]["contactfpga"].partition(":")[0]]
+)
 def test_host_loads_only_its_dependencies(module):
     direct = {normal(requirement) for requirement in project()["dependencies"]}
     provided = importlib.metadata.packages_distributions()

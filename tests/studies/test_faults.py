@@ -11,7 +11,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga_sim.pages import safety_page, writer
 from contactfpga_sim.sheet import guards
 from contactfpga_sim.studies.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.studies.faults import study, trial
+from contactfpga_sim.studies.faults import start, study, trial
 from contactfpga_sim.studies.faults.catalogue import FAULTS
 from contactfpga_sim.studies.faults.hurt import Hurt
 from contactfpga_sim.studies.faults.study import Place
@@ -154,3 +154,13 @@ def test_the_page_lists_every_fault_and_every_option():
 def test_the_page_is_up_to_date():
     text = PAGE.read_text(encoding="utf-8")
     assert writer.update(text, safety_page.TABLES) == text
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("fault", ["shorted diode", "shorted rows", "shorted columns"])
+def test_a_self_test_at_power_up_tells_joined_lines_and_shorted_diodes(fault):
+    times = list(start.found(fault).values())
+    assert len(times) > 10
+    assert None not in times
+    assert max(times) < start.clocks(start.TESTED) / Derived(start.TESTED).clocks_per_us < 100
+    assert start.told_us(Hurt()) is None

@@ -64,14 +64,14 @@ class ModelBoard:
         *packets, self._heard_bytes = (self._heard_bytes + data).split(b"\0")
         found = taken_in(packets)
         for number, _, command in found:
-            if command is None or self.wire.skin.self_test:
+            if command is None or self.wire.commands:
                 self.heard = number
                 self.commanded += [] if command is None else [command]
         return [one[:2] for one in found]
 
     def _hear_pulses(self, data) -> list:
         self._heard_bytes += data
-        found = heard([(0, self._heard_bytes)], self.wire.known.bit_clocks, self.wire.skin.self_test)
+        found = heard([(0, self._heard_bytes)], self.wire.known.bit_clocks, bool(self.wire.commands))
         self.commanded = [one.command for one in found.requests if one.command is not None]
         new = [(one.number, one.hello) for one in found.requests][self._taken :]
         self._taken += len(new)

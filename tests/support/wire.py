@@ -148,13 +148,18 @@ class Wire:
         facts[RATES] = struct.pack("<II", skin.clock_hz, skin.baud)
         if skin.name:
             facts[NAME] = skin.name.encode()
-        commands = b"\x01" * skin.self_test + (b"\x03\x04" if skin.units else b"")
-        if commands:
+        if commands := self.commands:
             facts[COMMANDS] = commands
         if skin.units:  # an MCP3208 at 3.3 V, without sums: 20 clocks of 1 MHz for each
             clocks = 20 * skin.clock_hz // 1_000_000
             facts[UNITS] = struct.pack("<BBBBHI", skin.units, 12, 0, 0, clocks, clocks * skin.units)
         return facts
+
+    @property
+    def commands(self) -> bytes:
+        """Numbers of the commands that its board takes: a self-test, "sample at", and those of units without sums."""
+        moves = self.skin.report == "cells" and self.skin.scan != "adaptive"
+        return b"\x01" * self.skin.self_test + b"\x02" * moves + b"\x03\x04" * bool(self.skin.units)
 
     def hello_fields(self, *, sent=0, epoch=0, heard=0, stuck=0, facts=None) -> list:
         """The fields of a hello, as bytes, in order."""

@@ -11,7 +11,7 @@ from amaranth.lib.wiring import Out
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
 from contactfpga_hdl.board.clock import PllClock
-from contactfpga_hdl.scan.pins import column_pins, row_pins
+from contactfpga_hdl.scan.pins import column_pins, drives_columns_both_ways, row_pins
 from contactfpga_hdl.top import Top
 from contactfpga_hdl.units.ports import unit_pins
 
@@ -78,17 +78,18 @@ class BoardTop(Elaboratable):
         return "o" if self._sheet[name].flow == Out else "i"
 
     def _connect_both_ways(self, m: Module, name: str, port: io.SingleEndedPort, core: Top) -> None:
-        """A buffer per line, each with its own output enable. Without guard lines columns are driven to the released
-        level only."""
+        """A buffer per line, each with its own output enable. Without guard lines and self-test columns are driven to
+        the released level only."""
         levels, read = (core.rows, core.rows_read) if name == "rows" else (self._column_levels(core), core.columns)
         for line, (level, drive) in enumerate(zip(levels, getattr(core, f"{name}_drive"), strict=True)):
             m.submodules[f"{name}_{line}"] = buffer = io.Buffer("io", port[line])
             m.d.comb += [buffer.o.eq(level), buffer.oe.eq(drive), read[line].eq(buffer.i)]
 
     def _column_levels(self, core: Top) -> Value:
-        if not self.skin.guard:
+        if not drives_columns_both_ways(self.skin):
             return Const(-int(self.skin.selects_low), self.skin.columns)
-        return Cat(core.columns_level.replicate(self.skin.columns), ~core.columns_level)
+        level = core.columns_level.replicate(self.skin.columns)
+        return Cat(level, ~core.columns_level) if self.skin.guard else level
 
     def _connect_floating(self, m: Module, port: io.SingleEndedPort, rows: Value) -> None:
         for row in range(self.skin.rows):

@@ -1,20 +1,14 @@
 """What the board tells of its lines, byte by byte: reports of faults, and slots of its self-test (docs/protocol.md)."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
-from amaranth.lib import data, memory, stream, wiring
+from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import faults
 from contactfpga.wire.framing import DIGIT_BITS, cobs_encode
-from contactfpga_hdl.payloads import faults_layout
-
-
-def slots_layout(derived: Derived) -> data.StructLayout:
-    """What the self-test read in a slot: its number, and the rows and columns that read as selected."""
-    skin = derived.skin
-    return data.StructLayout({"number": DIGIT_BITS * faults.SLOT_DIGITS, "rows": skin.rows, "columns": skin.columns})
+from contactfpga_hdl.payloads import faults_layout, slots_layout
 
 
 class Reporter(wiring.Component):

@@ -8,10 +8,10 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, HELLO_BIT, KEEP_ALIVE_BIT, TIME_BITS, Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.units import plain_bytes
-from contactfpga_hdl.link.faults import Reporter, slots_layout
+from contactfpga_hdl.link.faults import Reporter
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
-from contactfpga_hdl.payloads import faults_layout, summary_layout, tag_layout
+from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
 from contactfpga_hdl.units.pack import packet_signature
 
 HELLO_REGION = 3

@@ -32,13 +32,18 @@ def column_pins(skin: Skin) -> dict[str, wiring.Member]:
     """The pins that read the columns: one per column, or those of the shift registers with one ``column_data`` per
     chain. With precharge columns are driven to the released level while ``columns_drive``, bit by bit.
 
-    A scan that reads the rows of a sheet with guard lines drives columns to ``columns_level``, and the guard column,
-    the last one, to the other level.
+    A scan that reads the rows and has guard lines or a self-test drives columns to ``columns_level``, and a guard
+    column, the last one, to the other level.
     """
     if skin.precharge_us:
-        level = {"columns_level": Out(1, init=int(skin.selects_low))} if skin.guard and skin.reads_rows else {}
+        level = {"columns_level": Out(1, init=int(skin.selects_low))} if drives_columns_both_ways(skin) else {}
         return _read_pins(skin) | {"columns_drive": Out(skin.column_lines)} | level
     return _read_pins(skin)
+
+
+def drives_columns_both_ways(skin: Skin) -> bool:
+    """Whether columns are driven to either level."""
+    return skin.reads_rows and (skin.guard or skin.self_test)
 
 
 def _read_pins(skin: Skin) -> dict[str, wiring.Member]:

@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin.derived import HEARD_BITS, Derived
 from contactfpga_hdl.payloads import faults_layout, row_layout, tag_layout
 from contactfpga_hdl.scan.pins import column_pins, row_pins
+from contactfpga_hdl.scan.sample_at import sample_at_ports
 
 
 def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
@@ -31,4 +32,5 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
         "epoch": Out(1),
         "contact": Out(1),
         **({"faults": Out(faults)} if faults.size else {}),
+        **sample_at_ports(derived),
     }

@@ -9,6 +9,7 @@ from contactfpga_hdl.scan.guard import Told
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row
 from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
+from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
 
@@ -29,12 +30,18 @@ class _Slots:
     def is_last(self) -> Value:
         return self.following[self.first] & self.scans
 
+    @property
+    def begins_rows(self) -> Value:
+        """In the first clock of row 0."""
+        return self.following[1 % len(self.following)] & (self.clock == 0)
+
 
 class _Sample:
     """The columns as they were sampled, and of which row."""
 
     def __init__(self, derived: Derived):
         self.begins = Signal()  # the next one, of a row
+        self.early = Const(0)  # before the settle time is over
         skin = derived.skin
         self.of_driven = Signal()  # high for a clock: it is there, and was taken while a row was driven
         self.of_row = Signal()  # and this is one of the sheet's rows
@@ -53,6 +60,9 @@ class Scanner(wiring.Component):
     A row's columns are sampled in the last clock it is driven. The row is offered three clocks later (two synchronizer
     stages and the row register), and later by what its columns take on shift registers. With ``guard`` a frame begins
     with the guard row, which is not offered.
+
+    On the command "sample at" rows are sampled earlier, and all else happens when it always does. The guard row is not,
+    and the others then say nothing of the guard column.
 
     pins: those of the row driver and of the column reader.
     rows (out): rows in ascending order.
@@ -81,8 +91,8 @@ class Scanner(wiring.Component):
         connect_pins(m, reader.pins, self.pins)
         slots, sample = _Slots(self.derived), _Sample(self.derived)
         self._drive_rows(m, slots, driver)
-        self._sample_columns(m, slots, reader, sample)
-        self._mask_row(m, reader.levels, sample)
+        levels = self._sample_columns(m, slots, reader, sample)
+        self._mask_row(m, levels, sample)
         self._offer_row(m, sample)
         self._watch_contact(m, sample)
         time = self._tag_frame(m, slots, sample)
@@ -113,8 +123,9 @@ class Scanner(wiring.Component):
             driver.release.eq(slots.clock == derived.settle_clocks - 1),
         ]
 
-    def _sample_columns(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> None:
-        """A slot has two samples: in the last clock its row is driven, and in the last one that no row is."""
+    def _sample_columns(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> Value:
+        """A slot has two samples: in the last clock its row is driven, and in the last one that no row is. Returns the
+        levels of what was sampled."""
         derived = self.derived
         lead = derived.column_load_clocks + 1
         begins_released = Signal()
@@ -122,10 +133,9 @@ class Scanner(wiring.Component):
         # None is under way when a row's begins.
         alone = self.skin.column_read == "direct" and derived.settle_clocks > 2
         m.d.comb += [
-            sample.begins.eq(slots.scans & (slots.clock == derived.settle_clocks - lead)),
+            sample.begins.eq(slots.scans & (slots.clock == self._sample_clock(m, slots, sample) - lead)),
             begins_released.eq(slots.scans & (slots.clock == derived.row_clocks - lead)),
             reader.begin.eq(sample.begins | begins_released),
-            sample.of_driven.eq(reader.done & done_is_row),
             sample.of_row.eq(sample.of_driven & ~sample.is_guard),
             sample.of_released.eq(reader.done & ~done_is_row),
         ]
@@ -134,6 +144,29 @@ class Scanner(wiring.Component):
             m.d.sync += sample.is_last.eq(slots.is_last)
         with m.If(sample.of_driven):
             m.d.sync += sample.row.eq(Mux(sample.is_last, slots.first, Mux(sample.is_guard, 0, sample.row + 1)))
+        if moves_sample(derived):
+            return self._keep_sample(m, slots, reader, sample)
+        m.d.comb += sample.of_driven.eq(reader.done & done_is_row)
+        return reader.levels
+
+    def _sample_clock(self, m: Module, slots: _Slots, sample: _Sample) -> Value | int:
+        """Of the next row, counted from 1."""
+        if not moves_sample(self.derived):
+            return self.derived.settle_clocks
+        chosen = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
+        sample.early = chosen.early
+        return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
+
+    def _keep_sample(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> Value:
+        """What was sampled early counts when it always does."""
+        derived = self.derived
+        counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
+        due, kept = Signal(name="sample_due"), Signal.like(reader.levels)
+        m.d.comb += sample.of_driven.eq(due & (slots.clock == counts))
+        m.d.sync += due.eq(due & ~sample.of_driven | sample.begins)
+        with m.If(reader.done):
+            m.d.sync += kept.eq(reader.levels)
+        return Mux(reader.done, reader.levels, kept)
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """While no row is driven, but for a clock after the last one and a clock before the next one."""
@@ -159,7 +192,7 @@ class Scanner(wiring.Component):
             told.rows.eq((~sample.read[-1]).replicate(skin.rows)),
             told.columns.eq(~sample.read),
             told.stuck.eq(stuck.seen),
-            told.checks_rows.eq(Mux(sample.of_row, Const(1, skin.rows) << sample.row, 0)),
+            told.checks_rows.eq(Mux(sample.of_row & ~sample.early, Const(1, skin.rows) << sample.row, 0)),
             told.checks_columns.eq(sample.of_driven & sample.is_guard),
             told.checks_stuck.eq(stuck.take),
             told.round.eq(stuck.take),
@@ -219,10 +252,12 @@ class Scanner(wiring.Component):
                 m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
         watch_epoch(m, time, self.epoch, late=ahead < 0)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
-        # What comes while columns are shifted in came after their sample: it asks for the next frame.
-        begins = (sample.begins if late else sample.of_row) & sample.is_first
+        # What comes while columns are shifted in came after their sample: it asks for the next frame. Where the sample
+        # moves so does what comes after the first clock.
+        moves = moves_sample(self.derived)
+        begins = slots.begins_rows if moves else (sample.begins if late else sample.of_row) & sample.is_first
         asked, heard_now = requested, heard
-        if not late:
+        if not late and not moves:
             asked, heard_now = Mux(begins, waiting, requested), Mux(begins, self.heard, heard)
         with m.If(begins):
             m.d.sync += [requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]

@@ -7,11 +7,11 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import TIME_BITS, Derived
-from contactfpga_hdl.scan.pins import DirectColumns
+from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways
 from contactfpga_hdl.scan.ports import scan_ports
 from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import watch_epoch
-from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, turned
+from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, tag_faults, turned
 from contactfpga_hdl.scan.reversal_rows import (
     clean_rows,
     offer_all_rows,
@@ -20,6 +20,8 @@ from contactfpga_hdl.scan.reversal_rows import (
     watch_motion,
 )
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
+from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
+from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
 from contactfpga_hdl.scan.stuck import count_columns, present
 from contactfpga_hdl.util.lowest import lowest
 
@@ -34,8 +36,8 @@ class ReversalScanner(wiring.Component):
     then. The guard column is driven to the selecting level in between, the guard row to the released one.
 
     Untouched rows are looked at in each clock, and no level changes. A row's columns are sampled in the last clock in
-    which it is driven; the row is offered three clocks later. The next row is not driven before this one is taken, and
-    the next frame does not begin before this one is packed.
+    which it is driven, or earlier on the command "sample at"; the row is offered three clocks later. The next row is
+    not driven before this one is taken, and the next frame does not begin before this one is packed.
 
     rows (out): the rows that were driven, in ascending order, and an empty row after one whose neighbor was not; an
     untouched sheet has one empty row. With ``report = "cells"`` all rows.
@@ -58,6 +60,7 @@ class ReversalScanner(wiring.Component):
         self.derived = Derived(skin)
         super().__init__(
             scan_ports(self.derived)
+            | (test_ports(self.derived) if skin.self_test else {})
             | {
                 "packed": In(1),
                 "time": Out(TIME_BITS),
@@ -72,8 +75,9 @@ class ReversalScanner(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         sheet, turn, checks = Sheet(self.skin), Turn(self.derived), Checks(self.derived)
+        test = SelfTest(self.skin) if self.skin.self_test else None
         self._read_sheet(m, sheet)
-        precharge = self._drive_sheet(m, sheet, turn, checks)
+        precharge = self._drive_sheet(m, sheet, turn, checks, test)
         self._take_turns(m, sheet, turn, checks)
         pressed = self._mask(m, sheet, turn)
         offer_rows = offer_driven_rows if self.derived.skips else offer_all_rows
@@ -84,8 +88,10 @@ class ReversalScanner(wiring.Component):
         if self.skin.guard:
             check_lines(m, self, sheet, turn, checks, precharge)
         else:
-            m.d.comb += self.tag.fault.eq(self.tag.stuck.any())
             m.d.comb += self.watched.eq(turned(m, self.time[CHECK_BIT]) & turn.rests)
+        if test is not None:
+            test_lines(m, self, sheet, turn, test)
+        tag_faults(m, self, turn)
         return m
 
     def _read_sheet(self, m: Module, sheet: Sheet) -> None:
@@ -104,24 +110,31 @@ class ReversalScanner(wiring.Component):
             sheet.clean.eq((touched & clean_rows(skin)).any()),
         ]
 
-    def _drive_sheet(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks) -> Precharge:
+    def _drive_sheet(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks, test: SelfTest | None) -> Precharge:
         """All pins come from registers; at power-up none is driven."""
         skin = self.skin
         m.submodules.precharge = precharge = Precharge(skin)
-        driven, begun = Signal(), Signal()
+        driven = Signal()
+        begun = Signal()
         m.d.sync += [driven.eq(~sheet.listens), begun.eq(turn.begins)]
         selected, drive, stuck = sheet.selected, driven.replicate(skin.rows), sheet.pressed
+        inverted, charged = Const(0, 1), precharge.pins
         if skin.guard:
             holds = Signal()  # from the first clock on
             inverted = Signal()
-            m.d.sync += [holds.eq(1), inverted.eq(sheet.inverts)]
-            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
+            m.d.sync += [holds.eq(~turn.tests), inverted.eq(sheet.inverts)]
             selected, drive = Cat(selected, sheet.guard), Cat(drive, holds)
             stuck = Mux(checks.of_guard, stuck & 1 << skin.columns, stuck[: skin.columns])
+        if test is not None:
+            rows_drive, columns_drive = test.pins()
+            selected, drive = selected | test.discharges.replicate(skin.row_lines), drive | rows_drive
+            inverted, charged = inverted | test.discharges, charged | columns_drive
+        if drives_columns_both_ways(skin):
+            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
         m.d.comb += [
             self.pins.rows.eq(~selected if skin.selects_low else selected),
             self.pins.rows_drive.eq(drive),
-            self.pins.columns_drive.eq(precharge.pins),
+            self.pins.columns_drive.eq(charged),
             turn.released.eq(turn.begins | turn.rests & turn.settled),
             precharge.drive.eq(sheet.charges),
             precharge.columns.eq(stuck),
@@ -154,6 +167,8 @@ class ReversalScanner(wiring.Component):
             sheet.selected.eq(0),
             sheet.guard.eq(0),
         ]
+        moves = moves_sample(derived)
+        moved = SampleAt(m, derived, self.moves, self.clocks, turn.begins) if moves else None
         with m.FSM(name="turn"):
             with m.State("LISTEN"):
                 m.d.comb += [
@@ -165,6 +180,10 @@ class ReversalScanner(wiring.Component):
                     m.d.sync += clock.eq(clock)
                     with m.If(turn.rests & touched):  # others may be about to be
                         m.d.sync += [turn.rests.eq(0), clock.eq(SYNCHRONIZED)]
+                    if self.skin.self_test:
+                        with m.Elif(turn.asked & ~turn.underway):
+                            m.d.comb += turn.lets_go.eq(1)
+                            m.next = "TEST"
                     if self.skin.guard:
                         with m.Elif(turn.rests & checks.asked):
                             checks.begin(m)
@@ -195,9 +214,13 @@ class ReversalScanner(wiring.Component):
                     sheet.selected.eq(Mux(checks.selects, 0, Const(1, self.skin.rows) << turn.y)),
                     sheet.guard.eq(checks.selects),
                 ]
+                sampled = due[0].eq(~checks.selects)
+                if moved is not None:
+                    with m.If(clock == moved.clock):
+                        m.d.sync += sampled
                 with m.If(clock == settle):
                     m.d.sync += [sheet.selected.eq(0), sheet.guard.eq(0), clock.eq(0)]
-                    m.d.sync += [due[0].eq(~checks.selects), checks.checked[0].eq(checks.selects)]
+                    m.d.sync += [*([sampled] if moved is None else []), checks.checked[0].eq(checks.selects)]
                     with m.If(turn.todo.any()):
                         m.next = "CHARGE"
                     with m.Else():
@@ -207,6 +230,12 @@ class ReversalScanner(wiring.Component):
                     m.d.comb += [sheet.charges.eq(1), sheet.listens.eq(1), sheet.inverts.eq(1)]
                     with m.If(clock == checks.clocks):
                         m.d.sync += [clock.eq(0), checks.checked[0].eq(1)]
+                        m.next = "LISTEN"
+            if self.skin.self_test:
+                with m.State("TEST"):
+                    m.d.comb += [sheet.listens.eq(1), turn.tests.eq(1)]
+                    with m.If(turn.tested):
+                        m.d.sync += clock.eq(0)
                         m.next = "LISTEN"
 
     def _end_frame(self, m: Module, checks: Checks) -> None:

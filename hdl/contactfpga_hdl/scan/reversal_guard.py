@@ -53,9 +53,7 @@ def check_lines(
         checks.of_rows.eq(checks.of_rows ^ checks.starts),
         checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts),
     ]
-    there, guard_reads, at_begin = checks.checked[1], sheet.pressed[-1], Signal()
-    counted = Signal(2)  # the last bit: the count of stuck columns is there in the next clock
-    m.d.sync += counted.eq(Cat(turn.begins, counted))
+    there, guard_reads = checks.checked[1], sheet.pressed[-1]
     m.d.comb += [
         checks.of_guard.eq(there & ~checks.of_rows),
         told.rows.eq(~sheet.read),
@@ -67,8 +65,15 @@ def check_lines(
         told.round.eq(checks.of_guard),
         told.turn.eq(precharge.turn),
         scan.faults.eq(told.faults),
-        scan.tag.fault.eq(scan.tag.stuck.any() | at_begin),
         scan.watched.eq(there & turn.rests),
     ]
-    with m.If(counted[1]):
-        m.d.sync += at_begin.eq(told.faults.as_value().any())
+
+
+def tag_faults(m: Module, scan: wiring.Component, turn: Turn) -> None:
+    """What a frame tells of faults is what is told when its count of stuck columns is there."""
+    at_begin, counted = Signal(), Signal(2)  # the last bit: that is so in the next clock
+    if "faults" in scan.signature.members:
+        m.d.sync += counted.eq(Cat(turn.begins, counted))
+        with m.If(counted[1]):
+            m.d.sync += at_begin.eq(scan.faults.as_value().any())
+    m.d.comb += scan.tag.fault.eq(scan.tag.stuck.any() | at_begin)

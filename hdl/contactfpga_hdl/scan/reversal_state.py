@@ -37,4 +37,8 @@ class Turn:
         self.following = Signal(row_bits(derived))  # of the next one
         self.strobe = Signal()  # high for a clock: the columns of that row are there
         self.waits = Signal()  # a row is on its way, or on offer
+        self.asked = Signal()  # a slot of the self-test is
+        self.lets_go = Signal()  # high for a clock: one begins
+        self.tests = Signal()  # it is under way
+        self.tested = Signal()  # high for a clock, its last one
         self.released = Signal()  # columns that read pressed in this clock are stuck

@@ -37,6 +37,8 @@ class Scan(Choice):
     stage can be too slow for it. Where zones are found it hands on the rows that it drove, with their numbers."""
     guards: bool = False
     """It looks at the guard lines of a Skin with ``guard``, and has the port ``faults``."""
+    moves_sample: bool = False
+    """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.sample_at.sample_at_ports`."""
     check: Callable[[Skin], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
     choice_clocks: Count
@@ -122,6 +124,7 @@ SCANS: dict[str, Scan] = {
             reads_rows=False,
             waits=False,
             guards=True,
+            moves_sample=True,
             check=lambda skin: None,
             choice_clocks=lambda derived: 0,
             max_frame_slots=lambda derived: derived.skin.row_lines,
@@ -151,6 +154,7 @@ SCANS: dict[str, Scan] = {
             reads_rows=True,
             waits=True,
             guards=True,
+            moves_sample=True,
             check=_check_reversal,
             choice_clocks=lambda derived: 0,
             max_frame_slots=lambda derived: math.ceil(derived.max_frame_clocks / derived.row_clocks),

@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Iterable
 
-from contactfpga.console import flags, numbers, terminal, watching
+from contactfpga.console import flags, numbers, self_testing, terminal, watching
 from contactfpga.driver import driver, health, ports
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
@@ -21,10 +21,12 @@ COUNTED_S = 1.0
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
-    long = "Seconds of device time over which frames are counted (default: 1) or watched (default: until Ctrl-C)."
+    long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, help=long)
     watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
     parser.add_argument("--watch", action="store_true", help=watch)
+    tested = "Have the board drive each line alone, again and again while you press every place; name joined lines."
+    parser.add_argument("--self-test", action="store_true", help=tested)
     stuck = "Seconds without a change after which a watch tells a pressed switch (default: 10)."
     parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="T", help=stuck)
     parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
@@ -32,10 +34,14 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
+    if args.watch and args.self_test:
+        raise ContactFPGAError("--watch and --self-test are two commands; give one of them")
     if args.watch:
         return watching.run(args)
     if args.stuck_s is not None:
         raise ContactFPGAError("--stuck-s is of a watch; add --watch")
+    if args.self_test:
+        return self_testing.run(args)
     report = _Report(silent=args.json)
     _look(args, report)
     if args.json:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import bouncing, flags, numbers
+from contactfpga.console import bouncing, flags, numbers, settling
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 
-HELP = "Show the pressed cells live, to check wiring and bounce."
+HELP = "Show the pressed cells live, to check wiring, bounce and settle times."
 EXTRA = None
 
 
@@ -18,6 +18,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.once(parser)
     bounce = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
     parser.add_argument("--bounce", action="store_true", help=bounce)
+    settle = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
+    parser.add_argument("--settle", action="store_true", help=settle)
     seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, help=seconds)
     parser.add_argument("--json", action="store_true", help="Print one JSON object with what was measured.")
@@ -25,20 +27,23 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    if args.bounce:
-        return _bounce(args)
+    if args.bounce and args.settle:
+        raise ContactFPGAError("--bounce and --settle are two measurements; make one after the other")
+    if args.bounce or args.settle:
+        return _measure(args)
     for name in ("seconds", "json"):
         if getattr(args, name):
-            raise ContactFPGAError(f"--{name} is of a measurement; add --bounce")
+            raise ContactFPGAError(f"--{name} is of a measurement; add --bounce or --settle")
     return _show(args)
 
 
-def _bounce(args: argparse.Namespace) -> int:
+def _measure(args: argparse.Namespace) -> int:
     if args.once:
-        raise ContactFPGAError("--once shows one frame, which tells of no bounce; leave it out")
+        what = "bounce" if args.bounce else "settle time"
+        raise ContactFPGAError(f"--once shows one frame, which tells of no {what}; leave it out")
     with flags.opened(args) as board:
         _check_cells(board)
-        return bouncing.measure(board, args)
+        return bouncing.measure(board, args) if args.bounce else settling.measure(board, args)
 
 
 def _show(args: argparse.Namespace) -> int:

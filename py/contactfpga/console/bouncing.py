@@ -31,7 +31,7 @@ NAMED = 8
 
 def measure(board: Board, args: argparse.Namespace) -> int:
     """Measure for ``args.seconds`` or until Ctrl-C; status 1 when nothing was measured."""
-    skin = _bare(board)
+    skin = bare_skin(board, "the bounce")
     bounce = Bounce(board.hello.send == "on_change")
     if not args.json:
         terminal.say(f"Press and release every switch of {board.port} some times. Ctrl-C ends the measurement.")
@@ -51,17 +51,17 @@ def measure(board: Board, args: argparse.Namespace) -> int:
     return 0 if bounce.bounced else 1
 
 
-def _bare(board: Board) -> Skin:
-    """The board's Skin, in which nothing hides a bounce."""
+def bare_skin(board: Board, hidden: str) -> Skin:
+    """The board's Skin, in which no debounce hides something."""
     skin = known_skin(board)
     if skin is None:
         raise ContactFPGAError(
-            f"{board.port}: a hello does not tell whether the board debounces, which would hide the bounce; give the "
+            f"{board.port}: a hello does not tell whether the board debounces, which would hide {hidden}; give the "
             "Skin that it was built from: --skin FILE"
         )
     if debounces.find(skin.debounce).gateware:
         raise ContactFPGAError(
-            f"{board.port} debounces ({skin.debounce!r}), which hides the bounce; build a bitstream from the same Skin "
+            f"{board.port} debounces ({skin.debounce!r}), which hides {hidden}; build a bitstream from the same Skin "
             'with debounce = "none" for this measurement'
         )
     return skin

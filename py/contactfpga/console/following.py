@@ -30,7 +30,7 @@ def follow(
     first_us: int | None = None
     time_us = 0
     findings: list[Finding] = []
-    with _shown(render) as show, contextlib.suppress(KeyboardInterrupt, ReplayEnded):
+    with shown(render) as show, contextlib.suppress(KeyboardInterrupt, ReplayEnded):
         try:
             while args.seconds is None or first_us is None or time_us - first_us < args.seconds * 1e6:
                 zones = board.next(args.timeout)
@@ -56,7 +56,7 @@ def known_skin(board: Board) -> Skin | None:
 
 
 @contextlib.contextmanager
-def _shown(render: Render | None) -> Iterator[Callable[[Zones], None]]:
+def shown(render: Render | None) -> Iterator[Callable[[Zones], None]]:
     if render is None or not terminal.of().live:
         yield lambda zones: None
         return

@@ -40,20 +40,29 @@ class Room:
 
 Render = Callable[[Zones, Room], RenderableType]
 
+Take = Callable[[Zones], None]
+"""Gets every frame, also those that are not shown."""
 
-def show(board: Board, args: argparse.Namespace, render: Render) -> int:
+
+def _ignore(zones: Zones) -> None:
+    pass
+
+
+def show(board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore) -> int:
     """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends."""
     console = terminal.console()
     if args.once:
-        console.print(render(board.next(args.timeout), room(console, endless=True)))
+        zones = board.next(args.timeout)
+        take(zones)
+        console.print(render(zones, room(console, endless=True)))
         return 0
     if not terminal.of().live:
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
             terminal.say(what, sys.stderr, hang=2)
-        return _last(board, args, console, render)
+        return _last(board, args, console, render, take)
     with Live(console=console, auto_refresh=False) as live:
-        for found in _paced(board, args.timeout, tell_silence=True):
+        for found in _paced(board, args.timeout, take, tell_silence=True):
             shown = str(found) if isinstance(found, Silence) else render(found, room(console))
             live.update(shown, refresh=True)
     return 0
@@ -65,11 +74,11 @@ def room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _last(board: Board, args: argparse.Namespace, console: Console, render: Render) -> int:
+def _last(board: Board, args: argparse.Namespace, console: Console, render: Render, take: Take) -> int:
     """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
     zones = None
     try:
-        for zones in _paced(board, args.timeout):  # noqa: B007
+        for zones in _paced(board, args.timeout, take):  # noqa: B007
             pass
     finally:
         if isinstance(zones, Zones):
@@ -77,7 +86,7 @@ def _last(board: Board, args: argparse.Namespace, console: Console, render: Rend
     return 0
 
 
-def _paced(board: Board, timeout: float, tell_silence: bool = False) -> Iterator[Zones | Silence]:
+def _paced(board: Board, timeout: float, take: Take, tell_silence: bool = False) -> Iterator[Zones | Silence]:
     """One frame every REFRESH_US of device time, and the last one of a recording in any case.
 
     With ``tell_silence`` no table stands still: where no frame comes what is yielded says so, until the timeout.
@@ -97,6 +106,7 @@ def _paced(board: Board, timeout: float, tell_silence: bool = False) -> Iterator
             if skipped is not None:
                 yield skipped  # the last frame is shown in any case
             return
+        take(zones)
         if pace.due(zones):
             skipped = None
             yield zones

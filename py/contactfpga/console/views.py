@@ -7,10 +7,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from contactfpga.console import drawn_sheet, terminal
+from contactfpga.console import drawn_settling, drawn_sheet, terminal
 from contactfpga.console.live import Room
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.tracking.tracks import Track, Tracks
+from contactfpga.zones.settling import Settling
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
@@ -29,11 +33,11 @@ NAMED = 12
 """Pressed cells whose places are written out."""
 
 
-def zones_view(board: Board, zones: Zones, room: Room) -> RenderableType:
-    """The sheet, with the table of its zones beside it or below."""
+def zones_view(board: Board, zones: Zones, room: Room, tracks: Tracks | None = None) -> RenderableType:
+    """The sheet, with the table of its zones beside it or below; with ``tracks``, the ids of their contacts."""
     below = status(board, zones, room.width)
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
-    listed = table(zones, left.height)
+    listed = table(zones, left.height, tracks)
     across = listed.__rich_measure__(room.console, room.console.options).maximum
     scale, beside = _layout(zones, left, across)
     drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
@@ -44,7 +48,7 @@ def zones_view(board: Board, zones: Zones, room: Room) -> RenderableType:
         shown = [both]
     else:
         high = drawn_sheet.size(zones, scale)[1]
-        shown = [_styled(drawing), table(zones, left.without(high).height)]
+        shown = [_styled(drawing), table(zones, left.without(high).height, tracks)]
     return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
@@ -84,6 +88,15 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
     return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
+def settling_view(found: Settling, skin: Skin, room: Room) -> RenderableType:
+    """What a measurement of settle times found up to now."""
+    wide = 2 * skin.columns <= room.width
+    drawing = drawn_settling.draw(found, Derived(skin).clocks_per_us, skin.mask, wide, room.unicode)
+    known = int((found.clocks > 0).sum())
+    below = f"{drawing.legend}\n{known} of {skin.rows * skin.columns - len(skin.mask)} cells measured"
+    return Group(_styled(drawing), Text(terminal.wrapped(below, room.width)))
+
+
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
     """The scale of the drawing, and whether the table stands beside it. Beside it is better than large: it is read
     with the sheet, and stays in sight."""
@@ -93,19 +106,26 @@ def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
     return drawn_sheet.scales(zones, room.width, room.height)[0], False
 
 
-def table(zones: Zones, lines: int | None = None) -> Table:
+def table(zones: Zones, lines: int | None = None, tracks: Tracks | None = None) -> Table:
     """The zones, the first of them where there are lines for no more."""
     most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
     left_out = len(zones) - most
     title = f"{zones.total_zones} zone" + ("" if zones.total_zones == 1 else "s")
     caption = f"and {left_out} more" if left_out > 0 else None
     made = Table(title=title, caption=caption)
-    for heading in ("cells", "mm²", "x mm", "y mm"):
+    ids = {} if tracks is None else {id(track.zone): _names(track) for track in tracks.active}
+    for heading in (*([] if tracks is None else ["id"]), "cells", "mm²", "x mm", "y mm"):
         made.add_column(heading, justify="right", no_wrap=True)
     for zone in zones[:most]:
         place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
-        made.add_row(str(zone.area_cells), f"{zone.area_mm2:g}", *place)
+        name = [] if tracks is None else [ids.get(id(zone), "-")]
+        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", *place)
     return made
+
+
+def _names(track: Track) -> str:
+    """The ids that a zone has, the one that it goes by first."""
+    return "+".join(map(str, (track.id, *track.merged)))
 
 
 def _mask(board: Board) -> drawn_sheet.Mask:

@@ -6,6 +6,7 @@ import math
 from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
 
+from contactfpga.driver import self_test
 from contactfpga.driver.link import Link
 from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
@@ -13,12 +14,14 @@ from contactfpga.driver.subscription import Events, Subscription, checked, frame
 from contactfpga.driver.transport import Transport
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReplayEnded
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import SAMPLE_AT
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
 from contactfpga.wire.faults import Faults
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
@@ -203,13 +206,40 @@ class Board:
     # ---- commands
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
-        """Have the board do something: 1, test its lines. Returns the first complete frame scanned after it took the
-        command; where answers were lost it may have taken it twice.
+        """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame
+        scanned after it took the command; where answers were lost it may have taken it twice.
 
         ``value`` is the command's, ``timeout`` in seconds. Raises :class:`NoSuchCommand` where the board does not take
         it, ValueError for numbers that no command has, and as :meth:`read` does.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
+
+    def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
+        """From the next frame on sample the columns this many clocks of the board after a row is selected, in place of
+        the settle time, which 0 is: to measure how long the sheet takes (``contactfpga wire --settle``). Returns the
+        first frame that is. Until it is set to 0 again, or the board restarts, what takes longer does not read pressed.
+
+        More than the settle time counts as that, and so does what is too early for the board: less than 2 clocks, or
+        than columns on shift registers take. Raises as :meth:`command` does; boards with ``report = "cells"`` and
+        ``scan = "raster"`` or ``"reversal"`` take it.
+        """
+        return self.command(SAMPLE_AT, clocks, timeout)
+
+    def self_test(self, timeout: float = 2.0) -> SelfTest:
+        """Have the board drive each of its lines alone, and return what that says of them (:class:`SelfTest`).
+
+        Diodes show only while their switch is pressed: do it again and again, and put the results together with
+        :func:`contactfpga.zones.self_test.merged`. The scan goes on between its slots. ``timeout`` in seconds. Raises
+        :class:`NoSuchCommand` where the board has none, and as :meth:`read` does. Without the board's Skin its mask is
+        not known, so lines that do not rise cannot be told from absent ones.
+        """
+        slots = self_test.run(self._link, checked(timeout))
+        try:
+            mask = frozenset(self.skin.mask)
+        except ContactFPGAError:
+            mask = None
+        sheet = self.sheet
+        return SelfTest(slots, sheet.rows, sheet.columns, self.hello.guard, mask)
 
     def set_zero(self, unit: int, reading: int, timeout: float = 1.0) -> Zones:
         """Tell the board what a pressure unit reads without load, in steps of its converter; as :meth:`command`."""

@@ -36,6 +36,8 @@ STUCK_MAX = (1 << STUCK_BITS) - 1
 
 SELF_TEST = 1
 """Number of a command: test all lines (docs/protocol.md)."""
+SAMPLE_AT = 2
+"""Of another one: sample the columns at another clock of the time for which a row is driven."""
 
 
 class Derived(Widths):
@@ -62,7 +64,9 @@ class Derived(Widths):
     @property
     def commands(self) -> tuple[int, ...]:
         """Numbers of the commands that the board takes."""
-        return (*((SELF_TEST,) if self.skin.self_test else ()), *self.units.commands)
+        self_test = (SELF_TEST,) if self.skin.self_test else ()
+        moves = self.scan.moves_sample and not self.report.zones
+        return self_test + ((SAMPLE_AT,) if moves else ()) + self.units.commands
 
     @functools.cached_property
     def units(self) -> Units:
@@ -84,6 +88,12 @@ class Derived(Widths):
         """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
         row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
         return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
+
+    @property
+    def first_sample_clocks(self) -> int:
+        """The least value of the command "sample at": with shift registers the columns of the slot before are in by
+        then."""
+        return max(2, self.column_load_clocks + self.column_shift_clocks)
 
     @property
     def release_clocks(self) -> int:

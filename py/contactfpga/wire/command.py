@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.inputs.values import shown, whole
-from contactfpga.skin.derived import SELF_TEST
+from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
 from contactfpga.skin.units import SUM_THRESHOLD, THRESHOLD, ZERO
 from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, digits, last_byte, pulses, seal
 from contactfpga.wire.hello import HEARD_DIGITS
@@ -18,6 +18,7 @@ MOST_WHAT, MOST_VALUE = (1 << DIGIT_BITS * WHAT_DIGITS) - 1, (1 << DIGIT_BITS * 
 
 COMMANDS = {
     SELF_TEST: ("self-test", "self_test = true"),
+    SAMPLE_AT: ("sample at", 'report = "cells" and scan = "raster" or "reversal"'),
     ZERO: ("zero of a pressure unit", "units"),
     THRESHOLD: ("threshold of a pressure unit", "units"),
     SUM_THRESHOLD: ("threshold of a weighted sum", "unit_sums"),

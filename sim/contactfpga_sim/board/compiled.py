@@ -16,6 +16,7 @@ from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
+from contactfpga_sim.sheet.shorts import Shorts
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
@@ -90,6 +91,15 @@ class CompiledBoard:
         )
         self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
 
+    def join(self, shorts: Shorts | None) -> None:
+        """From the next cycle on these lines are joined and these diodes bridged, and all others whole. Rows at the
+        supply and columns with strong pulls are the slow model's only."""
+        self._call("part")
+        shorts = shorts or Shorts()
+        for kind, pairs in enumerate((shorts.rows, shorts.columns, shorts.crossed, shorts.bridged)):
+            for one, other in pairs:
+                self._call("join", *map(ctypes.c_uint, (kind, one, other)))
+
     def settle(self, line: Line) -> None:
         """From the next cycle on columns take the time that such a line takes, and not none."""
         clock_s = 1 / self.skin.clock_hz
@@ -98,6 +108,16 @@ class CompiledBoard:
             raise ValueError(f"a line for {len(press) - 1} columns; the sheet has {self.skin.column_lines}")
         arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
         self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
+
+    def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
+        """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all
+        while one of ``rows`` pulls them, and each of ``columns``. Guard lines are the last."""
+        skin = self.skin
+        factors = (
+            np.array([given.get(line, 1.0) for line in range(lines)])
+            for given, lines in ((rows, skin.row_lines), (columns, skin.column_lines))
+        )
+        self._call("slow", *(each.ctypes.data_as(ctypes.c_void_p) for each in factors))
 
     def load(self, readings: Iterable[int]) -> None:
         """From the next cycle on the converter's inputs would read this, one for each pressure unit; 0 at first."""
@@ -190,6 +210,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "BIT_CLOCKS": Derived(skin).bit_clocks,
             "PRECHARGE": int(skin.precharge_us > 0),
             "REVERSAL": int(skin.reads_rows),
+            "KEEPS": Derived(skin).settle_clocks + 1 if skin.self_test else 0,
             "PROBES": int(netlist is None),
             "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),

@@ -40,26 +40,29 @@ PACED, PACE_S = 18, 250e-6
 ROUNDS = 20
 
 
-def frame(number: int, low: int) -> bytes:
-    """A fingertip of 3x3 cells that moves along a row."""
+def frame(number: int, low: int, fingers: int = 1) -> bytes:
+    """Fingertips of 3x3 cells, 4 rows apart, that move along their rows."""
     known = facts(SKIN)
     x, y = 1 + number // 40 % (SKIN.columns - 2), SKIN.rows // 2
     counted = 24 + 8 + 3 + known.area_bits + known.zones_bits
     room = -(-(counted + 4) // 8) * 8 - counted
-    record, _ = join(((9, known.area_bits), (9 * x, known.sum_x_bits), (9 * y, known.sum_y_bits)))
+    records = b""
+    for finger in range(fingers):
+        sums = ((9, known.area_bits), (9 * x, known.sum_x_bits), (9 * (y + 4 * finger), known.sum_y_bits))
+        records += join(sums)[0].to_bytes(known.item_bytes, "little")
     trailer, width = join(
         (
             (number * STEP_US % 2**24, 24),
             (number % 256, 8),
             (low, 3),
-            (9, known.area_bits),
-            (1, known.zones_bits),
+            (9 * fingers, known.area_bits),
+            (fingers, known.zones_bits),
             (0, room + 4),
             (5, 4),
         )
     )
     packet = Packet()
-    packet.push(record.to_bytes(known.item_bytes, "little") + trailer.to_bytes(width // 8, "little"))
+    packet.push(records + trailer.to_bytes(width // 8, "little"))
     return packet.wire(before=known.fingerprint[:2])
 
 
@@ -70,10 +73,11 @@ def greeting(number: int = 0) -> bytes:
 
 
 class Feeder:
-    """The board: answers requests until it is told to go, then writes all frames ``rounds`` times."""
+    """The board: answers requests until it is told to go, then writes all frames ``rounds`` times: ``paced`` of them
+    every PACE_S, or as fast as they are taken if that is 0. ``touched``: which of their numbers have the fingertip."""
 
-    def __init__(self, rounds: int, paced: bool):
-        self._rounds, self._paced = rounds, paced
+    def __init__(self, rounds: int, paced: int, touched: Callable[[int], bool]):
+        self._rounds, self._paced, self._touched = rounds, paced, touched
         context: Any = multiprocessing.get_context("fork")
         self._master, slave = os.openpty()
         tty.setraw(slave)
@@ -85,10 +89,10 @@ class Feeder:
 
     def _run(self) -> None:
         low, sent = self._answer()
-        frames = [frame(number, low) for number in range(FRAMES)]
+        frames = [frame(number, low, int(self._touched(number))) for number in range(FRAMES)]
         self._write(frame(sent, low))  # the reader waits until the frames are made
         place = sent + 1
-        size = PACED if self._paced else CHUNK // len(frames[0])
+        size = self._paced or CHUNK // len(frames[0])
         due_s = time.monotonic()
         while place < len(self.written_s):
             chosen = range(place, min(place + size, len(self.written_s)))
@@ -121,9 +125,11 @@ class Feeder:
 
 
 @contextmanager
-def stream(rounds: int, paced: bool = False) -> Iterator[tuple[contactfpga.Board, contactfpga.Subscription, Feeder]]:
+def stream(
+    rounds: int, paced: int = 0, touched: Callable[[int], bool] = lambda number: True
+) -> Iterator[tuple[contactfpga.Board, contactfpga.Subscription, Feeder]]:
     """An open board, and a queue that holds all of its frames but the first."""
-    feeder = Feeder(rounds, paced)
+    feeder = Feeder(rounds, paced, touched)
     feeder.process.start()
     try:
         with contactfpga.open(feeder.port, SKIN, timeout=10.0) as board:
@@ -165,7 +171,7 @@ def over_a_port(take: Callable[[contactfpga.Subscription], int]) -> float:
 def latencies_us() -> list[float]:
     """From the last byte's write to ``latest``, of the frames that it returns but those of the first tenth."""
     found, rounds = [], 6
-    with stream(rounds, paced=True) as (board, queue, feeder):
+    with stream(rounds, PACED) as (board, queue, feeder):
         queue.close()
         number = 0
         while number < rounds * FRAMES - 1:

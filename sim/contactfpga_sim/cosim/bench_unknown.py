@@ -19,6 +19,7 @@ from contactfpga_hdl.board.synthesis import NO_COLLISIONS
 from contactfpga_sim.board import native
 from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
 from contactfpga_sim.cosim.record import OutOfTime, Stimulus
+from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.trace import Timeline, Trace
 from contactfpga_sim.sheet.matrix import Contention, Matrix
 
@@ -139,7 +140,8 @@ def _bench(skin: Skin, timeline: Timeline, cycles: int, known: dict[str, str]) -
 module bench;
 reg clk = 0, rst = 1, rx = 1;
 reg [{skin.column_lines - 1}:0] stuck = 0, {cells};
-{sheet}wire tx, contact, alive{"" if skin.alive else " = 0"};
+{sheet}wire tx, contact;
+wire alive{"" if skin.alive else " = 0"};
 reg [2:0] seen = 3'bxxx;
 integer cycle;
 top top(.clk(clk), .rst(rst), .rx(rx), .tx(tx), .contact(contact){pins}{", .alive(alive)" if skin.alive else ""});
@@ -176,9 +178,12 @@ def _sheet(skin: Skin) -> tuple[str, str]:
     pulled = " | ".join(f"{{{skin.column_lines}{{selected[{row}]}}}} & closed{row}" for row in lines)
     feeding = ", ".join(f"|(closed{row} & feeding & ~stuck)" for row in reversed(lines))
     reverses = skin.reads_rows
-    checks = reverses and skin.guard
+    checks = reverses and (skin.guard or skin.self_test)
     released = f"columns_level == 1'b{int(skin.selects_low)}"
-    guard = f"{{~({released}), {{{skin.columns}{{{released}}}}}}}"
+    plain = f"{{{skin.columns}{{{released}}}}}"
+    guard = f"{{~({released}), {plain}}}" if skin.guard else plain
+    kept = _kept(skin, columns) if skin.self_test else ""
+    reads = "pulled | stuck" + (" | held | still" if skin.self_test else "")
     text = f"""wire {rows} rows;
 wire {rows} rows_drive{"" if reverses else f" = {{{skin.row_lines}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
@@ -186,7 +191,7 @@ wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
 wire {columns} feeding = columns_drive{f" & {guard}" if checks else ""};
 wire {rows} selected = {selecting} & rows_drive;
 wire {columns} pulled = {pulled};
-wire {columns} reads = pulled | stuck;
+{kept}wire {columns} reads = {reads};
 wire {rows} touched = {{{feeding}}};
 wire {rows} rows_read = rows & rows_drive | {let_go} & ~rows_drive;
 """
@@ -194,6 +199,18 @@ wire {rows} rows_read = rows & rows_drive | {let_go} & ~rows_drive;
     pins += ", .columns_drive(columns_drive)" if skin.precharge_us else ""
     pins += ", .columns_level(columns_level)" if checks else ""
     return text, pins + (", .rows_drive(rows_drive), .rows_read(rows_read)" if reverses else "")
+
+
+def _kept(skin: Skin, columns: str) -> str:
+    """Columns that a self-test discharged stay at the selecting level for a slot, as their pulls are weak."""
+    return f"""wire {columns} held = columns_drive & ~feeding;
+reg {columns} kept = 0;
+integer left = 0;
+wire {columns} still = left != 0 ? kept & ~feeding : 0;
+always @(posedge clk)
+    if (|held) begin kept <= held; left <= {facts(skin).settle + 1}; end
+    else if (left != 0) begin kept <= still; left <= left - 1; end
+"""
 
 
 def _moves(skin: Skin, timeline: Timeline, cycles: int) -> dict[int, str]:

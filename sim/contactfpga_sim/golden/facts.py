@@ -78,9 +78,19 @@ class Facts:
 
     @property
     def commands(self) -> bytes:
-        """Numbers of the commands that the board takes: 1 is the self-test, 3 to 5 are of units and their sums."""
+        """Numbers of the commands that the board takes: 1 is the self-test, 2 moves the sample, 3 to 5 are of units."""
         of_units = b"\x03\x04" + b"\x05" * bool(self.skin.unit_sums) if self.skin.units else b""
-        return b"\x01" * self.skin.self_test + of_units
+        return b"\x01" * self.skin.self_test + b"\x02" * self.samples_early + of_units
+
+    @property
+    def samples_early(self) -> bool:
+        """The board can sample a row's columns before the settle time is over."""
+        return self.skin.report == "cells" and self.skin.scan in ("raster", "reversal")
+
+    @property
+    def first_sample(self) -> int:
+        """The earliest of its clocks in which a row's columns can be sampled, counted from 1."""
+        return max(2, self.load + self.column_shift)
 
     @functools.cached_property
     def clocks_per_us(self) -> int:

@@ -86,6 +86,10 @@ class Reports:
         self._handed = handed
         self._due, self._since = None, idle
 
+    def pause(self, idle: int) -> None:
+        """Something else of this kind goes out, and nothing is compared until ``idle``."""
+        self._due, self._since = None, idle
+
     def packet(self, handed: Sequence[int]) -> bytes:
         """The report whose bytes were handed over in these cycles."""
         return report(self._facts, self._sent(handed))

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.faults import Reports, Told, report
+from contactfpga_sim.golden.faults import Reports, Told, report, slot
 from contactfpga_sim.golden.hello import DIGITS, State, hello
 
 
@@ -35,7 +35,9 @@ class Link:
         self._reported: list[int] = []
         """Where reports begin in ``bytes``; they are not filled in either."""
         self._after_report = -1
-        """The cycle from which on the wire was idle after the last one."""
+        """The cycle from which on the wire was idle after the last one, or after a slot of the self-test."""
+        self._slot: tuple[int, bytes] | None = None
+        self._slot_over: int | None = None
         self._units = units
         self._swept = 0
         """Sweeps that were taken, or replaced by one that was."""
@@ -59,13 +61,25 @@ class Link:
         self._frame = None
         return waited
 
+    def offer_slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
+        """A slot of the self-test waits from ``cycle`` on."""
+        assert self._slot is None, "one slot at a time"
+        self._slot = (cycle, slot(self._facts, number, rows, columns))
+        self._slot_over = None
+
+    def slot_over(self, cycle: int) -> int | None:
+        """The cycle in which the slot was taken as a whole, if that is not after ``cycle``."""
+        self.advance(cycle)
+        return self._slot_over if self._slot_over is not None and self._slot_over <= cycle else None
+
     def advance(self, cycle: int) -> None:
         """Let the wire take what it takes up to and including ``cycle``."""
         while True:
             due = self._reports.due(cycle) if self._reports and self._idle_from <= cycle else None
             frame_from = [self._frame[0]] if self._frame else []
+            slot_from = [self._slot[0]] if self._slot else []
             swept = [self._units[self._swept][0]] if self._swept < len(self._units) else []
-            waits = [*self._hellos, *frame_from, *([] if due is None else [due]), *swept]
+            waits = [*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept]
             if not waits:
                 return
             taken = max(self._idle_from, min(waits))
@@ -76,6 +90,8 @@ class Link:
                 self._send_hello(taken)
             elif due is not None and due <= taken and not self._frame_is_next(taken):
                 self._send_report(taken)
+            elif self._slot and self._slot[0] <= taken and not self._frame_is_next(taken):
+                self._send_slot(taken, self._slot[1])
             elif not self._frame or self._frame[0] > taken or self._sweep_is_next(taken):
                 self._send_sweep(taken)
             else:
@@ -119,6 +135,15 @@ class Link:
             packet = self._units[self._swept][1]
             self._swept += 1
         self._send(taken, packet)
+
+    def _send_slot(self, taken: int, packet: bytes) -> None:
+        """It is over in the cycle after the last byte before its check was handed over."""
+        assert self._reports is not None
+        begin, self._slot = len(self.bytes), None
+        self._send(taken, packet)
+        self._slot_over = self.bytes[begin + len(packet) - 5][0] + 1
+        self._after_report = self._idle_from
+        self._reports.pause(self._idle_from)
 
     def _send_hello(self, taken: int) -> None:
         self._blank.append((len(self.bytes), taken, self.sent))

@@ -51,7 +51,7 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):
         link.want_hello(cycle)
     packer = Packer(known, link, divide.Divider(known, trace) if known.divided else Queue())
-    stages = Stages(known, trace, packer, frames, told)
+    stages = Stages(known, trace, packer, frames, told, link)
     scanned = known.scan.scan(scan.Play(known, timeline, heard.requests, cycles, stages))
     link.finish(cycles)
     faulty = safe.fault(frames, stages.told)
@@ -65,9 +65,12 @@ def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, sca
 class Stages:
     """The stages after the scan: rows are handed over, records leave, frames are packed; all noted in a trace."""
 
-    def __init__(self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told):
+    def __init__(
+        self, facts: Facts, trace: Trace, packer: Packer, scanned: list[scan.Scan], reported: Told, link: Link
+    ):
         self._facts = facts
         self._reported = reported
+        self._link = link
         self._trace = trace
         self._packer = packer
         self._scanned = scanned
@@ -88,6 +91,14 @@ class Stages:
     def watch(self, cycle: int) -> None:
         """An untouched sheet was looked at."""
         self.well.append(cycle)
+
+    def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
+        """A slot of the self-test goes out, from a cycle on."""
+        self._link.offer_slot(cycle, number, rows, columns)
+
+    def slot_over(self, cycle: int) -> int | None:
+        """The cycle in which it went out, if that is not after ``cycle``."""
+        return self._link.slot_over(cycle)
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
         """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced."""

@@ -9,9 +9,11 @@ import numpy as np
 from contactfpga_sim.golden import debounce, reversal_guard
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
+from contactfpga_sim.golden.handed import Handed
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.reversal_guard import Checks
-from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
+from contactfpga_sim.golden.self_test import SelfTest
 
 RETRY_US = 2**16
 """A column that read stuck is driven again when the clock passes a multiple of this."""
@@ -19,10 +21,11 @@ RETRY_US = 2**16
 
 @dataclasses.dataclass(frozen=True)
 class Slot:
-    """A row is driven from cycle ``begin`` on; its columns are sampled in the last cycle in which it is."""
+    """A row is driven from cycle ``begin`` to cycle ``end``; its columns are sampled in the last one, or earlier."""
 
     row: int
     begin: int
+    end: int
     sample: int
 
     @property
@@ -52,6 +55,7 @@ class Scanner:
         self._rests = False
         self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
         self.checks = Checks(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
+        self.test = SelfTest(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
 
     def frame(self) -> None:
         """The next frame."""
@@ -69,7 +73,7 @@ class Scanner:
             told=begun + 3,
             slots=0,
             alone=frozenset(todo),
-            faults=self.checks.word if self.checks else 0,
+            faults=self._word,
         )
         self.begun.append(begun)
         self._rests = not todo
@@ -87,7 +91,7 @@ class Scanner:
         touched or a frame is wanted."""
         project = self._facts.project
         if not self._rests:
-            return max(self._listens + project + 1, self._packed)
+            return self._after_tests(max(self._listens + project + 1, self._packed))
         begin = self.begun[-1] + 1
         while True:
             wanted = max(self._wanted(), self._packed, begin)
@@ -95,14 +99,48 @@ class Scanner:
             until = min(wanted, check)
             self._rest(begin, until)
             touched = self._first_touched(begin - 2, until - 2)
+            test = self._test_asked(begin, until if touched is None else touched + 1)
+            if test is not None:
+                until, touched = test, None
+                self._held = [entry for entry in self._held if entry[0] <= until]
             self._watch(begin, until if touched is None else touched + 2)
             if touched is not None:
-                return max(self._wake(touched) + project, self._packed)
-            if not self.checks or wanted < check:
+                return self._after_tests(max(self._wake(touched) + project, self._packed))
+            if test is not None:
+                self._test_at(test)
+            elif not self.checks or wanted < check:
                 return wanted
-            self._listen_after(*self.checks.at_rest(check))
-            self._stages.watch(self._listens)
+            else:
+                self._listen_after(*self.checks.at_rest(check))
+                self._stages.watch(self._listens)
+            self._watch(until + 1, self._listens + project)
             begin = self._listens + project + 1
+
+    def _after_tests(self, begin: int) -> int:
+        """A frame would begin in this cycle, but slots of the self-test that are wanted by then come before."""
+        while self._test_asked(begin, begin) is not None:
+            self._test_at(begin)
+            begin = self._listens + self._facts.project + 1
+        return begin
+
+    def _test_asked(self, begin: int, until: int) -> int | None:
+        """The first cycle from ``begin`` to ``until`` in which a slot of the self-test can begin and is wanted."""
+        begin = max(begin, self._packed)
+        asked = self.test.asked(until) if self.test and begin <= until else None
+        return None if asked is None else max(asked, begin)
+
+    def _test_at(self, cycle: int) -> None:
+        assert self.test is not None
+        sample = self.test.slot(cycle)
+        self._listens = sample + 4
+        self._stages.tell(sample + 3, self._word)
+
+    @property
+    def _word(self) -> int:
+        """What is told of lines."""
+        joined = self.test is not None and self.test.joined
+        checked = self._facts.fault_bits - 1 if joined else 0
+        return (self.checks.word if self.checks else 0) | joined << checked
 
     def _watch(self, begin: int, end: int) -> None:
         """The sheet rests in these cycles; without guard lines that is told now and then."""
@@ -124,7 +162,7 @@ class Scanner:
         if guard_is_stuck:
             self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
         self._listens = checked + 2
-        self._stages.tell(checked + 3, self.checks.word if self.checks else 0)
+        self._stages.tell(checked + 3, self._word)
 
     def _wanted(self) -> int:
         """The first cycle in which a frame is, though nothing is touched."""
@@ -192,10 +230,12 @@ class Scanner:
         """Drives the rows and fills in ``cells``; returns (R, C) bool: what counts, debounced."""
         facts = self._facts
         counted = np.zeros_like(cells)
-        handed = _Handed(facts, rows)
+        handed = Handed(facts, rows)
         begin = begun + max(4, facts.precharge - facts.project)
+        ahead = early_clocks(facts, self._requests, begun)
         for row in todo:
-            slot = Slot(row, begin, begin + facts.settle - 1)
+            end = begin + facts.settle - 1
+            slot = Slot(row, begin, end, end - ahead)
             self.slots.append(slot)
             cells[row] = self._read(slot)
             if cells[row].any():
@@ -209,9 +249,9 @@ class Scanner:
         if not todo:
             handed.nothing(begun + 1)
         else:
-            self._listens = self.slots[-1].sample + 2
+            self._listens = self.slots[-1].end + 2
             if self.checks:
-                self._listen_after(*self.checks.after(self.slots[-1].sample))
+                self._listen_after(*self.checks.after(self.slots[-1].end))
         return counted
 
     def _read(self, slot: Slot) -> np.ndarray:
@@ -222,45 +262,6 @@ class Scanner:
     def _set_contact(self, cycle: int, level: int) -> None:
         if level != (self.contact[-1][1] if self.contact else 0):
             self.contact.append((cycle, level))
-
-
-class _Handed:
-    """Which rows of a frame are offered: where zones are found those that were driven, each with an empty one after it
-    whose neighbor is not; otherwise all."""
-
-    def __init__(self, facts: Facts, rows: Rows):
-        self.taken = 0
-        """The cycle in which the last one was taken."""
-        self._facts = facts
-        self._rows = rows
-        self._place = 0
-        self._nothing = np.zeros(facts.columns, bool)
-
-    def driven(self, row: int, cells: np.ndarray, offered: int, following: int | None) -> None:
-        if self._facts.zones:
-            self._offer(row, cells, offered, True, following is None)
-            if following is not None and following != row + 1:
-                self._offer(row + 1, self._nothing, self.taken + 1, False, False)
-            return
-        self._all_until(row, offered)
-        self._offer(row, cells, max(offered, self.taken + 1), True, row == self._facts.rows - 1)
-        if following is None:
-            self._all_until(self._facts.rows, offered)
-
-    def nothing(self, offered: int) -> None:
-        if self._facts.zones:
-            self._offer(0, self._nothing, offered, False, True)
-        else:
-            self._all_until(self._facts.rows, offered)
-
-    def _all_until(self, end: int, offered: int) -> None:
-        while self._place < end:
-            last = self._place == self._facts.rows - 1
-            self._offer(self._place, self._nothing, max(offered, self.taken + 1), False, last)
-
-    def _offer(self, place: int, cells: np.ndarray, offered: int, alone: bool, last: bool) -> None:
-        self.taken = self._rows.take(place, cells, offered, alone, last)
-        self._place = place + 1
 
 
 class Reversal(ScanRule):
@@ -279,10 +280,12 @@ class Reversal(ScanRule):
         scanner, facts = Scanner(play), play.facts
         while not scanner.begun or scanner.begun[-1] <= play.cycles:
             scanner.frame()
-        slots = [(slot.begin, slot.sample, slot.row) for slot in scanner.slots]
+        slots = [(slot.begin, slot.end, slot.row) for slot in scanner.slots]
         if scanner.checks:
             slots = sorted(slots + [(*slot, facts.rows) for slot in scanner.checks.slots])
-        driven = [change for begin, sample, row in slots for change in ((begin, 1 << row), (sample + 1, 0))]
+        driven = [change for begin, end, row in slots for change in ((begin, 1 << row), (end + 1, 0))]
+        if scanner.test:
+            driven = sorted(driven + scanner.test.discharged)
         return Scanned(scanner.contact, driven, scanner.begun)
 
 

@@ -93,6 +93,12 @@ class Stages(Protocol):
     def watch(self, cycle: int) -> None:
         """In a cycle an untouched sheet was looked at, for a scan that waits."""
 
+    def slot(self, cycle: int, number: int, rows: int, columns: int) -> None:
+        """A slot of the self-test, which read these lines as bits, goes out, from a cycle on."""
+
+    def slot_over(self, cycle: int) -> int | None:
+        """The cycle in which it went out, if that is not after ``cycle``; all before must have been said."""
+
     def frame(self, one: Scan, cells: np.ndarray) -> None:
         """All rows of a frame, ``cells`` (R, C) as they count; the scan waits for nothing."""
 
@@ -151,7 +157,7 @@ class Raster(ScanRule):
         counted = debounced(
             np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
         )
-        told = checks(facts, play.timeline, frames)
+        told = checks(facts, play.timeline, frames, play.requests)
         for change in (change for frame in told for change in frame):
             play.stages.tell(*change)
         for one, cells, changes in zip(scanned, counted, told, strict=True):
@@ -179,7 +185,17 @@ def sampled(facts: Facts, slot: int) -> int:
 
 def _asked_before(facts: Facts, slot: int) -> int:
     """The cycle from which on a request comes too late for a frame that begins with this slot."""
+    if facts.samples_early:
+        return facts.row_shift + slot * facts.row_clocks
     return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
+
+
+def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
+    """By how many clocks the samples of a frame come before the end of the settle time: it takes the commands over that
+    were received before cycle ``late``."""
+    moved = [one.command[1] for one in requests if one.cycle < late and one.command and one.command[0] == 2]
+    fits = moved and facts.samples_early and facts.first_sample <= moved[-1] < facts.settle
+    return facts.settle - moved[-1] if fits else 0
 
 
 def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
@@ -190,9 +206,10 @@ def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: 
         begin = strobe(facts, slots[0])
         late = _asked_before(facts, slots[0])
         early = _asked_before(facts, slots[0] - facts.row_lines) if index else 0
+        ahead = early_clocks(facts, requests, late)
         result.append(
             Scan(
-                cells=np.array([_read(facts, timeline, slot)[: facts.columns] for slot in slots]) & ~facts.mask,
+                cells=np.array([_read(facts, timeline, slot, ahead)[: facts.columns] for slot in slots]) & ~facts.mask,
                 offered=[strobe(facts, slot) + 1 for slot in slots],
                 stuck=int(np.sum((_stuck(facts, timeline, index)[: facts.columns]) & ~facts.mask.all(axis=0))),
                 time_us=(begin - facts.column_shift) // facts.clocks_per_us,
@@ -247,9 +264,9 @@ def _line(facts: Facts, slot: int) -> int:
     return (*(facts.skin.row_order or range(facts.rows)), facts.rows)[_row(facts, slot)]
 
 
-def _read(facts: Facts, timeline: Timeline, slot: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed in a slot."""
-    cycle = sampled(facts, slot)
+def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.ndarray:
+    """(column lines,) bool: columns that read pressed in a slot, sampled some clocks ahead of the settle time's end."""
+    cycle = sampled(facts, slot) - ahead
     return np.asarray(closed(facts, timeline, cycle)[_row(facts, slot)] | stuck(facts, timeline, cycle))
 
 
@@ -263,19 +280,22 @@ def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
     return columns
 
 
-def checks(facts: Facts, timeline: Timeline, count: int) -> list[Changes]:
-    """By frame what is told of faulty lines: (cycle, word) of each check, the last one at the frame's end."""
+def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Request] = ()) -> list[Changes]:
+    """By frame what is told of faulty lines: (cycle, word) of each check, the last one at the frame's end. Rows are not
+    checked in a frame that is sampled early."""
     if not facts.skin.guard:
         return [[]] * count
     told, result = Told(facts), []
     for frame in range(count):
         changes, renews = [], _renews(facts, frame)
         slots = row_slots(facts, frame)
+        ahead = early_clocks(facts, requests, _asked_before(facts, slots[0]))
         told.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
         changes.append((strobe(facts, slots[0] - 1) + 1, told.word))
         for row, slot in enumerate(slots):
             whole = _read(facts, timeline, slot)[-1]
-            told.check("rows", np.full(facts.rows, not whole), renews, row)
+            if not ahead:
+                told.check("rows", np.full(facts.rows, not whole), renews, row)
             if slot == slots[-1]:
                 told.check("stuck", _stuck(facts, timeline, frame), renews)
             changes.append((strobe(facts, slot) + 1, told.word))

@@ -16,11 +16,12 @@ def table(turned: Mapping[str, Mapping[str, Turned]]) -> str:
     return writer.table(HEAD, [line for name, methods in turned.items() for line in rows(STUDIES[name], methods)])
 
 
-def rows(study: Study, methods: Mapping[str, Turned]) -> list[str]:
-    """A study's lines; what they have in common is said in the first one."""
+def rows(study: Study, methods: Mapping[str, Turned], pictured: bool = True) -> list[str]:
+    """A study's lines; what they have in common is said in the first one. ``pictured``: the page has its picture."""
+    title = f"[{study.title}](#{study.name})" if pictured else study.title
     lines = []
     for number, (method, turned) in enumerate(methods.items()):
-        knob = f"[{study.title}](#{study.name}): {study.knob}" if number == 0 else ""
+        knob = f"{title}: {study.knob}" if number == 0 else ""
         helps = study.helps if number == 0 else ""
         lines.append(writer.line((knob, method, *_cells(study, turned), helps)))
     return lines

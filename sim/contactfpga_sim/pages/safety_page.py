@@ -9,7 +9,7 @@ import sys
 
 from contactfpga.console import interrupt
 from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.faults import study, trial
+from contactfpga_sim.studies.faults import start, study, trial
 from contactfpga_sim.studies.faults.catalogue import FAULTS
 from contactfpga_sim.studies.faults.study import Place
 
@@ -20,6 +20,7 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard` and a deadline": ("guarded", ("flags", "deadline")),
     "`guard` and `alive`": ("guarded", ("flags", "alive")),
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
+    "these and `self_test`": ("guarded", ("flags", "deadline", "alive", start.HOST)),
 }
 """Options with the Skin and with what tells a fault."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
@@ -35,7 +36,7 @@ def faults_table() -> str:
             [
                 fault.title,
                 fault.effect,
-                _told_by(guarded, fault.host),
+                _told_by(guarded, fault.host) + _tested(name),
                 _after(guarded, ("flags", "deadline", "alive")),
                 _after(guarded, ("contact",)) if _is_told(guarded) else "",
                 str(max(place.wrong for place in guarded)) if _is_told(guarded) else "all",
@@ -50,12 +51,24 @@ def coverage_table() -> str:
     """Told faults of the listed ones, with and without each option."""
     rows = [["options", "faults told at every place", "diagnostic coverage", "places told"]]
     for name, (skin, channels) in OPTIONS.items():
-        counts = [study.told(skin, fault, channels) for fault in FAULTS]
+        counts = [_told(skin, fault, channels) for fault in FAULTS]
         whole = sum(told == of for told, of in counts)
         places, of_places = (sum(count) for count in zip(*counts, strict=True))
         share = f"{100 * whole / len(FAULTS):.0f} %"
         rows.append([name, f"{whole} of {len(FAULTS)}", share, f"{places} of {of_places}"])
     return writer.table_of(rows)
+
+
+def _told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
+    """As :func:`study.told`; the self-test is asked as well where it is one of the channels."""
+    tested = start.found(fault) if start.HOST in channels else {}
+    if not tested:
+        return study.told(skin, fault, channels)
+    places = _harmful(skin, fault)
+    told = (
+        tested[place.name] is not None or any(place.us(channel) is not None for channel in channels) for place in places
+    )
+    return sum(told), len(places)
 
 
 def _harmful(skin: str, fault: str) -> list[Place]:
@@ -74,12 +87,20 @@ def _is_told(places: list[Place]) -> bool:
 def _told_by(places: list[Place], host: str) -> str:
     """What tells it, at all places or at some."""
     if not any(_channels(place) for place in places):
-        return f"**not told**; meant for `{host}`" if host else "**not told**"
+        return f"**not told** by a scan; meant for `{host}`" if host else "**not told**"
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
     names = NAMES | {"flags": f"{NAMES['flags']} ({', '.join(words)})"}
     said = [names[channel] for channel in NAMES if any(channel in _channels(place) for place in places)]
     some = "" if _is_told(places) else f", at {_count(places, tuple(NAMES))} places"
     return f"{', '.join(said)}{some}"
+
+
+def _tested(fault: str) -> str:
+    """What the self-test at power-up tells of it."""
+    times = [us for us in start.found(fault).values() if us is not None]
+    of = len(start.found(fault))
+    share = "" if len(times) == of else f" at {len(times)} of {of} places"
+    return f"; the self-test, {max(times):.0f} µs after power-up at most{share}" if times else ""
 
 
 def _general(word: str) -> str:

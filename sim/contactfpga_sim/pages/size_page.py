@@ -23,6 +23,7 @@ from contactfpga_sim.studies import size
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 """Sheets that the boards page shows beside the default ones."""
+FAST = Path("examples/fast.toml")
 
 
 FAULTS: dict[str, dict[str, Any]] = {
@@ -33,6 +34,12 @@ FAULTS: dict[str, dict[str, Any]] = {
     "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
 }
 """Options that tell of faults, by their titles."""
+FAST_FAULTS: dict[str, dict[str, Any]] = {
+    "`guard`": {"guard": True},
+    "`self_test`": {"self_test": True},
+    "`guard` and `self_test`": {"guard": True, "self_test": True},
+}
+"""The same of a scan by line reversal."""
 
 WEIGHTS = (
     (1, 2, 3, -4, 5, 6, 7, 8),
@@ -62,13 +69,18 @@ def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
 
 
 def faults_table() -> str:
-    """The reference Skin with the options that tell of faults."""
-    reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
-    rows = [("none", f"{reference:,}", "")]
-    for title, options in FAULTS.items():
-        found = size.luts(lambda options=options: Top(Skin(**options)), sizes.UP5K)  # type: ignore[misc]
-        rows.append((title, f"{found:,}", f"{found - reference:+}"))
+    """The reference Skin and the fast one with the options that tell of faults."""
+    rows = [*_fault_rows(Skin(), "none", FAULTS), *_fault_rows(Skin.load(FAST), f"`{FAST}`", FAST_FAULTS)]
     return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
+
+
+def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list[tuple[str, str, str]]:
+    reference = size.luts(lambda: Top(skin), sizes.UP5K)
+    rows = [(name, f"{reference:,}", "")]
+    for title, options in table.items():
+        found = size.luts(lambda options=options: Top(skin.replace(**options)), sizes.UP5K)  # type: ignore[misc]
+        rows.append((title, f"{found:,}", f"{found - reference:+}"))
+    return rows
 
 
 def units_table() -> str:

@@ -14,6 +14,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.settled import at_settle_time
 
 Diodes = Literal["col2row", "row2col"]
 _RETRY = 1 << RETRY_BIT
@@ -149,6 +150,7 @@ def _raster_lemmas(proof: Proof, inside: Inside, dut: Scanner, late) -> None:
     proof.lemma(inside["reader.begun"] == ((clock == settled) | ended))
     proof.lemma(inside["reader.done"] == ((clock == settled + 1) | late))
     proof.lemma(inside["done_is_row"] == ~((clock > settled + 1) | ended | late))
+    at_settle_time(proof, inside, dut.derived, clock)
 
 
 def _also_in(columns, inside: Inside, clock: int):

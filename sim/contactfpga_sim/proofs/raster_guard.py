@@ -14,6 +14,7 @@ from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.precharge import level_lemmas
 from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.settled import at_settle_time
 
 Diodes = Literal["col2row", "row2col"]
 ROWS, COLUMNS = 3, 2
@@ -88,6 +89,8 @@ def _lemmas(proof: Proof, inside: Inside, dut: Scanner, slot: Signal, line: Sign
     proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
     proof.lemma(inside["reader.done"] == ((slot == settled + 1) | released & (slot == 1)))
     proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))
+    proof.lemma(inside["is_last"] == Mux(slot >= settled, line == ROWS - 1, released & (line == ROWS)))
+    at_settle_time(proof, inside, dut.derived, slot)
     proof.lemma(inside["ended"] == proof.before((slot == settled + 1) & (line == ROWS - 1)))
 
 

@@ -14,6 +14,7 @@ from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.precharge import apart
 from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.proofs.settled import at_settle_time
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
 SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}
@@ -114,6 +115,7 @@ def _clock_lemmas(sheet: Sheet) -> None:
     charge, settled = derived.release_clocks - 2, derived.project_clocks + 2
     proof.lemma((state != LISTEN) | (clock <= settled))
     proof.lemma((state != CHARGE) | (clock < charge))
+    at_settle_time(proof, inside, derived)
     proof.lemma(due != 3)
     proof.lemma((due == 0) | (state == LISTEN) | (state == CHARGE))
     proof.lemma((due != 1) | (clock == 0))

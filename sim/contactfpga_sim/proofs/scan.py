@@ -65,6 +65,7 @@ def each_sample_once(proof: Proof, diodes: Literal["col2row", "row2col"]) -> Non
     with m.If(slot == dut.derived.row_clocks - 1):
         m.d.sync += released.eq(1)
     proof.lemma(inside["row"] == next_row)
+    proof.lemma(inside["is_last"] == Mux(slot >= settled, row == skin.rows - 1, released & (row == 0)))
     proof.lemma(inside["reader.begun"] == ((slot == settled) | released & (slot == 0)))
     proof.lemma(inside["reader.done"] == (strobe | released & (slot == 1)))
     proof.lemma(inside["done_is_row"] == ~((slot > settled + 1) | released & (slot <= 1)))

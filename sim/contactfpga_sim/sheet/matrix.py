@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.sheet.shorts import Lines, Shorts, bits, followers
+
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
@@ -29,7 +32,8 @@ class Matrix:
     makes it do. ``col2row``: a row selects by being low and a column that reads pressed is low, else pulled
     up; ``row2col``: both high, else pulled down. Masked cells may be pressed too: the board has to ignore them.
     Likewise a driven column passes its level, the released one, to rows that are let go; else these are pulled to the
-    selecting level. A stuck column cannot be driven.
+    selecting level. A stuck column cannot be driven. After a discharge of a self-test columns that are let go stay at
+    the selecting level for as long as a slot takes, as their pulls are weak.
 
     Switches and faults are told in the sheet's rows and columns, guard lines last; levels are those of the lines that
     these are soldered to.
@@ -43,11 +47,16 @@ class Matrix:
         self._all_rows = (1 << skin.row_lines) - 1
         self._all_columns = (1 << skin.column_lines) - 1
         self._selects_low = skin.selects_low
+        self._guarded = int(skin.guard)
         self._guards = [1 << skin.columns] * skin.rows + [(1 << skin.columns) - 1] if skin.guard else [0] * skin.rows
         self._pressed = [0] * skin.rows
         self._reaches = [self._all_columns] * skin.row_lines
         self.stuck = 0
         """Lines of the columns that are stuck."""
+        self._shorts: Shorts | None = None
+        self._released = Lines(0, 0)  # let go, and lifted to the released level
+        self._keeps = Derived(skin).settle_clocks + 1 if skin.self_test else 0  # clocks
+        self._kept, self._left = 0, 0  # columns, and clocks for which they are
         self.closed = [0] * skin.row_lines
         """By a row's line, the lines of the columns that it reaches through closed switches."""
         self._solder()
@@ -71,6 +80,10 @@ class Matrix:
                 self._reaches[row] &= ~(1 << column)
         self._solder()
 
+    def join(self, shorts: Shorts | None) -> None:
+        """Join lines and bridge diodes, and part all others."""
+        self._shorts = shorts and shorts.soldered(self._row_line, self._column_line)
+
     def _solder(self) -> None:
         """What is closed and whole, on the lines."""
         for row, guard in enumerate(self._guards):
@@ -82,30 +95,65 @@ class Matrix:
 
     def feeding(self, driven: int, level: int | None) -> tuple[int, int]:
         """Of the columns that are driven those to the released level, and those to the selecting one. ``level`` is that
-        of all but the guard column, which is driven to the other one; None where columns are driven one way only."""
+        of all but a guard column, which is driven to the other one; None where columns are driven one way only."""
         if level is None:
             return driven, 0
-        released = driven & (self._all_columns >> 1 if level == self._selects_low else ~(self._all_columns >> 1))
+        plain = self._all_columns >> self._guarded
+        released = driven & (plain if level == self._selects_low else ~plain)
         return released, driven & ~released
 
     def levels(self, rows: int, rows_driven: int | None = None, columns_driven: int = 0, columns_held: int = 0) -> int:
         """Levels of the columns, bit c is column c, for the levels of the row pins, bit r is row r.
 
         ``rows_driven``: which rows are driven, by default all; ``columns_driven``: which columns are, to the released
-        level; ``columns_held``: which to the selecting one. Raises :class:`Contention`.
+        level; ``columns_held``: which to the selecting one. To be asked for once per clock. Raises :class:`Contention`.
         """
-        selected = (rows ^ self._all_rows if self._selects_low else rows) & self._driven(rows_driven)
+        driven = self._driven(rows_driven)
+        selected = (rows ^ self._all_rows if self._selects_low else rows) & driven
+        if self._shorts is None:
+            pulled, lifted = self._pulled(selected), columns_driven
+        else:
+            pulled, lifted = self._follow(Lines(selected, columns_held), Lines(driven & ~selected, columns_driven))
+        if fights := pulled & columns_driven:
+            raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
+        pressed = pulled | self.stuck | columns_held | self._keep(columns_held, lifted)
+        return pressed ^ self._all_columns if self._selects_low else pressed
+
+    def _pulled(self, selected: int) -> int:
         pulled = 0
         for row, word in enumerate(self.closed):
             if selected >> row & 1:
                 pulled |= word
-        if fights := pulled & columns_driven:
-            raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
-        pressed = pulled | self.stuck | columns_held
-        return pressed ^ self._all_columns if self._selects_low else pressed
+        return pulled
+
+    def _keep(self, held: int, lifted: int) -> int:
+        """Columns that are let go and still at the selecting level."""
+        if held:
+            self._kept, self._left = held, self._keeps
+        elif self._left:
+            self._left -= 1
+            self._kept &= ~lifted
+            return self._kept
+        return 0
+
+    def _follow(self, selecting: Lines, releasing: Lines) -> tuple[int, int]:
+        """With shorts: columns that follow a line at the selecting level, and those that follow one at the released
+        level. A pin may work against the supply, and against no other pin."""
+        assert self._shorts is not None
+        feeding = Lines(releasing.rows, releasing.columns & ~self.stuck)
+        low = followers(self._shorts, self.closed, selecting, selecting=True)
+        if low.rows & feeding.rows | low.columns & feeding.columns:
+            raise Contention(f"lines {feeding} are driven against {selecting}, which shorts join")
+        supplied = Lines(feeding.rows | bits(self._shorts.supplied), feeding.columns)
+        self._released = followers(self._shorts, self.closed, supplied, selecting=False)
+        return low.columns, self._released.columns | bits(self._shorts.pulled)
 
     def row_levels(self, rows: int, rows_driven: int, columns_driven: int) -> int:
         """Levels at the row pins: those of ``rows`` where they are driven, else what the columns make of them."""
+        if self._shorts is not None:
+            touched = self._released.rows
+            let_go = touched if self._selects_low else touched ^ self._all_rows
+            return rows & rows_driven | let_go & ~rows_driven
         feeding = columns_driven & ~self.stuck
         touched = sum(1 << row for row, word in enumerate(self.closed) if word & feeding)
         let_go = touched if self._selects_low else touched ^ self._all_rows

@@ -82,7 +82,7 @@ class Sheet:
         self.drives: tuple[str, ...] = (COLUMN_DATA[skin.column_read],)
         if skin.precharge_us:
             self.reads += ("columns_drive",)
-        if skin.reads_rows and skin.guard:
+        if skin.reads_rows and (skin.guard or skin.self_test):
             self.reads += ("columns_level",)
         if skin.reads_rows:
             self.reads += ("rows_drive",)

@@ -2,10 +2,14 @@
 // Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and
 // COLUMN_CHAINS, 0 for direct lines; PROBES is 0 for a netlist, which has the pins only; DIVIDED is 1 where items are
 // apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns can be driven, REVERSAL where
-// rows can be let go and are read. UNITS pressure units are read by an MCP3208. With MUTANTS the gateware has an input that picks a mutant. With STATE each of its
+// rows can be let go and are read. UNITS pressure units are read by an MCP3208. KEEPS: clocks for which columns that a
+// self-test discharged stay so when they are let go, 0 where there is no self-test. With MUTANTS the gateware has an
+// input that picks a mutant. With STATE each of its
 // bits can be flipped, and a moment kept and returned to.
 #include <algorithm>
+#include <cmath>
 #include <deque>
+#include <vector>
 
 #define ROW_LINES (ROWS + GUARD)
 #define COLUMN_LINES (COLUMNS + GUARD)
@@ -13,6 +17,7 @@
 #include "clocked.h"
 #include "converter.h"
 #include "shift.h"
+#include "shorts.h"
 #ifdef STATE
 #include "state.h"
 #endif
@@ -33,7 +38,9 @@ public:
     Word stuck = 0;
     // A column with capacitance goes a share of its way a clock: to the level that a pressed switch pulls it to, or back
     // to 0. It reads pressed above the threshold. Share and level depend on how many columns are pulled at once.
+    // A row, or a column, may be slower than the others by a factor.
     bool slow = false;
+    std::vector<double> row_factor, column_factor;
     double press_share[COLUMN_LINES + 1], pulled[COLUMN_LINES + 1], release_share = 1, threshold = 0.5;
 
     Matrix() {
@@ -56,21 +63,34 @@ public:
 
     static Word driven(Word row_levels) { return (COL2ROW ? ~row_levels : row_levels) & mask(ROW_LINES); }
 
-    // Of the columns that are driven those to the released level, where `level` is that of all but the guard column, the
+    // Of the columns that are driven those to the released level, where `level` is that of all but a guard column, the
     // last one, which is driven to the other one.
     static Word feeding(Word driven, bool level) {
-        return driven & (level == COL2ROW ? mask(COLUMN_LINES - 1) : ~mask(COLUMN_LINES - 1));
+        return driven & (level == COL2ROW ? mask(COLUMNS) : ~mask(COLUMNS));
     }
 
-    // Once a clock, with the columns that are driven to the released level; `fights` counts the clocks in which one meets
-    // a row that is driven to the other level.
+    Shorts<ROW_LINES, COLUMN_LINES> shorts;
+
+    // Once a clock, with the rows that are driven to the selecting level, those that are driven to the other one, and the
+    // columns that are driven to the released level or held at the selecting one; `fights` counts the clocks in which
+    // driven lines meet at different levels.
     uint64_t fights = 0;
-    Word levels(Word driven, Word columns_driven) {
-        Word reads = 0;
-        for (; driven; driven &= driven - 1)
-            reads |= closed_[lowest(driven)];
-        fights += (reads & columns_driven) != 0;
-        reads |= stuck;
+    Word levels(Word selected, Word rows_released, Word columns_driven, Word columns_held) {
+        Word reads = 0, lifted = columns_driven;
+        if (selected)
+            selected_ = lowest(selected);
+        if (shorts.any) {
+            const Lines feeding{rows_released, columns_driven & ~stuck};
+            const Lines low = shorts.followers(closed_, {selected, columns_held}, true);
+            lifted_ = shorts.followers(closed_, feeding, false);
+            fights += ((low.rows & feeding.rows) | (low.columns & feeding.columns)) != 0;
+            reads = low.columns, lifted = lifted_.columns;
+        } else {
+            for (; selected; selected &= selected - 1)
+                reads |= closed_[lowest(selected)];
+            fights += (reads & columns_driven) != 0;
+        }
+        reads |= stuck | columns_held | keep(columns_held, lifted);
         if (slow)
             reads = settled(reads, columns_driven);
         return (COL2ROW ? ~reads : reads) & mask(COLUMN_LINES);
@@ -79,7 +99,9 @@ public:
     // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
     Word row_levels(Word levels, Word rows_driven, Word columns_driven) const {
         Word touched = 0;
-        for (unsigned line = 0; line < ROW_LINES; line++)
+        if (shorts.any)
+            touched = lifted_.rows;
+        else for (unsigned line = 0; line < ROW_LINES; line++)
             touched |= Word{(closed_[line] & columns_driven & ~stuck) != 0} << line;
         return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROW_LINES));
     }
@@ -89,6 +111,27 @@ private:
     uint8_t row_end_[ROW_LINES], column_end_[COLUMN_LINES];
     Word closed_[ROW_LINES];  // by a row's line, the lines of the columns that it reaches through closed switches
     double volts_[COLUMN_LINES] = {};
+    unsigned selected_ = 0;  // the line that is driven, or was last
+
+    double share(double usual, bool pull, unsigned column) const {
+        if (row_factor.empty())
+            return usual;
+        return -std::expm1(std::log1p(-usual) / (column_factor[column] * (pull ? row_factor[selected_] : 1)));
+    }
+
+    Lines lifted_ = {};          // with shorts, to the released level
+    Word kept_ = 0, kept_for_ = 0;  // columns that were discharged, and clocks for which they stay so
+
+    Word keep(Word held, Word lifted) {
+        if (KEEPS && held) {
+            kept_ = held, kept_for_ = KEEPS;
+            return 0;
+        }
+        if (!kept_for_)
+            return 0;
+        kept_for_--;
+        return kept_ &= ~lifted;
+    }
 
     void solder() {
         for (unsigned row = 0; row < ROW_LINES; row++)
@@ -114,7 +157,7 @@ private:
             if (columns_driven >> column & 1 && !pull)
                 volts_[column] = 0;
             volts_[column] +=
-                ((pull ? pulled[together] : 0) - volts_[column]) * (pull ? press_share[together] : release_share);
+                ((pull ? pulled[together] : 0) - volts_[column]) * share(pull ? press_share[together] : release_share, pull, column);
             reads |= Word{volts_[column] > threshold} << column;
         }
         return reads;
@@ -231,7 +274,7 @@ class Board {
     auto &columns() { return model_.top.p_columns; }
 #endif
 
-#if GUARD && REVERSAL && PROBES
+#if (GUARD || KEEPS) && REVERSAL && PROBES
     Word columns_driven() {
         const auto &top = model_.top;
         return Matrix::feeding(static_cast<Word>(get(top.p_columns__drive)), get(top.p_columns__level));
@@ -240,6 +283,12 @@ class Board {
     Word columns_driven() { return static_cast<Word>(get(model_.top.p_columns__drive)); }
 #else
     Word columns_driven() { return 0; }
+#endif
+
+#if KEEPS && PROBES
+    Word columns_held() { return static_cast<Word>(get(model_.top.p_columns__drive)) & ~columns_driven(); }
+#else
+    Word columns_held() { return 0; }
 #endif
 
 #if REVERSAL
@@ -276,7 +325,7 @@ public:
 #endif
             model_.settle();
             const Word driven = Matrix::driven(rows()) & rows_driven();
-            const Word levels = read(matrix.levels(driven, columns_driven()));
+            const Word levels = read(matrix.levels(driven, rows_driven() & ~driven, columns_driven(), columns_held()));
             const bool rows_change = put_rows(), miso_changes = put_miso();
             if (levels != levels_ || rows_change || miso_changes) {
                 // Lines enter flip-flops only, so the second evaluation changes nothing but what those take.
@@ -297,7 +346,8 @@ public:
         Matrix matrix;
         Sender sender;
         Reader reader;
-        uint64_t cycle, levels, row_levels;
+        uint64_t cycle;
+        Word levels, row_levels;
         bool line;
     };
     Moment moment() const { return {state.words(), matrix, sender, reader, cycle, levels_, row_levels(), line_}; }
@@ -311,7 +361,7 @@ public:
 #endif
     }
     bool same(const Moment &moment) const { return reader.same(moment.reader) && state.words() == moment.words; }
-    uint64_t row_levels() const {
+    Word row_levels() const {
 #if REVERSAL
         return row_levels_;
 #else
@@ -389,6 +439,11 @@ EXPORT void board_stick(Board *board, const uint8_t *columns) {
 EXPORT void board_cut(Board *board, const uint8_t *row_ends, const uint8_t *column_ends) {
     board->matrix.cut(row_ends, column_ends);
 }
+EXPORT void board_part(Board *board) { board->matrix.shorts = {}; }
+EXPORT void board_join(Board *board, unsigned kind, unsigned one, unsigned other) {
+    const uint8_t *lines[] = {line_of_row, line_of_column};
+    board->matrix.shorts.join(kind, lines[kind == COLUMN_PAIR][one], lines[kind != ROW_PAIR][other]);
+}
 EXPORT void board_settle(
     Board *board, const double *press_share, const double *pulled, double release_share, double threshold) {
     Matrix &matrix = board->matrix;
@@ -404,6 +459,15 @@ EXPORT void board_load(Board *board, const uint32_t *codes) {
 #if UNITS
     std::copy_n(codes, UNITS, board->converter.codes);
 #endif
+}
+EXPORT void board_slow(Board *board, const double *row_factor, const double *column_factor) {
+    Matrix &matrix = board->matrix;
+    matrix.row_factor.resize(ROW_LINES);
+    matrix.column_factor.resize(COLUMN_LINES);
+    for (unsigned row = 0; row < ROW_LINES; row++)
+        matrix.row_factor[line_of_row[row]] = row_factor[row];
+    for (unsigned column = 0; column < COLUMN_LINES; column++)
+        matrix.column_factor[line_of_column[column]] = column_factor[column];
 }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 

@@ -28,7 +28,7 @@ class Fault:
     left: str
     """What a user can still do; where nothing tells it, why not."""
     host: str = ""
-    """The host's means that is meant for it, which this study does not run: ``self_test`` or ``Watch``."""
+    """What is meant for it: ``self_test``, which is run at power-up, or the host's ``Watch``, which is not run here."""
 
 
 def _ends(length: int) -> tuple[int, ...]:

@@ -1,0 +1,77 @@
+"""A control loop of 1 kHz that stops on contact, and when the skin says nothing: `python examples/reflex.py [PORT]`.
+
+Between two steps it waits for frames: a contact is acted on when its frame comes, not when the next step is due. "No
+data" is never "no contact": without a frame for SILENCE_S the loop stops, too.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import NamedTuple
+
+import contactfpga
+
+PERIOD_S = 0.001
+"""From step to step."""
+
+SILENCE_S = 0.005
+"""The oldest that the newest frame may be. The board must send every frame (`send = "always"`): one that sends changes
+only is silent while nothing changes."""
+
+
+class Stop(NamedTuple):
+    """Why the loop ended."""
+
+    reason: str
+    """`contact`, `fault` (a frame that may be wrong) or `silence`."""
+    decided_s: float
+    """When, on the board's clock."""
+    zones: contactfpga.Zones | None
+    """The frame that told it; None of silence."""
+
+
+def guard(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
+    """Call ``step`` every PERIOD_S until there is a reason to stop."""
+    heard_s = due_s = board.clock()
+    while True:
+        step()
+        due_s = max(due_s + PERIOD_S, board.clock())  # a step that took too long is not made up for
+        while (left_s := due_s - board.clock()) > 0:
+            try:
+                zones = board.latest(left_s)
+            except contactfpga.ReadTimeout:
+                break
+            heard_s = board.clock() if zones.host_time_s is None else zones.host_time_s
+            if reason := why_stop(zones):
+                return Stop(reason, board.clock(), zones)
+        if board.clock() - heard_s > SILENCE_S:
+            return Stop("silence", board.clock(), None)
+
+
+def why_stop(zones: contactfpga.Zones) -> str:
+    """What a frame says against going on; "" where nothing does."""
+    if "mismatch" in zones.flags or zones.faults:
+        return "fault"
+    return "contact" if zones.pressed else ""
+
+
+def main() -> int:
+    """Wait for a touch, and say what stopped the loop."""
+    steps = 0
+
+    def step() -> None:
+        nonlocal steps
+        steps += 1  # in its place: read the joints, command the motors
+
+    with contactfpga.open(sys.argv[1] if len(sys.argv) > 1 else None) as board:
+        stop = guard(board, step)
+    # Here the robot brakes.
+    print(f"stopped after {steps} steps: {stop.reason}")
+    if stop.zones:
+        print(stop.zones)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,172 @@
+"""The self-test of a scan by line reversal: each line alone is driven, and what follows it is found.
+
+A slot begins with all lines at the selecting level. Then all are let go, and one of them, or none in the first slot, is
+driven to the released level: no pin can work against another one for longer than that. Current may flow from a column
+through its pressed switches to rows, the way of their diodes; nothing else may follow.
+"""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import slots_layout
+from contactfpga_hdl.scan.guard import checked_rows
+from contactfpga_hdl.scan.reversal_state import Sheet, Turn
+from contactfpga_hdl.scan.stuck import anywhere
+
+SEEN = 2
+"""Clocks after which a level is at a synchronizer's output."""
+
+
+class SelfTest(wiring.Component):
+    """Slot 0 with no line driven, one per row, one per column; all of them once after power-up and after each command.
+
+    command (in): high for a clock; slots go out from then on, and a test under way starts again after its slot.
+    asks (out): a slot is wanted.
+    begin (in): high for a clock in which one is; the scan drives nothing from the next clock but one on.
+    ends (out): high for a clock, its last one.
+    rows, columns (in): lines that read released, from synchronizers; rows that are masked whole never do.
+    discharges (out): all lines are driven to the selecting level, from the second clock after ``begin`` on for the
+    projection time.
+    alone (out): rows, then columns, that are driven to the released level, after a gap of a clock for the settle time.
+    Lines that are masked whole are not driven.
+    slots (out): after a command, what was read in each slot.
+    joined (out): a slot found a line that follows another one; until a whole test finds none. A column that rises in
+    slot 0 says nothing in the others; a row that does without a column is joined with the supply.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.derived = Derived(skin)
+        super().__init__(
+            {
+                "command": In(1),
+                "asks": Out(1, init=1),
+                "begin": In(1),
+                "ends": Out(1),
+                "rows": In(skin.rows),
+                "columns": In(skin.columns),
+                "discharges": Out(1),
+                "alone": Out(skin.rows + skin.columns),
+                "slots": Out(stream.Signature(slots_layout(self.derived))),
+                "joined": Out(1),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        lines = self.skin.rows + self.skin.columns
+        number = Signal(range(lines + 2))  # of the slot; beyond the last there is none
+        line = Signal(lines)  # that it drives
+        m.d.comb += [line.eq((Const(1, 1) << number)[1 : lines + 1]), self.slots.payload.number.eq(number)]
+        judges = self._drive(m, line)
+        self._count(m, judges, number, lines)
+        self._judge(m, judges, number, line)
+        return m
+
+    def _drive(self, m: Module, line: Value) -> Value:
+        """All pins come from registers. Returns what is high when the levels of a slot are there."""
+        project, settle = self.derived.project_clocks, self.derived.settle_clocks
+        clock = Signal(range(max(project, settle, SEEN + 1)))
+        drives = Signal()
+        judges = Signal()
+        driven = checked_rows(self.skin) | anywhere(self.skin) << self.skin.rows
+        m.d.sync += [clock.eq(0), self.discharges.eq(0), self.alone.eq(Mux(drives, line & driven, 0))]
+        m.d.comb += self.ends.eq(judges)
+        with m.FSM(name="slot"):
+            with m.State("REST"):
+                with m.If(self.begin):
+                    m.next = "GAP"
+            with m.State("GAP"):
+                m.next = "DISCHARGE"
+            with m.State("DISCHARGE"):
+                m.d.sync += [self.discharges.eq(1), clock.eq(clock + 1)]
+                with m.If(clock == project - 1):
+                    m.d.sync += clock.eq(0)
+                    m.next = "LET GO"
+            with m.State("LET GO"):
+                m.next = "DRIVE"
+            with m.State("DRIVE"):
+                m.d.comb += drives.eq(1)
+                m.d.sync += clock.eq(clock + 1)
+                with m.If(clock == settle - 1):
+                    m.d.sync += clock.eq(0)
+                    m.next = "SEE"
+            with m.State("SEE"):
+                m.d.sync += clock.eq(clock + 1)
+                with m.If(clock == SEEN):
+                    m.d.comb += judges.eq(1)
+                    m.next = "REST"
+        return judges
+
+    def _count(self, m: Module, judges: Value, number: Signal, last: int) -> None:
+        """Which slot is next. One that goes out is kept until then."""
+        waits = self.slots.valid
+        wanted = Signal()
+        tells = Signal()  # slots go out
+        over = Signal()
+        starts = Signal()
+        m.d.comb += [
+            over.eq(Mux(tells, waits & self.slots.ready, judges)),
+            starts.eq(wanted & (over | ~self.asks & ~waits)),
+        ]
+        with m.If(over):
+            m.d.sync += [waits.eq(0), self.asks.eq(number != last), number.eq(number + 1)]
+        with m.If(judges & tells):
+            m.d.sync += [waits.eq(1), self.asks.eq(0)]
+        with m.If(starts):
+            m.d.sync += [wanted.eq(0), tells.eq(1), self.asks.eq(1), number.eq(0)]
+        with m.If(self.command):
+            m.d.sync += wanted.eq(1)
+
+    def _judge(self, m: Module, judges: Value, number: Signal, line: Value) -> None:
+        rows, columns = self.rows, self.columns & anywhere(self.skin)
+        rises = Signal(len(line))  # in slot 0
+        first, found, follows, bad = Signal(), Signal(), Signal(len(line)), Signal()
+        of_row = line[: self.skin.rows].any()
+        m.d.comb += [
+            first.eq(number == 0),
+            follows.eq(Cat(Mux(of_row, rows, 0), columns) & ~line & ~rises),
+            bad.eq(Mux(first, rows.any() & ~columns.any(), follows.any())),
+        ]
+        with m.If(judges):
+            m.d.sync += [
+                self.slots.payload.rows.eq(rows),
+                self.slots.payload.columns.eq(columns),
+                found.eq(bad | found & ~first),
+                self.joined.eq(bad | Mux(number == len(line), found, self.joined)),
+            ]
+            with m.If(first):
+                m.d.sync += rises.eq(Cat(rows, columns))
+
+    def pins(self) -> tuple[Value, Value]:
+        """Rows and columns that are driven. A guard row is discharged, a guard column is by its switches."""
+        rows, columns = self.skin.rows, self.skin.columns
+        guard = 1 << rows if self.skin.guard else 0
+        discharged = self.discharges.replicate(rows + 1) & (checked_rows(self.skin) | guard)
+        return (
+            (discharged | self.alone[:rows])[: self.skin.row_lines],
+            self.discharges.replicate(columns) & anywhere(self.skin) | self.alone[rows:],
+        )
+
+
+def test_ports(derived: Derived) -> dict[str, wiring.Member]:
+    """Of a scan with a self-test, as :class:`SelfTest` has them."""
+    return {"command": In(1), "slots": Out(stream.Signature(slots_layout(derived)))}
+
+
+def test_lines(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, test: SelfTest) -> None:
+    """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it."""
+    m.submodules.test = test
+    wiring.connect(m, test.slots, wiring.flipped(scan.slots))
+    m.d.comb += [
+        test.command.eq(scan.command),
+        test.begin.eq(turn.lets_go),
+        test.rows.eq(sheet.read),
+        test.columns.eq(~sheet.pressed),
+        turn.asked.eq(test.asks),
+        turn.tested.eq(test.ends),
+        scan.faults.joined.eq(test.joined),
+    ]

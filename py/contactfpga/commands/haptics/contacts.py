@@ -1,0 +1,83 @@
+"""`contactfpga haptics contacts`: the force at each contact, or the center of pressure where none is given."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from contactfpga.commands.haptics import reading
+from contactfpga.console import terminal
+from contactfpga.haptics import Center, Contacts, solve
+
+HELP = "Compute the force at each contact from a wrench."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument(
+        "file", metavar="FILE.json", help="Wrench, contacts or surface; docs/haptics.md has the format."
+    )
+    cones = "Take friction's cones themselves, by Clarabel, instead of the simplest model that suffices."
+    parser.add_argument("--cones", action="store_true", help=cones)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    wrench, touches, surface = reading.contacts(args.file)
+    found = solve.contacts(wrench, touches, surface, cones=args.cones)
+    answer = _answer(found)
+    if surface is not None:
+        answer["center_of_pressure"] = None if found.center is None else _center(found.center)
+    if args.json:
+        print(json.dumps(answer, allow_nan=False))
+    else:
+        _show(found, surface is not None)
+    return 0
+
+
+def _answer(found: Contacts) -> dict[str, Any]:
+    ones = [
+        {"force_n": list(one.force_n), "normal_n": one.normal_n, "interval_n": list(one.interval_n)} for one in found
+    ]
+    spaces = {"model": found.model, "rank": found.rank, "null_space": found.null_space}
+    return {"contacts": ones, **spaces, "chi2": found.chi2}
+
+
+def _center(center: Center) -> dict[str, Any]:
+    names = ("normal_n", "tangential_n", "torsion_nm")
+    return {"point_m": list(center.point_m), **{name: getattr(center, name) for name in names}}
+
+
+def _show(found: Contacts, asked_center: bool) -> None:
+    for number, one in enumerate(found):
+        low, high = one.interval_n
+        upper = "no limit" if high is None else f"{high:.4g} N"
+        # What is rounding is shown as 0.
+        x, y, z = (round(part, 9) + 0.0 for part in one.force_n)
+        terminal.say(
+            f"contact {number}: pushes {one.normal_n:.4g} N, from {low:.4g} N to {upper} as friction allows; force "
+            f"({x:.4g}, {y:.4g}, {z:.4g}) N",
+            hang=2,
+        )
+    if asked_center:
+        terminal.say(_of_center(found.center), hang=2)
+    chi2 = "" if found.chi2 is None else f", chi2 {found.chi2:.4g} with {found.freedom} degrees of freedom"
+    terminal.say(f"model {found.model}, rank {found.rank}, nullity {len(found.null_space)}{chi2}", hang=2)
+    if found.beyond_friction:
+        terminal.say(
+            "no forces within friction's limits exert this wrench: the intervals hold for any friction", hang=2
+        )
+    if found.alarm:
+        terminal.say("chance explains this wrench less than once in a thousand times: something else touches", hang=2)
+
+
+def _of_center(center: Center | None) -> str:
+    if center is None:
+        return "no center of pressure: a single push on this surface does not exert the wrench"
+    x, y, z = (1e3 * one for one in center.point_m)
+    return (
+        f"center of pressure: ({x:.4g}, {y:.4g}, {z:.4g}) mm, pushes {center.normal_n:.4g} N, drags "
+        f"{center.tangential_n:.4g} N, turns {center.torsion_nm:.4g} Nm about the normal"
+    )

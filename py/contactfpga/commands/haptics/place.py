@@ -1,0 +1,134 @@
+"""`contactfpga haptics place`: where to put the units under a bumper."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from contactfpga.console import numbers, outputs
+from contactfpga.haptics import Cylinder, LoadCells, Plane
+from contactfpga.haptics.answer import HapticsError
+from contactfpga.haptics.layouts import Layout
+from contactfpga.haptics.rate import Rating, Task, compared, rate
+from contactfpga.haptics.surface import Surface
+
+HELP = "Compare places for the pressure units of a link."
+
+SHOWN = 3
+"""Arrangements of each kind in the table."""
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    length = numbers.length(10.0)
+    link = parser.add_argument_group("link: a cylinder about z, or a plane")
+    link.add_argument("--radius", type=length, metavar="M", help="Outer radius of a cylinder, with its foam.")
+    link.add_argument("--length", type=length, metavar="M", help="Length of the cylinder that may be touched.")
+    link.add_argument("--width", type=length, metavar="M", help="Size of a plane along x.")
+    link.add_argument("--depth", type=length, metavar="M", help="Size of a plane along y.")
+    height = "Height of the plane above the units (default: 0)."
+    link.add_argument("--height", type=numbers.length(10.0, 0.0), default=0.0, metavar="M", help=height)
+    units = parser.add_argument_group("units")
+    ring = "Radius of the rings that units stand on (default: 0.8 of the cylinder's, 0.4 of the plane's smaller side)."
+    units.add_argument("--ring", type=length, metavar="M", help=ring)
+    noise = "Noise of a unit, as a share of what it must bear (default: 0.001)."
+    units.add_argument("--noise", type=numbers.number(1e-9, 1), default=0.001, metavar="SHARE", help=noise)
+    units.add_argument("--units", metavar="FILE", help="Also rate the units in this TOML file.")
+    loads = parser.add_argument_group("loads")
+    newton, share = numbers.number(1e-3, 1e6, "N"), numbers.number(0, 10)
+    loads.add_argument("--force", type=newton, default=30.0, metavar="N", help="Largest push (default: 30).")
+    loads.add_argument("--friction", type=share, default=0.5, metavar="MU", help="Of what touches (default: 0.5).")
+    at = "Push at which errors are stated (default: 12)."
+    loads.add_argument("--at", type=newton, default=12.0, metavar="N", help=at)
+    mass = "Mass of the bumper, whose weight is taken out in every pose (default: 0)."
+    loads.add_argument("--mass", type=numbers.number(0, 1000, "kg"), default=0.0, metavar="KG", help=mass)
+    sigma = "How well gravity and motion are known then (default: 0.1)."
+    loads.add_argument(
+        "--acceleration-sigma", type=numbers.number(0, 100, "m/s2"), default=0.1, metavar="M/S2", help=sigma
+    )
+    parser.add_argument("--all", action="store_true", help="Print every arrangement, not only the best of each kind.")
+    parser.add_argument("--picture", metavar="FILE", help="Draw the best one into this .svg or .png (extra sim).")
+    parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    surface, size, ring = _link(args)
+    picture = _picture(args.picture)
+    loads = (args.force, args.friction, args.noise, args.at, args.mass, args.acceleration_sigma)
+    task = Task(surface, size, *loads)
+    ratings = compared(task, args.ring or ring)
+    if args.units:
+        ratings = sorted([*ratings, _own(task, args.units)], key=lambda rating: rating.place_m)
+    if args.json:
+        print(json.dumps({"layouts": [_answer(rating) for rating in ratings]}, allow_nan=False))
+    else:
+        _show(task, ratings if args.all else _best(ratings))
+    if picture is not None:
+        from contactfpga.haptics import drawing
+
+        drawing.draw(picture, task, ratings)
+    return 0
+
+
+def _link(args: argparse.Namespace) -> tuple[Surface, tuple[float, float], float]:
+    round_link = args.radius is not None or args.length is not None
+    if round_link == (args.width is not None or args.depth is not None):
+        raise HapticsError(
+            "the link is missing; give --radius and --length of a cylinder, or --width and --depth of a plane"
+        )
+    if round_link:
+        if args.radius is None or args.length is None:
+            raise HapticsError(f"{'--radius' if args.radius is None else '--length'} is missing; a cylinder has both")
+        return Cylinder(args.radius), (-args.length / 2, args.length / 2), 0.8 * args.radius
+    if args.width is None or args.depth is None:
+        raise HapticsError(f"{'--width' if args.width is None else '--depth'} is missing; a plane has both")
+    return Plane(args.height), (args.width, args.depth), 0.4 * min(args.width, args.depth)
+
+
+def _picture(path: str | None) -> Path | None:
+    if path is None:
+        return None
+    if Path(path).suffix not in (".svg", ".png"):
+        raise HapticsError(f"--picture is {path!r}; its name must end in .svg or .png")
+    return outputs.file(path, "--picture")
+
+
+def _own(task: Task, path: str) -> Rating:
+    rating = rate(task, Layout(Path(path).name, LoadCells.load(path)))
+    if rating is None:
+        raise HapticsError(f"{path}: these units cannot hold the loads; they see too few components of a wrench")
+    return rating
+
+
+def _best(ratings: list[Rating]) -> list[Rating]:
+    kinds: dict[str, list[Rating]] = {}
+    for rating in ratings:
+        name = rating.layout.name
+        kinds.setdefault(name.rpartition(",")[0] or name, []).append(rating)
+    return [one for one in ratings if any(one in kind[:SHOWN] for kind in kinds.values())]
+
+
+def _answer(rating: Rating) -> dict[str, Any]:
+    units = [{"point_m": list(unit.point_m), "axis": list(unit.axis)} for unit in rating.layout.cells.units]
+    numbers_of = {name: getattr(rating, name) for name in ("bears_n", "sigma_n", "place_m", "force_n", "seen_n")}
+    return {"name": rating.layout.name, **numbers_of, "rank": rating.layout.cells.rank, "units": units}
+
+
+def _show(task: Task, ratings: list[Rating]) -> None:
+    from contactfpga.console import tables
+
+    head = [
+        "units",
+        "a unit bears, N",
+        f"error of the place at {task.at_n:g} N, mm",
+        "of the force, N",
+        "smallest force seen, N",
+    ]
+    rows = [head]
+    for one in ratings:
+        figures = (f"{one.bears_n:.1f}", f"{1e3 * one.place_m:.3f}", f"{one.force_n:.3f}", f"{one.seen_n:.3f}")
+        rows.append([one.layout.name, *figures])
+    tables.show(rows)

@@ -1,0 +1,196 @@
+"""`contactfpga wire --settle`: how long each cell of a board takes to read pressed, and which settle time is enough."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+from typing import Any
+
+import numpy as np
+
+from contactfpga.circuit.times import MARGIN, Time
+from contactfpga.console import drawn_settling, terminal
+from contactfpga.console.bouncing import NAMED, bare_skin
+from contactfpga.console.following import shown
+from contactfpga.driver.board import Board
+from contactfpga.driver.health import Finding
+from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTimeout
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.zones.settling import Settling
+from contactfpga.zones.zone import Zones
+
+
+def measure(board: Board, args: argparse.Namespace) -> int:
+    """Measure for ``args.seconds`` of device time or until Ctrl-C; status 1 when nothing was measured."""
+    skin = bare_skin(board, "what one frame shows")
+    found = _settling(board, skin)
+    board.sample_at(0, args.timeout)  # refuses what cannot be measured before anything is asked of the user
+    if not args.json:
+        terminal.say(
+            f"Press every place of {board.port} for a moment, or lay a plate on the sheet. Ctrl-C ends the measurement."
+        )
+
+    def render(_: Zones, room: Any) -> Any:
+        from contactfpga.console import views  # rich, which scripts do without
+
+        return views.settling_view(found, skin, room)
+
+    seconds, end = _follow(board, args, found, None if args.json else render)
+    if args.json:
+        print(json.dumps(_answer(found, skin, seconds, end)), flush=True)
+    else:
+        _show(found, skin, end)
+    return 0 if (found.clocks > 0).any() else 1
+
+
+def _settling(board: Board, skin: Skin) -> Settling:
+    derived = Derived(skin)
+    first, settle = derived.first_sample_clocks, derived.settle_clocks
+    if settle <= first:
+        raise ContactFPGAError(
+            f"{board.port}: a row is driven for {settle} clocks, and its columns cannot be sampled before {first}; "
+            "build a bitstream from the same Skin with a longer settle_us for this measurement"
+        )
+    return Settling((skin.rows, skin.columns), first, settle, skips=skin.reads_rows, guard=skin.guard)
+
+
+def _follow(board: Board, args: argparse.Namespace, found: Settling, render: Any) -> tuple[float, list[Finding]]:
+    """Measure until the end, and leave the board as it was; returns the seconds that it took and what is to be said of
+    the end."""
+    findings: list[Finding] = []
+    zones, past_us = board.sample_at(0, args.timeout), 0
+    found.start(_cells(zones))
+    with shown(render) as show:
+        try:
+            with contextlib.suppress(KeyboardInterrupt):
+                while args.seconds is None or past_us < args.seconds * 1e6:
+                    clocks, before = found.next_clocks(), zones
+                    if clocks is None:
+                        zones = board.sample_at(0, args.timeout)
+                        found.start(_cells(zones))
+                    else:
+                        early = board.sample_at(clocks, args.timeout)
+                        zones = board.sample_at(0, args.timeout)
+                        found.take(clocks, _cells(early), _cells(zones))
+                    past_us += max(0, zones.time_us - before.time_us)  # a board that starts again begins at 0
+                    show(zones)
+        except (PortLost, ReadTimeout, NoSuchCommand) as error:  # what was found is worth having all the same
+            findings.append(Finding("fault", str(error)))
+        finally:
+            findings += _restored(board, args.timeout)
+    return past_us / 1e6, findings
+
+
+def _cells(zones: Zones) -> np.ndarray:
+    assert zones.cells is not None
+    return zones.cells
+
+
+def _restored(board: Board, timeout: float) -> list[Finding]:
+    """The board samples at the end of its settle time again; what is to be said where it does not."""
+    for _ in range(2):  # somebody who presses Ctrl-C twice shall not keep it from that
+        try:
+            board.sample_at(0, timeout)
+            return []
+        except KeyboardInterrupt:
+            continue
+        except ContactFPGAError:
+            break
+    left = (
+        f"{board.port} may still sample too early, so that pressed switches read released; switch it off and on, or "
+        "run this command again"
+    )
+    return [Finding("fault", left)]
+
+
+def _answer(found: Settling, skin: Skin, seconds: float, end: list[Finding]) -> dict[str, Any]:
+    per_us, slow = Derived(skin).clocks_per_us, found.slow()
+    clocks = [[int(cell) or None for cell in row] for row in found.clocks]
+    return {
+        "seconds": seconds,
+        "clock_hz": skin.clock_hz,
+        "settle_clocks": found.settle,
+        "first_clocks": found.first,
+        "clocks": clocks,
+        "us": [[None if cell is None else cell / per_us for cell in row] for row in clocks],
+        "median_clocks": None if np.isnan(found.median) else found.median,
+        "slow": {"cells": slow.cells, "rows": slow.rows, "columns": slow.columns},
+        "back_clocks": [int(column) or None for column in found.back_clocks],
+        "proposal": None if (settle_us := _proposed_us(found, skin)) is None else {"settle_us": settle_us},
+        "findings": [finding._asdict() for finding in end],
+    }
+
+
+def _proposed_us(found: Settling, skin: Skin) -> float | None:
+    longest = int(found.clocks.max())
+    return Time(longest / skin.clock_hz, "").us(MARGIN) if longest else None
+
+
+def _show(found: Settling, skin: Skin, end: list[Finding]) -> None:
+    for finding in end:
+        terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
+    known, per_us = found.clocks[found.clocks > 0], Derived(skin).clocks_per_us
+    if not len(known):
+        terminal.say("Nothing was measured: no cell read pressed for long enough at the full settle time.")
+        return
+    place = terminal.of()
+    drawing = drawn_settling.draw(found, per_us, skin.mask, 2 * skin.columns <= place.width, place.unicode)
+    print(drawing.text)
+    terminal.say(drawing.legend)
+    terminal.say(
+        f"{len(known)} of {skin.rows * skin.columns - len(skin.mask)} cells measured: "
+        f"{_span(known.min(), found, per_us)} at least, {found.median / per_us:.2f} us the median, "
+        f"{known.max() / per_us:.2f} us at most.",
+        hang=2,
+    )
+    _show_slow(found, per_us)
+    _show_back(found, per_us)
+    _propose(found, skin)
+
+
+def _span(clocks: int, found: Settling, per_us: int) -> str:
+    return f"{'up to ' if clocks == found.first else ''}{clocks / per_us:.2f} us"
+
+
+def _show_slow(found: Settling, per_us: int) -> None:
+    slow = found.slow()
+    if 2 * len(slow.cells) > (found.clocks > 0).sum():
+        terminal.say("Most cells take nearly the whole settle time: it is short for this sheet.")
+        return
+    for kind, lines in (("row", slow.rows), ("column", slow.columns)):
+        if lines:
+            named = ", ".join(map(str, lines[:NAMED])) + (", ..." if len(lines) > NAMED else "")
+            terminal.say(f"slow {kind}{'s' * (len(lines) > 1)} {named}: a long or thin line, or a weak pin", hang=2)
+    alone = [cell for cell in slow.cells if cell[0] not in slow.rows and cell[1] not in slow.columns]
+    if alone:
+        times = [f"({row}, {column}) {found.clocks[row, column] / per_us:.2f} us" for row, column in alone[:NAMED]]
+        what = f"slow cells {', '.join(times)}{', ...' if len(alone) > NAMED else ''}: contacts of high resistance"
+        terminal.say(what, hang=2)
+
+
+def _show_back(found: Settling, per_us: int) -> None:
+    """Columns that still read pressed where the next row's does not."""
+    late = np.flatnonzero(found.back_clocks > found.first).tolist()
+    if late:
+        named = [f"{column} ({found.back_clocks[column] / per_us:.2f} us)" for column in late[:NAMED]]
+        what = (
+            f"slow to come back: columns {', '.join(named)}{', ...' if len(late) > NAMED else ''} after the next row's"
+        )
+        terminal.say(f"{what} selection; a longer release_us, precharge_us or a stronger pull helps", hang=2)
+
+
+def _propose(found: Settling, skin: Skin) -> None:
+    settle_us = _proposed_us(found, skin)
+    assert settle_us is not None
+    if settle_us > skin.settle_us:
+        terminal.say(f"The Skin's {skin.settle_us:g} us leave too little room.")
+    try:
+        skin.replace(settle_us=settle_us)
+    except ContactFPGAError as error:
+        terminal.say(
+            f"{settle_us:g} us would be enough for the sheet, but not for the rest of this Skin: {error}", hang=2
+        )
+        return
+    terminal.say(f"Proposed, {MARGIN:g} times the longest of the measured cells:\nsettle_us = {settle_us:g}")

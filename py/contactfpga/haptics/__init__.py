@@ -1,0 +1,44 @@
+"""How hard, where, and how sure: forces at the zones, from pressure units under the bumper.
+
+SI units, in the link's frame. A wrench is what contacts exert on the link; normals point out of it; no push is
+below 0.
+"""
+
+from contactfpga.haptics.answer import HapticsError
+from contactfpga.haptics.calibrate import Calibration, calibrate
+from contactfpga.haptics.contact import Contact, Contacts, Touch
+from contactfpga.haptics.drift import Drift, DriftWatch
+from contactfpga.haptics.evidence import Closing
+from contactfpga.haptics.locate import Locator, Place, closed
+from contactfpga.haptics.reach import Reach
+from contactfpga.haptics.solve import contacts
+from contactfpga.haptics.surface import Center, Cylinder, Plane
+from contactfpga.haptics.unit import Unit
+from contactfpga.haptics.units import LoadCells
+from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
+
+__all__ = [
+    "Bumper",
+    "Calibration",
+    "Center",
+    "Closing",
+    "Contact",
+    "Contacts",
+    "Cylinder",
+    "Drift",
+    "DriftWatch",
+    "HapticsError",
+    "LoadCells",
+    "Locator",
+    "Motion",
+    "Noise",
+    "Place",
+    "Plane",
+    "Reach",
+    "Touch",
+    "Unit",
+    "Wrench",
+    "calibrate",
+    "closed",
+    "contacts",
+]

@@ -1,0 +1,67 @@
+"""Input that no bumper can have, and how numbers from outside are read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import is_finite, shown
+
+Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+LARGEST = 1e9
+"""Of what a file says in SI units; powers of it are still numbers."""
+
+
+class HapticsError(ContactFPGAError, ValueError):
+    """A value that no bumper, unit or contact can have; the message names it and the limit."""
+
+
+def number(name: str, value: Any, low: float = -LARGEST, high: float = LARGEST, unit: str = "") -> float:
+    """``value`` if it is a number from ``low`` to ``high``; raises :class:`HapticsError`."""
+    if not is_finite(value) or not low <= value <= high:
+        raise HapticsError(f"{name} is {shown(value)}; it must be a number from {low:g} to {high:g} {unit}".rstrip())
+    return float(value)
+
+
+def positive(name: str, value: Any, unit: str) -> float:
+    """``value`` if it is a number above 0; raises :class:`HapticsError`."""
+    if not is_finite(value) or not 0 < value <= LARGEST:
+        raise HapticsError(f"{name} is {shown(value)}; it must be a number above 0 and at most {LARGEST:g} {unit}")
+    return float(value)
+
+
+def vector(name: str, value: Any, unit: str) -> Vector:
+    """Three numbers; raises :class:`HapticsError`."""
+    if not _is_list(value) or len(value) != 3:
+        raise HapticsError(f"{name} is {shown(value)}; it must be a list of three numbers, x, y and z {unit}".rstrip())
+    x, y, z = (number(f"{name}[{index}]", one, unit=unit) for index, one in enumerate(value))
+    return x, y, z
+
+
+def direction(name: str, value: Any) -> Vector:
+    """Three numbers as a vector of length 1; raises :class:`HapticsError` where they have no direction."""
+    x, y, z = vector(name, value, "")
+    length = math.hypot(x, y, z)
+    if length < 1e-9:
+        raise HapticsError(f"{name} is {shown(value)}; it must point somewhere, and its length is 0")
+    return x / length, y / length, z / length
+
+
+def matrix(name: str, value: Any, rows: int, columns: int) -> Floats:
+    """``rows`` lists of ``columns`` numbers; raises :class:`HapticsError`."""
+    shape = f"{rows} lists of {columns} numbers each"
+    if not _is_list(value) or len(value) != rows or not all(_is_list(row) and len(row) == columns for row in value):
+        raise HapticsError(f"{name} is {shown(value)}; it must be {shape}")
+    read = [[number(f"{name}[{r}][{c}]", one) for c, one in enumerate(row)] for r, row in enumerate(value)]
+    return np.array(read, float).reshape(rows, columns)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, (str, bytes))

@@ -1,0 +1,206 @@
+"""Contacts: where something touches, and what is known of the force there."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import overload
+
+from contactfpga.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.haptics.surface import Center
+from contactfpga.haptics.wrench import ALARM, Wrench
+from contactfpga.inputs.values import shown
+
+FULL_WRENCH = "FULL_WRENCH"
+"""Force at a place that is not known: the center of pressure."""
+PURE_FORCE = "PURE_FORCE"
+"""At each contact a force of any direction within friction's cone."""
+PURE_FORCE_WITH_KNOWN_DIRECTION = "PURE_FORCE_WITH_KNOWN_DIRECTION"
+"""At each contact a push along the normal."""
+
+Interval = tuple[float, float | None]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Touch:
+    """A place that is touched, from the sheet; the force there is asked."""
+
+    point_m: Vector
+    normal: Vector
+    """Outward unit normal."""
+    friction: float = 0.5
+    """Largest force along the surface over the push."""
+    point_sigma_m: float = 0.0
+    """Standard deviation of each coordinate of the point."""
+
+    def __post_init__(self) -> None:
+        length = math.hypot(*self.normal)
+        if not abs(length - 1) < 1e-6:
+            raise HapticsError(f"normal is {shown(self.normal)}; its length must be 1, and is {length:g}")
+        if not math.isfinite(sum(self.point_m)):
+            raise HapticsError(f"point_m is {shown(self.point_m)}; it must be three finite numbers in m")
+        if not (0 <= self.friction < 1e3 and 0 <= self.point_sigma_m < 1e3):
+            name = "point_sigma_m" if 0 <= self.friction < 1e3 else "friction"
+            raise HapticsError(f"{name} is {shown(getattr(self, name))}; it must be a number from 0 to 1000")
+
+
+class Contact:
+    """A touch with its force."""
+
+    __slots__ = ("_intervals", "_number", "force_n", "frame", "normal_n", "touch")
+
+    def __init__(
+        self,
+        touch: Touch,
+        force_n: Vector,
+        normal_n: float,
+        frame: str,
+        intervals: Callable[[], list[Interval]],
+        number: int,
+    ):
+        self.touch = touch
+        self.force_n = force_n
+        """On the link."""
+        self.normal_n = normal_n
+        """Push, 0 or above: a contact never pulls."""
+        self.frame = frame
+        self._intervals = intervals
+        self._number = number
+
+    @property
+    def point_m(self) -> Vector:
+        """In the link's frame."""
+        return self.touch.point_m
+
+    @property
+    def normal(self) -> Vector:
+        """Outward unit normal."""
+        return self.touch.normal
+
+    @property
+    def interval_n(self) -> Interval:
+        """Least and largest push among all forces that friction allows and that exert the same wrench; the second is
+        None where there is no largest one. With three contacts or more it may need Clarabel: raises
+        :class:`~contactfpga.MissingExtra` without it."""
+        return self._intervals()[self._number]
+
+    def __repr__(self) -> str:
+        x, y, z = (1e3 * one for one in self.point_m)
+        return f"<Contact: {self.normal_n:.3f} N at ({x:.2f}, {y:.2f}, {z:.2f}) mm>"
+
+
+@dataclasses.dataclass(slots=True)
+class Solution:
+    """Forces at all contacts of one frame, and how sure they are."""
+
+    model: str
+    forces_n: list[Vector]
+    intervals: Callable[[], list[Interval]]
+    rank: int
+    null_space: list[list[float]]
+    """Directions in which the forces may change with no change of the wrench; x, y and z of each contact in turn, or
+    one push each with known directions."""
+    chi2: float | None
+    freedom: int
+    """Degrees of freedom of ``chi2``: components of the wrench that are not used up by the forces."""
+    touches: Sequence[Touch]
+    wrench: Wrench
+    covariance: Callable[[], Floats | None]
+    """(3k, 3k) of the forces, without the directions of the null space."""
+    beyond_friction: bool = False
+
+    @property
+    def residual(self) -> tuple[float, float, float, float, float, float]:
+        """The wrench without what the forces exert."""
+        (fx, fy, fz), (mx, my, mz) = self.wrench.force_n, self.wrench.moment_nm
+        for touch, (px, py, pz) in zip(self.touches, self.forces_n):
+            x, y, z = touch.point_m
+            fx, fy, fz = fx - px, fy - py, fz - pz
+            mx, my, mz = mx - (y * pz - z * py), my - (z * px - x * pz), mz - (x * py - y * px)
+        return fx, fy, fz, mx, my, mz
+
+
+class Contacts(Sequence[Contact]):
+    """The contacts of one frame, in the order in which they were given."""
+
+    def __init__(self, wrench: Wrench, touches: Sequence[Touch], solution: Solution, center: Center | None = None):
+        self.wrench = wrench
+        self.center = center
+        """Where no zone was given: the contact that the wrench alone shows, or None."""
+        self._solution = solution
+        self.model = solution.model
+        """Which model of a contact was chosen: :data:`PURE_FORCE`, :data:`PURE_FORCE_WITH_KNOWN_DIRECTION` or
+        :data:`FULL_WRENCH`."""
+        self.rank = solution.rank
+        """Of the matrix from forces to wrench."""
+        self.null_space = solution.null_space
+        self.chi2 = solution.chi2
+        """How far the wrench is from what these contacts can exert, in squares of its noise; None without noise."""
+        self.freedom = solution.freedom
+        self.beyond_friction = solution.beyond_friction
+        """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
+        Intervals then hold for pushes with any friction."""
+        made = []
+        for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
+            nx, ny, nz = touch.normal
+            push = -(nx * force[0] + ny * force[1] + nz * force[2])
+            made.append(Contact(touch, force, push if push > 0 else 0.0, wrench.frame, self._intervals, number))
+        self._contacts = tuple(made)
+
+    def _intervals(self) -> list[Interval]:
+        return self._kept_intervals
+
+    @functools.cached_property
+    def _kept_intervals(self) -> list[Interval]:
+        return self._solution.intervals()
+
+    @functools.cached_property
+    def covariance_n2(self) -> Floats | None:
+        """(3k, 3k) of all forces in turn, without what no wrench shows (:attr:`null_space`); None without noise."""
+        return self._solution.covariance()
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the wrench is one that these contacts exert by chance only once in a thousand times."""
+        return self.chi2 is not None and self.freedom > 0 and self.chi2 > ALARM[self.freedom - 1]
+
+    @property
+    def unexplained(self) -> Wrench | None:
+        """What only the units see, where :attr:`alarm` says that there is something: the rest of the wrench."""
+        if not self.alarm:
+            return None
+        rest = self._solution.residual
+        return dataclasses.replace(self.wrench, force_n=rest[:3], moment_nm=rest[3:])
+
+    @property
+    def unfelt(self) -> list[Contact]:
+        """What only the sheet sees: contacts that may push with no force at all, to within 3.3 standard deviations of
+        the noise (:attr:`interval_n`). Two fingers that squeeze the link are such contacts."""
+        covariance = self.covariance_n2
+        found = []
+        for number, one in enumerate(self._contacts):
+            sigma = 0.0
+            if covariance is not None:
+                normal, part = one.normal, slice(3 * number, 3 * number + 3)
+                sigma = math.sqrt(max(0.0, float(normal @ covariance[part, part] @ normal)))
+            if one.interval_n[0] <= 3.3 * sigma + 1e-9:
+                found.append(one)
+        return found
+
+    @overload
+    def __getitem__(self, index: int) -> Contact: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Contact, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Contact | tuple[Contact, ...]:
+        return self._contacts[index]
+
+    def __len__(self) -> int:
+        return len(self._contacts)
+
+    def __repr__(self) -> str:
+        chi2 = "" if self.chi2 is None else f", chi2 {self.chi2:.2f}"
+        return "\n".join([f"<Contacts: {len(self)}, {self.model}, rank {self.rank}{chi2}", *map(str, self)]) + ">"

@@ -1,0 +1,179 @@
+"""How good an arrangement of units is for a link: judged by the contacts it has to find.
+
+A condition number would hang on the origin and the unit of length.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+from contactfpga.haptics.answer import Floats, HapticsError, Vector, number, positive
+from contactfpga.haptics.layouts import Layout, on_cylinder, on_plane
+from contactfpga.haptics.surface import Cylinder, Surface
+from contactfpga.haptics.vectors import cross, turning
+from contactfpga.haptics.wrench import ALARM, Noise, Wrench
+
+TURNS = 24
+"""Places around a cylinder."""
+ALONG = 9
+"""Places along it, and along each side of a plane."""
+SLANTS = 12
+"""Directions of friction."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """A link's surface and the loads that it must bear."""
+
+    surface: Surface
+    size_m: tuple[float, float]
+    """Touched part: of a cylinder from z = the first to the second; of a plane its width and depth about z's axis."""
+    force_n: float = 30.0
+    """Largest push; the units are chosen to bear it, with friction, anywhere."""
+    friction: float = 0.5
+    noise: float = 0.001
+    """Standard deviation of a unit, as a share of what it must bear."""
+    at_n: float = 12.0
+    """Push at which errors are stated."""
+    mass_kg: float = 0.0
+    """Of the bumper."""
+    acceleration_sigma_m_s2: float = 0.1
+    """How well gravity and motion are known when the bumper's weight is taken out, in any pose."""
+
+    def __post_init__(self) -> None:
+        positive("force_n", self.force_n, "N")
+        positive("at_n", self.at_n, "N")
+        number("friction", self.friction, 0, 10)
+        positive("noise", self.noise, "")
+        number("mass_kg", self.mass_kg, 0, 1e3, "kg")
+        number("acceleration_sigma_m_s2", self.acceleration_sigma_m_s2, 0, 1e3, "m/s2")
+        first, second = self.size_m
+        if isinstance(self.surface, Cylinder):
+            if not first < second:
+                raise HapticsError(f"the cylinder runs from {first:g} to {second:g} m; the first must be less")
+        else:
+            positive("width", first, "m")
+            positive("depth", second, "m")
+
+    def places(self) -> list[tuple[Vector, Vector]]:
+        """Points and normals that are tried."""
+        first, second = self.size_m
+        if isinstance(self.surface, Cylinder):
+            round_m = 2 * math.pi * self.surface.radius_m
+            flat = [(round_m * turn / TURNS, z) for z in np.linspace(first, second, ALONG) for turn in range(TURNS)]
+        else:
+            across = np.linspace(-0.5, 0.5, ALONG)
+            flat = [(first * x, second * y) for y in across for x in across]
+        return [self.surface.place(float(x), float(y)) for x, y in flat]
+
+    @functools.cached_property
+    def slopes(self) -> Floats:
+        """(n, 2, 6): how the center of pressure of the stated push changes with the wrench, by place."""
+        found = []
+        for point, normal in self.places():
+            fx, fy, fz = (-self.at_n * one for one in normal)
+            if isinstance(self.surface, Cylinder):
+                wrench = Wrench((fx, fy, fz), cross(point, (fx, fy, fz)))
+                found.append(self.surface.slopes(wrench, -self.at_n, normal, point[2]))
+            else:
+                found.append(self.surface.slopes(fz, point[0], point[1]))
+        return np.array(found)
+
+    @property
+    def middle_m(self) -> Vector:
+        """The bumper's center of mass is taken to be here."""
+        if isinstance(self.surface, Cylinder):
+            return (0.0, 0.0, sum(self.size_m) / 2)
+        return (0.0, 0.0, self.surface.height_m)
+
+
+@dataclasses.dataclass(frozen=True)
+class Rating:
+    """What an arrangement comes to; worst over all places unless said otherwise."""
+
+    layout: Layout
+    bears_n: float
+    """What a single unit must bear."""
+    sigma_n: float
+    """Noise of such a unit."""
+    place_m: float
+    """Standard deviation of the center of pressure's distance from the contact."""
+    force_n: float
+    """Standard deviation of the force at a known place."""
+    seen_n: float
+    """Smallest force that is told from none, in any direction that friction allows."""
+    seen: Floats
+    """(places, directions): the same by place, and by direction: straight, then with friction all around."""
+    errors_m: Floats
+    """``place_m`` by place."""
+
+
+def compared(task: Task, radius_m: float) -> list[Rating]:
+    """Every arrangement on rings of this radius that can bear the loads, best place first."""
+    positive("the ring's radius", radius_m, "m")
+    if isinstance(task.surface, Cylinder):
+        layouts = on_cylinder(radius_m, *task.size_m)
+    else:
+        layouts = on_plane(radius_m, task.surface.height_m)
+    found = [rating for rating in (rate(task, layout) for layout in layouts) if rating is not None]
+    return sorted(found, key=lambda rating: rating.place_m)
+
+
+def rate(task: Task, layout: Layout) -> Rating | None:
+    """The rating of an arrangement; None where the units cannot hold the loads."""
+    cells = layout.cells
+    sees_friction = cells.rank == 6
+    places = task.places()
+    pushes = _wrenches(places, 0.0 if not sees_friction else task.friction)
+    borne = task.force_n * np.linalg.pinv(cells.geometry, rcond=1e-9) @ pushes.T
+    if not np.allclose(cells.geometry @ borne, task.force_n * pushes.T, atol=1e-6 * task.force_n):
+        return None
+    bears = float(np.abs(borne).max())
+    sigma = task.noise * bears
+    noise = Noise(sigma**2 * cells.geometry @ cells.geometry.T + _weight(task, sees_friction))
+    errors = np.sqrt(((task.slopes @ noise.covariance) * task.slopes).sum(axis=(1, 2)))
+    seen = _seen(pushes, noise).reshape(len(places), -1)
+    force = _force_n(noise, places, sees_friction)
+    return Rating(layout, bears, sigma, float(errors.max()), force, float(seen.max()), seen, errors)
+
+
+def _weight(task: Task, sees_friction: bool) -> Floats:
+    """(6, 6): what is not known of the bumper's weight."""
+    carried = np.concatenate([np.eye(3), turning(task.middle_m)])
+    spread = (task.mass_kg * task.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
+    if not sees_friction:  # guides take what units along z do not
+        kept = np.zeros(6)
+        kept[2:5] = 1.0
+        spread = spread * np.outer(kept, kept)
+    return np.asarray(spread)
+
+
+def _wrenches(places: list[tuple[Vector, Vector]], friction: float) -> Floats:
+    """(m, 6): pushes of 1 N at each place, straight and with friction in every direction."""
+    points, normals = (np.array(each) for each in zip(*places))
+    # Around a cylinder, and then along it.
+    first = np.cross(np.where(np.abs(normals[:, 2:]) > 0.5, [[1.0, 0, 0]], [[0, 0, 1.0]]), normals)
+    second = np.cross(normals, first)
+    turns = [2 * math.pi * step / SLANTS for step in range(SLANTS)] if friction else []
+    forces = [-normals] + [-normals + friction * (math.cos(turn) * first + math.sin(turn) * second) for turn in turns]
+    stacked = np.stack([np.concatenate([force, np.cross(points, force)], axis=1) for force in forces], axis=1)
+    return np.asarray(stacked.reshape(-1, 6))
+
+
+def _seen(pushes: Floats, noise: Noise) -> Floats:
+    """(m,): newtons at which each push raises the alarm of a wrench without a zone."""
+    felt = ((pushes @ noise.information) * pushes).sum(axis=1)
+    slanted = np.linalg.norm(pushes[:, :3], axis=1)
+    return np.asarray(slanted * np.sqrt(ALARM[noise.rank - 1] / np.maximum(felt, 1e-30)))
+
+
+def _force_n(noise: Noise, places: list[tuple[Vector, Vector]], sees_friction: bool) -> float:
+    exerts = np.array([np.concatenate([np.eye(3), turning(point)]) for point, _ in places])
+    if not sees_friction:
+        exerts = exerts @ np.array([normal for _, normal in places])[:, :, None]
+    spread = np.linalg.inv(exerts.transpose(0, 2, 1) @ noise.information @ exerts)
+    return float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max()))

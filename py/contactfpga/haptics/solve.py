@@ -1,0 +1,78 @@
+"""From a wrench and touched places to contacts, by the simplest model that suffices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from contactfpga.haptics import few, many
+from contactfpga.haptics.answer import HapticsError
+from contactfpga.haptics.contact import FULL_WRENCH, Contacts, Solution, Touch
+from contactfpga.haptics.surface import Surface
+from contactfpga.haptics.system import System, distinct
+from contactfpga.haptics.wrench import Wrench
+from contactfpga.zones.zone import Zones
+
+
+def contacts(
+    wrench: Wrench,
+    zones: Zones | Sequence[Touch],
+    surface: Surface | None = None,
+    friction: float = 0.5,
+    *,
+    cones: bool = False,
+) -> Contacts:
+    """The force at each zone, or at each place in a list of :class:`Touch`.
+
+    One contact: a closed form. Two: the same, with the exact interval of each push. More: pushes along the normals if
+    they suffice, else forces in pyramids within friction's cones, by non-negative least squares (extra `haptics`). With
+    ``cones`` friction's cones themselves, by Clarabel. Where units do not see all six components of the wrench, or
+    friction is 0, pushes along the normals. Where there is no zone, the center of pressure on ``surface``. No contact
+    ever pulls.
+
+    Args:
+        surface: the bumper's outside, on which zones are placed.
+        friction: of zones; a :class:`Touch` has its own.
+    """
+    touches = touched(zones, surface, friction) if isinstance(zones, Zones) else zones
+    if not touches:
+        return Contacts(wrench, (), _nothing(wrench), None if surface is None else surface.center(wrench))
+    if len(touches) > 1:
+        distinct(touches)
+    return Contacts(wrench, touches, _chosen(wrench, touches, cones))
+
+
+def _chosen(wrench: Wrench, touches: Sequence[Touch], cones: bool) -> Solution:
+    rough = [touch.friction > 0 for touch in touches]
+    sees_all = wrench.noise is None or wrench.noise.rank == 6
+    if not sees_all or not any(rough):
+        return many.pushes(System(wrench, touches))
+    if cones:
+        return many.within_cones(System(wrench, touches))
+    if len(touches) == 1:
+        return few.one(wrench, touches[0])
+    if len(touches) == 2 and all(rough):
+        return few.two(wrench, touches)
+    return many.many(System(wrench, touches))
+
+
+def _nothing(wrench: Wrench) -> Solution:
+    rest, noise = wrench.array, wrench.noise
+    chi2 = None if noise is None else float(rest @ noise.information @ rest)
+    return Solution(FULL_WRENCH, [], list, 0, [], chi2, 6 if noise is None else noise.rank, (), wrench, lambda: None)
+
+
+def touched(zones: Zones, surface: Surface | None, friction: float = 0.5) -> list[Touch]:
+    """The zones as places on the bumper's outside. A barycenter is taken to be off by no more than chance within a
+    cell, a pitch over the root of 12; :class:`~contactfpga.haptics.Locator` knows better."""
+    if surface is None:
+        raise HapticsError("surface is missing; contacts() needs the bumper's outside to place zones on it")
+    pitch_mm = math.hypot(zones.sheet.pitch_x_mm, zones.sheet.pitch_y_mm) / math.sqrt(2)
+    sigma = 1e-3 * pitch_mm / math.sqrt(12)
+    found = []
+    for zone in zones:
+        if zone.point_mm is not None:
+            x, y, z = zone.point_mm
+            point, normal = surface.place(*surface.flat((1e-3 * x, 1e-3 * y, 1e-3 * z)))
+            found.append(Touch(point, normal, friction, sigma))
+    return found

@@ -1,0 +1,216 @@
+"""The pressure units that carry the bumper: readings to a wrench, and what they cannot see."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from contactfpga.haptics import table
+from contactfpga.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.haptics.unit import Unit
+from contactfpga.haptics.vectors import turning
+from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
+from contactfpga.inputs.values import shown
+
+COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
+
+
+class LoadCells:
+    """All units of a bumper, in the link's frame."""
+
+    def __init__(
+        self,
+        units: Sequence[Unit],
+        *,
+        frame: str = "",
+        bumper: Bumper | None = None,
+        zero_gravity_m_s2: Vector = (0.0, 0.0, 0.0),
+        matrix: Floats | None = None,
+    ):
+        """Raises :class:`HapticsError` where there is no unit.
+
+        Args:
+            frame: name of the link's frame.
+            bumper: the mass on the units; None: it weighs nothing.
+            zero_gravity_m_s2: which way things fell when the zeros were read, in the link's frame; 0: without bumper.
+            matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
+        """
+        if not units:
+            raise HapticsError("there is no unit; give at least one")
+        self.units = tuple(units)
+        self.frame = frame
+        self.bumper = bumper
+        self.zero_gravity_m_s2 = zero_gravity_m_s2
+        self.calibrated = matrix is not None
+        axes = np.array([unit.axis for unit in self.units], float)
+        places = np.array([unit.point_m for unit in self.units], float)
+        self.geometry: Floats = np.concatenate([axes.T, np.cross(places, axes).T])
+        """(6, n): what each unit exerts on the bumper per newton; about the link's origin."""
+        self._gains = np.array([unit.gain_n for unit in self.units])
+        # Units act on the bumper and contacts oppose them: this is the one place of that sign.
+        self.matrix: Floats = -self.geometry * self._gains if matrix is None else np.asarray(matrix, float)
+        """(6, n): what contacts exert on the link per step of each reading."""
+        self.zeros: Floats = np.array([unit.zero for unit in self.units])
+        spread = self.matrix * (np.array([unit.sigma_n for unit in self.units]) / np.abs(self._gains))
+        self.noise = Noise(spread @ spread.T)
+        self._weight = None if bumper is None else bumper.wrench(Motion(zero_gravity_m_s2))
+        ranges = [unit.range or (-np.inf, np.inf) for unit in self.units]
+        self._low, self._high = (np.array(ends) for ends in zip(*ranges))
+        self._ends = any(unit.range for unit in self.units)
+        self._springs = any(unit.preload_n is not None for unit in self.units)
+        self._preload = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in self.units])
+
+    @classmethod
+    def load(cls, path: str | Path) -> LoadCells:
+        """The units in a TOML file. Raises :class:`HapticsError`, OSError."""
+        return cls(**table.load(path))
+
+    def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
+        """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
+        inertia are taken out; without, it has to be at rest as when its zeros were read."""
+        read = np.array(readings, float)
+        if read.shape != self.zeros.shape:
+            raise HapticsError(
+                f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
+            )
+        deviations = read - self.zeros
+        values = self.matrix @ deviations
+        if motion is not None and self.bumper is not None and self._weight is not None:
+            values = values + (self.bumper.wrench(motion) - self._weight)
+        fx, fy, fz, mx, my, mz = values.tolist()
+        if not math.isfinite(fx + fy + fz + mx + my + mz):
+            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
+        saturated, lifted = self._saturated(read), self._lifted(deviations)
+        return Wrench((fx, fy, fz), (mx, my, mz), self.noise, self.frame, saturated, lifted)
+
+    def _saturated(self, read: Floats) -> tuple[int, ...]:
+        if not self._ends:
+            return ()
+        return tuple(((read <= self._low) | (read >= self._high)).nonzero()[0].tolist())
+
+    def _lifted(self, deviations: Floats) -> tuple[int, ...]:
+        if not self._springs:
+            return ()
+        return tuple((deviations * self._gains + self._preload <= 0).nonzero()[0].tolist())
+
+    def wrenches(self, readings: Floats) -> Floats:
+        """(m, 6): forces and moments of (m, n) readings, with the bumper at rest as when its zeros were read."""
+        return np.asarray((np.atleast_2d(self._read(readings)) - self.zeros) @ self.matrix.T)
+
+    def _read(self, readings: Sequence[float] | Floats) -> Floats:
+        read = np.asarray(readings, float)
+        if read.ndim == 0 or read.shape[-1] != len(self.units):
+            raise HapticsError(
+                f"readings have the shape {read.shape}; there are {len(self.units)} units, one reading each"
+            )
+        if not np.isfinite(read).all():
+            raise HapticsError(f"readings are {shown(read.tolist())}; all must be finite numbers")
+        return read
+
+    @functools.cached_property
+    def singular_values(self) -> Floats:
+        """Of the (6, n) matrix in N and Nm, largest first."""
+        return np.asarray(np.linalg.svd(self.geometry, compute_uv=False), float)
+
+    @functools.cached_property
+    def _seen(self) -> tuple[Floats, int, Vector, float]:
+        """Left singular vectors about the units' barycenter with moments over their distance; rank; place; distance."""
+        x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
+        moved = np.array(self.matrix)
+        moved[3:] -= turning((x, y, z)) @ moved[:3]
+        spread = np.array([unit.point_m for unit in self.units]) - (x, y, z)
+        length = float(np.sqrt((spread**2).sum() / len(spread))) or 1.0
+        moved[3:] /= length
+        vectors, values, _ = np.linalg.svd(moved)
+        return vectors, int((values > 1e-9 * values[0]).sum()), (x, y, z), length
+
+    @property
+    def rank(self) -> int:
+        """Independent components of a wrench that the units see; 6 are all."""
+        return self._seen[1]
+
+    @property
+    def unseen(self) -> Floats:
+        """(6 - rank, 6): sums of a wrench's components, about the link's origin, that no unit reads: each row's inner
+        product with the wrench. As a motion the row is one that no unit resists."""
+        vectors, rank, place, length = self._seen
+        lost = np.array(vectors[:, rank:])
+        lost[3:] /= length
+        lost[:3] += turning(place) @ lost[3:]
+        lost[np.abs(lost) < 1e-12] = 0.0
+        return np.asarray((lost / np.linalg.norm(lost, axis=0)).T)
+
+    @property
+    def cannot_see(self) -> list[str]:
+        """:attr:`unseen` in words: the components that each of them is made of."""
+        return [_in_words(one) for one in reduced(self.unseen)]
+
+    def noise_at(self, point_m: Vector) -> Floats:
+        """(3,): standard deviations in N of the force of a single contact at a known point."""
+        if self.rank < 6:
+            raise HapticsError(f"the units see {self.rank} of 6 components; not all of a force is known at any point")
+        exerts = np.concatenate([np.eye(3), turning(point_m)])
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts))))
+
+    def lifting_n(self, point_m: Vector, along: Vector) -> float:
+        """The force in N, along the unit vector ``along`` at this point, from which on a unit is lifted; infinite where
+        none ever is. Needs every unit's ``preload_n``."""
+        if not np.isfinite(self._preload).all():
+            raise HapticsError("preload_n is missing; give the preload of every unit")
+        exerted = np.concatenate([along, np.cross(point_m, along)])
+        per_newton = np.linalg.lstsq(self.matrix / self._gains, exerted, rcond=None)[0]
+        falls = per_newton < 0
+        return float((self._preload[falls] / -per_newton[falls]).min(initial=np.inf))
+
+    def rezeroed(self, readings: Floats, zones: int, gravity_m_s2: Vector | None = None) -> LoadCells:
+        """The same with new zeros, from (m, n) readings while nothing touches.
+
+        Raises :class:`HapticsError` where something does: ``zones`` on the sheet, or readings that are not quiet, which
+        vary by more than three times their noise.
+
+        Args:
+            gravity_m_s2: which way things fall now, in the link's frame; None: as when the last zeros were read.
+        """
+        if zones:
+            raise HapticsError(f"{zones} zones are pressed; zeros are read while nothing touches")
+        read = np.atleast_2d(self._read(readings))
+        if len(read) < 10:
+            raise HapticsError(f"{len(read)} readings are too few for a zero; give at least 10")
+        varies = read.std(axis=0, ddof=1) * np.abs(self._gains)
+        for number, unit in enumerate(self.units):
+            if varies[number] > 3 * unit.sigma_n:
+                raise HapticsError(
+                    f"unit {number} varies by {varies[number]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
+                )
+        units = [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, read.mean(axis=0))]
+        gravity = self.zero_gravity_m_s2 if gravity_m_s2 is None else gravity_m_s2
+        matrix = self.matrix if self.calibrated else None
+        return LoadCells(units, frame=self.frame, bumper=self.bumper, zero_gravity_m_s2=gravity, matrix=matrix)
+
+
+def reduced(rows: Floats) -> Floats:
+    """Rows that span the same space, each with a leading 1 that the others lack, so that they name few components."""
+    found = np.array(rows)
+    done = 0
+    for column in range(found.shape[1]):
+        if done == len(found):
+            break
+        largest = done + int(np.abs(found[done:, column]).argmax())
+        if abs(found[largest, column]) < 1e-9:
+            continue
+        found[[done, largest]] = found[[largest, done]]
+        found[done] /= found[done, column]
+        others = np.arange(len(found)) != done
+        found[others] -= found[others, column : column + 1] * found[done]
+        done += 1
+    return found
+
+
+def _in_words(wrench: Floats) -> str:
+    parts = [name for name, value in zip(COMPONENTS, wrench) if abs(value) > 1e-6]
+    return " with ".join(parts)

@@ -1,0 +1,1 @@
+"""Contacts over time: ids that stay, from the zones of one frame after the other."""

@@ -1,0 +1,203 @@
+"""Follows contacts from frame to frame."""
+
+from __future__ import annotations
+
+import math
+
+from contactfpga.inputs.values import is_finite, shown
+from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking import joins
+from contactfpga.tracking.assignment import assign
+from contactfpga.tracking.spot import Member, Spot, across, place
+from contactfpga.tracking.tracks import Event, Kind, Tracks
+from contactfpga.zones.zone import Zone, Zones
+
+LIMITS = {
+    "gate_mm": (0.1, 10_000.0, "mm"),
+    "hold_ms": (0.0, 10_000.0, "ms"),
+    "shared_ms": (0.0, 60_000.0, "ms"),
+    "move_mm": (0.1, 10_000.0, "mm"),
+}
+"""Least and most of each setting."""
+
+
+class Tracker:
+    """Gives contacts ids that stay: hand it every frame, in order.
+
+    It neither reads nor waits: time is the frames' own, so a recording gives the same ids as the board did. A contact
+    is taken for the one of the frame before whose place, moved on as it went, is nearest; of all pairs within the gate
+    those with the least total distance. On a cylinder distances run along its surface.
+
+    ``gate_mm``: how far from there, or from where it was last seen, a contact may be found. ``hold_ms``: for how long a
+    contact that no frame shows is held, so that it comes through a bounce. ``shared_ms``: for how long a contact is
+    remembered that has a zone with others, while that zone is only as large as theirs. ``move_mm``: how far a contact
+    goes from one ``move`` to the next. Raises ValueError for a setting that cannot be.
+    """
+
+    def __init__(self, gate_mm: float = 20.0, *, hold_ms: float = 5.0, shared_ms: float = 300.0, move_mm: float = 5.0):
+        for name, value in {"gate_mm": gate_mm, "hold_ms": hold_ms, "shared_ms": shared_ms, "move_mm": move_mm}.items():
+            low, high, unit = LIMITS[name]
+            if not is_finite(value) or not low <= value <= high:
+                raise ValueError(f"{name} is {shown(value)}; it must be a number from {low:g} to {high:,g} {unit}")
+        self._gate_mm, self._move_mm = float(gate_mm), float(move_mm)
+        self._hold_us, self._shared_us = hold_ms * 1e3, shared_ms * 1e3
+        self._next_id = 1
+        self._time_us = -1
+        self._sheet: Sheet | None = None
+        self._around_mm: float | None = None
+        self._spots: list[Spot] = []
+        self._events: list[Event] = []
+
+    def update(self, zones: Zones) -> Tracks:
+        """The contacts after this frame, and what happened to them.
+
+        A frame that is flagged ``mismatch`` may be wrong, so it changes nothing; one that is flagged ``overflow`` ends
+        no contact. Frames that were lost end none either: a contact goes on where it is found next. A frame whose time
+        lies before that of the last one, or of another sheet, begins a new history. Raises TypeError for anything but
+        a frame.
+        """
+        if not isinstance(zones, Zones):
+            raise TypeError(f"update() takes a frame of zones, such as board.next() returns; it got {shown(zones)}")
+        self._events = []
+        restarted = self._restart(zones)
+        self._time_us = zones.time_us
+        for spot in self._spots:
+            spot.held = True  # until a zone of this frame is its own
+        unsure = [] if "mismatch" in zones.flags else self._step(zones)
+        active = sorted((spot.track() for spot in self._spots), key=lambda track: track.id)
+        return Tracks(self._time_us, tuple(active), tuple(self._events), tuple(unsure), restarted)
+
+    # ---- one frame
+
+    def _restart(self, zones: Zones) -> bool:
+        """End all contacts if this frame does not continue the last one."""
+        if self._sheet is zones.sheet and zones.time_us >= self._time_us:
+            return False
+        restarted = zones.time_us < self._time_us or self._sheet not in (None, zones.sheet)
+        if restarted:
+            for spot in self._spots:
+                self._end(spot)
+            self._spots = []
+        self._sheet = zones.sheet
+        radius_mm = zones.sheet.radius_mm
+        self._around_mm = None if radius_mm is None else 2 * math.pi * radius_mm
+        return restarted
+
+    def _step(self, zones: Zones) -> list[Zone]:
+        """Returns the zones that no contact has."""
+        pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
+        unsure = [zone for zone in free if zone.ghost]
+        free = [zone for zone in free if not zone.ghost]
+        merges: dict[Spot, list[Spot]] = {}
+        parts: dict[Spot, list[Zone]] = {}
+        if lost:
+            merges = joins.merged(pairs, lost, free, self._apart, self._gate_mm)
+        if free and self._spots:
+            parts = joins.parted(pairs, lost, free, merges, self._apart, self._expects, self._gate_mm)
+        self._spots = [spot for spot in lost if self._held(spot, "overflow" in zones.flags)]
+        for spot, zone in pairs:
+            self._go_on(spot, zone, merges.get(spot), parts.get(spot))
+        for spot, split in parts.items():
+            if spot not in dict(pairs):
+                self._part(spot, split)
+        for zone in free:
+            self._spots.append(Spot(zone, self._time_us, [self._begin(zone)]))
+        return unsure
+
+    def _paired(self, seen: list[Zone]) -> tuple[list[tuple[Spot, Zone]], list[Spot], list[Zone]]:
+        """Spots with the zones they go on in, spots that are not found, and zones that are new."""
+        spots = self._spots
+        if not spots or not seen:
+            return [], list(spots), list(seen)
+        costs = [[self._cost(spot, ahead, zone) for zone in seen] for spot, ahead in self._ahead()]
+        chosen = assign(costs, self._gate_mm * (1 + 1e-9))  # a pair at the gate is one
+        pairs = [(spot, seen[column]) for spot, column in zip(spots, chosen) if column is not None]
+        lost = [spot for spot, column in zip(spots, chosen) if column is None]
+        if len(pairs) == len(seen):
+            return pairs, lost, []
+        taken = set(chosen)
+        return pairs, lost, [zone for column, zone in enumerate(seen) if column not in taken]
+
+    def _ahead(self) -> list[tuple[Spot, tuple[float, float]]]:
+        return [(spot, spot.ahead(self._time_us)) for spot in self._spots]
+
+    def _cost(self, spot: Spot, ahead: tuple[float, float], zone: Zone) -> float:
+        """Distance to where it would be; also one that stopped at once is within the gate."""
+        off = self._distance(ahead[0], ahead[1], zone)
+        if off <= self._gate_mm:
+            return off
+        return self._gate_mm if self._distance(spot.x, spot.y, zone) <= self._gate_mm else math.inf
+
+    def _distance(self, x: float, y: float, zone: Zone) -> float:
+        zone_x, zone_y = place(zone)
+        return math.hypot(across(zone_x - x, self._around_mm), zone_y - y)
+
+    def _apart(self, spot: Spot, zone: Zone) -> float:
+        """From where a spot would be to a zone, in mm."""
+        return self._distance(*spot.ahead(self._time_us), zone)
+
+    def _expects(self, spot: Spot, zone: Zone) -> bool:
+        return joins.expected(spot, zone, self._time_us, self._around_mm, self._gate_mm)
+
+    # ---- what becomes of a spot
+
+    def _go_on(self, spot: Spot, zone: Zone, merged: list[Spot] | None, split: list[Zone] | None) -> None:
+        if merged:
+            joins.join(spot, merged, zone, self._time_us, self._around_mm)
+            self._spots.append(spot)
+            first, *others = (one.id for one in spot.members)
+            self._say("merge", first, zone, tuple(others))
+        elif split:
+            self._part(spot, [zone, *split])
+        else:
+            spot.follow(zone, self._time_us, self._around_mm)
+            self._spots.append(spot)
+            self._forget(spot)
+            if self._distance(spot.from_x, spot.from_y, zone) >= self._move_mm:
+                spot.from_x, spot.from_y = spot.x, spot.y
+                self._say("move", spot.members[0].id, zone)
+
+    def _part(self, spot: Spot, zones: list[Zone]) -> None:
+        first = spot.members[0].id
+        for zone, members in joins.shared_out(spot, zones, self._time_us, self._around_mm, self._gate_mm):
+            if not members:
+                members = [self._begin(zone, (first,))]
+            self._spots.append(joins.piece(spot, zone, members, self._time_us, self._around_mm))
+            if first not in [one.id for one in members]:
+                self._say("split", members[0].id, zone, (first,))
+
+    def _held(self, spot: Spot, overflow: bool) -> bool:
+        """Whether a spot that this frame does not show may still be there; ends it if not."""
+        if overflow or self._time_us - spot.seen_us < self._hold_us:
+            return True
+        self._end(spot)
+        return False
+
+    def _forget(self, spot: Spot) -> None:
+        """End a contact for which its zone has been too small for too long."""
+        spare = spot.spare()
+        if spare is None:
+            spot.small_us = None
+        elif spot.small_us is None:
+            spot.small_us = self._time_us
+        elif self._time_us - spot.small_us >= self._shared_us:
+            spot.members.remove(spare)
+            spot.center()
+            spot.small_us = None
+            self._say("up", spare.id, spot.zone, seen_us=spot.seen_us)
+
+    def _begin(self, zone: Zone, parents: tuple[int, ...] = ()) -> Member:
+        made = Member(self._next_id, self._time_us, zone.area_mm2)
+        self._next_id += 1
+        self._say("down", made.id, zone, parents)
+        return made
+
+    def _end(self, spot: Spot) -> None:
+        for one in spot.members:
+            self._say("up", one.id, spot.zone, seen_us=spot.seen_us)
+
+    def _say(
+        self, kind: Kind, name: int, zone: Zone, parents: tuple[int, ...] = (), seen_us: int | None = None
+    ) -> None:
+        seen = self._time_us if seen_us is None else seen_us
+        self._events.append(Event(kind, name, self._time_us, parents, zone, seen))

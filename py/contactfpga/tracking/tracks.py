@@ -1,0 +1,103 @@
+"""What a tracker says after a frame: the contacts that are there, and what happened to them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+from contactfpga.zones.zone import Zone
+
+Kind = Literal["down", "move", "merge", "split", "up"]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Track:
+    """One contact that is there, by the frame it was last seen in."""
+
+    id: int
+    """Stays with the contact; no other contact ever has it."""
+    zone: Zone
+    """Where it was last seen."""
+    since_us: int
+    """When it came, in device time in us."""
+    seen_us: int
+    """The frame in which it was last seen."""
+    vx_mm_s: float
+    """Its speed along x in mm/s, smoothed over some milliseconds."""
+    vy_mm_s: float
+    held: bool = False
+    """This frame does not show it. It bounces, or the frame leaves zones out (``overflow``, ``mismatch``)."""
+    merged: tuple[int, ...] = ()
+    """Ids of smaller contacts in the same zone; each gets its own zone again when they part."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        return {
+            "id": self.id,
+            "x_mm": self.zone.x_mm,
+            "y_mm": self.zone.y_mm,
+            "vx_mm_s": self.vx_mm_s,
+            "vy_mm_s": self.vy_mm_s,
+            "area_cells": self.zone.area_cells,
+            "since_us": self.since_us,
+            "seen_us": self.seen_us,
+            "held": self.held,
+            "merged": list(self.merged),
+        }
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened to a contact."""
+
+    kind: Kind
+    """``down``: it begins, and ``up``: it ends, once each. ``move``: it is ``move_mm`` from where the last event saw
+    it. ``merge``: from now on it has one zone with the ``parents``. ``split``: it has a zone of its own, apart from
+    the ``parents``."""
+    id: int
+    time_us: int
+    """Device time of the frame that showed it, in us."""
+    parents: tuple[int, ...]
+    """Ids of the other contacts of a ``merge`` or ``split``, and of a ``down`` by which a contact parted into two."""
+    zone: Zone
+    """Its zone then; of ``up``, the last one."""
+    seen_us: int
+    """When it was last seen: ``time_us``, but for ``up``, which may come up to ``hold_ms`` later."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        return {
+            "kind": self.kind,
+            "id": self.id,
+            "time_us": self.time_us,
+            "parents": list(self.parents),
+            "x_mm": self.zone.x_mm,
+            "y_mm": self.zone.y_mm,
+            "seen_us": self.seen_us,
+        }
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Tracks:
+    """What :meth:`Tracker.update` returns."""
+
+    time_us: int
+    """Of the frame."""
+    active: tuple[Track, ...]
+    """The contacts that are there, one for each zone, by their ids."""
+    events: tuple[Event, ...]
+    """What happened since the frame before, in order."""
+    unsure: tuple[Zone, ...] = ()
+    """Zones that no contact has, because other pressed switches may have made them (:attr:`Zone.ghost`). They begin
+    no contact; one that is there goes on in such a zone."""
+    restarted: bool = False
+    """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Everything in plain Python values, ready for JSON."""
+        return {
+            "tracks": [track.to_dict() for track in self.active],
+            "events": [event.to_dict() for event in self.events],
+            "unsure": len(self.unsure),
+            "restarted": self.restarted,
+        }

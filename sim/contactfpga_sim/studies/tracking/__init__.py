@@ -1,0 +1,1 @@
+"""How well contacts are followed: moving scenes with a known truth, recordings, a baseline, and where it breaks."""

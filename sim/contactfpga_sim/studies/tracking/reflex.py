@@ -1,0 +1,93 @@
+"""How soon the control loop of ``examples/reflex.py`` stops on this machine: `python -m
+contactfpga_sim.studies.tracking.reflex`.
+
+A process of its own plays a board on a pseudo-terminal, with a touch every 5 ms. Times are this machine's, with
+whatever else it does.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import statistics
+import sys
+import time
+from types import ModuleType
+from typing import NamedTuple
+
+import contactfpga
+from contactfpga.console import interrupt
+from contactfpga_sim.board.driver_speed import FRAMES, STEP_US, stream
+
+PACED = 3
+"""Frames written at once: 12,000 per second, some more than the reference Skin's."""
+
+PERIOD, TOUCHED = 64, 16
+"""Frames from touch to touch, and how many of them it lasts; FRAMES is a multiple of the first."""
+
+ROUNDS = 4
+
+HEAD = ("stops on a touch", "median", "99 %", "worst", "stops on silence")
+
+
+class Measured(NamedTuple):
+    """From the last byte of the first frame with a touch to the loop's decision, in us."""
+
+    found_us: list[float]
+    """In order of size."""
+    silent: int
+    """How often the loop stopped because the machine stood still for longer than its deadline."""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """For a table."""
+        found = self.found_us
+        p99 = found[len(found) * 99 // 100]
+        times = (statistics.median(found), p99, found[-1])
+        return f"{len(found):,}", *(f"{time:.0f} µs" for time in times), str(self.silent)
+
+
+def example() -> ModuleType:
+    """``examples/reflex.py``."""
+    spec = importlib.util.spec_from_file_location("reflex", contactfpga.examples() / "reflex.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def measured(rounds: int = ROUNDS) -> Measured:
+    """Run the loop again and again, each time from an untouched sheet."""
+    loop, found, last, silent = example(), [], (rounds - 1) * FRAMES, 0
+
+    def touched(number: int) -> bool:
+        return number % PERIOD >= PERIOD - TOUCHED
+
+    with stream(rounds, PACED, touched) as (board, queue, feeder):
+        queue.close()
+        number = 0
+        while number < last:
+            while board.latest(10.0).pressed:
+                pass
+            stop = loop.guard(board, lambda: None)
+            if stop.reason != "contact":
+                silent += 1
+                continue
+            number = stop.zones.time_us // STEP_US
+            touch = number - number % PERIOD + PERIOD - TOUCHED
+            if number > FRAMES // 10:
+                found.append((stop.decided_s - feeder.written_s[touch]) * 1e6)
+    return Measured(sorted(found), silent)
+
+
+def main() -> int:
+    """Print what came out."""
+    started = time.monotonic()
+    for name, value in zip(HEAD, measured().cells):
+        print(f"{name}: {value}")
+    print(f"in {time.monotonic() - started:.0f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

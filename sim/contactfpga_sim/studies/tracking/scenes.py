@@ -1,0 +1,120 @@
+"""Fingers that slide, cross, meet and tap: each with a number of its own, which is the truth about it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes.contacts import Contact, Swing, Track, disc
+from contactfpga_sim.scenes.scene import Scene
+
+SKIN = Skin()
+FINGER_MM = 8.0
+"""Radius of a finger's contact."""
+SECONDS = 2.0
+"""Length of a scene."""
+MIDDLE_MM = 75.0
+"""Of the sheet, along x and y."""
+
+BOUNCE_S = 0.003
+"""For how long the switches bounce after a touch and before a lift, 1 ms open and 1 ms closed."""
+
+Random = np.random.Generator
+
+
+@dataclasses.dataclass(frozen=True)
+class Finger:
+    """A contact and when it is there."""
+
+    contact: Contact
+    begins_s: float = -math.inf
+    ends_s: float = math.inf
+    bounces: bool = False
+
+    def there(self, seconds: float) -> bool:
+        """Whether it touches the sheet."""
+        return self.begins_s <= seconds < self.ends_s
+
+    def cells(self, seconds: float, skin: Skin) -> np.ndarray:
+        """(rows, columns) bool: the switches that it closes."""
+        if not self.there(seconds) or self._open(seconds):
+            return np.zeros((skin.rows, skin.columns), bool)
+        return Scene((self.contact,)).pressed(seconds, skin)
+
+    def _open(self, seconds: float) -> bool:
+        after, before = seconds - self.begins_s, self.ends_s - seconds
+        return self.bounces and min(after, before) < BOUNCE_S and int(min(after, before) * 1000) % 2 == 1
+
+
+Played = tuple[Finger, ...]
+
+
+def _finger(x_mm: object, y_mm: object, **options: float) -> Finger:
+    return Finger(Contact(shape=disc(FINGER_MM), x_mm=x_mm, y_mm=y_mm), **options)  # type: ignore[arg-type]
+
+
+def sliding(rng: Random) -> Played:
+    """Three fingers that swing along lanes 50 mm apart, each at up to 50 to 1000 mm/s."""
+    found = []
+    for lane in (25.0, 75.0, 125.0):
+        reach, speed = rng.uniform(20, 55), math.exp(rng.uniform(math.log(50), math.log(1000)))
+        hertz = speed / (2 * math.pi * reach)
+        found.append(_finger(Swing(MIDDLE_MM, reach, hertz, rng.uniform(0, 6)), lane + rng.uniform(-4, 4)))
+    return tuple(found)
+
+
+def crossing(rng: Random) -> Played:
+    """Two fingers that swing past each other on lanes 0 to 24 mm apart, at up to 300 to 1500 mm/s each."""
+    speed, gap = rng.uniform(300, 1500), rng.uniform(0, 24)
+    hertz = speed / (2 * math.pi * 55)
+    phase = rng.uniform(0, 2 * math.pi)
+    return (
+        _finger(Swing(MIDDLE_MM, 55, hertz, phase), MIDDLE_MM - gap / 2),
+        _finger(Swing(MIDDLE_MM, 55, hertz, phase + math.pi), MIDDLE_MM + gap / 2),
+    )
+
+
+def meeting(rng: Random) -> Played:
+    """Two fingers that come together until they touch, stay up to 0.4 s, and part the way they came; three times."""
+    angle, speed = rng.uniform(0, 2 * math.pi), rng.uniform(100, 400)
+    far, near = 40.0, rng.uniform(8, 11)
+    travel, rest = (far - near) / speed, rng.uniform(0.02, 0.4)
+    times, values, now = [0.0], [far], 0.0
+    for _ in range(3):
+        for pause, value in ((0.05, far), (travel, near), (rest, near), (travel, far)):
+            now += pause
+            times.append(now)
+            values.append(value)
+    apart = Track(tuple(times), tuple(values))
+    return tuple(_along(apart, angle + turn) for turn in (0.0, math.pi))
+
+
+def _along(apart: Callable[[float], float], angle: float) -> Finger:
+    def place(seconds: float, share: float) -> float:
+        return MIDDLE_MM + share * apart(seconds)
+
+    return _finger(functools.partial(place, share=math.cos(angle)), functools.partial(place, share=math.sin(angle)))
+
+
+def tapping(rng: Random) -> Played:
+    """Three fingers that tap, each within 12 mm of its place, with switches that bounce; each tap is a new contact."""
+    found = []
+    for home_x, home_y in ((30.0, 40.0), (75.0, 100.0), (120.0, 40.0)):
+        now = rng.uniform(0, 0.2)
+        while now < SECONDS:
+            long = rng.uniform(0.05, 0.3)
+            x, y = home_x + rng.uniform(-12, 12), home_y + rng.uniform(-12, 12)
+            found.append(_finger(x, y, begins_s=now, ends_s=now + long, bounces=True))
+            now += long + rng.uniform(0.03, 0.3)
+    return tuple(found)
+
+
+FAMILIES: dict[str, Callable[[Random], Played]] = {
+    family.__name__: family for family in (sliding, crossing, meeting, tapping)
+}
+"""Every family by its name."""

@@ -1,0 +1,80 @@
+"""The control loop of examples/reflex.py: it stops on contact, on silence and on a frame that may be wrong."""
+
+import itertools
+
+import pytest
+from model_board import SCAN_US, DirectPort
+
+import contactfpga
+from contactfpga_sim.studies.tracking import reflex
+
+SKIN = contactfpga.Skin()
+LOOP = reflex.example()
+
+
+class SendingPort(DirectPort):
+    """A port that sends a frame every scan, untouched until ``touch_s``, and nothing from ``silent_s`` on."""
+
+    def __init__(self, touch_s=float("inf"), silent_s=float("inf"), flags=()):
+        super().__init__(SKIN)
+        self.moments = []
+        self.touch_s, self.silent_s, self.flags = touch_s, silent_s, flags
+
+    def read(self, seconds):
+        if self._out:
+            return super().read(seconds)
+        due = self.time_us / 1e6
+        if due >= self.silent_s or due > self._seconds + seconds:
+            self._seconds += seconds
+            return b""
+        self._seconds = max(self._seconds, due)
+        if due >= self.touch_s:
+            self.moments = [(4, 10, 6)]
+            return self.frame(flags=self.flags)
+        return self.frame()
+
+
+def run(port):
+    steps = []
+    with contactfpga.open(port, SKIN) as board:
+        return LOOP.guard(board, lambda: steps.append(board.clock())), steps, board
+
+
+def test_it_stops_within_a_scan_of_a_touch():
+    stop, steps, _ = run(SendingPort(touch_s=0.0205))
+    assert stop.reason == "contact"
+    assert stop.zones.pressed == 4
+    assert 0 <= stop.decided_s - 0.0205 <= 2 * SCAN_US / 1e6
+    assert len(steps) == pytest.approx(21, abs=1)
+
+
+def test_it_steps_every_millisecond():
+    _, steps, _ = run(SendingPort(touch_s=0.1))
+    between = [b - a for a, b in itertools.pairwise(steps)]
+    assert between == [pytest.approx(0.001, abs=2 * SCAN_US / 1e6)] * (len(steps) - 1)
+    assert len(steps) == pytest.approx(100, abs=2)
+
+
+def test_silence_stops_it_like_a_contact():
+    stop, _, _ = run(SendingPort(silent_s=0.03))
+    assert (stop.reason, stop.zones) == ("silence", None)
+    assert stop.decided_s - 0.03 == pytest.approx(LOOP.SILENCE_S, abs=2 * LOOP.PERIOD_S)
+
+
+@pytest.mark.parametrize("flag", ["mismatch", "fault"])
+def test_a_frame_that_may_be_wrong_stops_it(flag):
+    stop, _, _ = run(SendingPort(touch_s=0.01, flags=[flag]))
+    assert stop.reason == "fault"
+
+
+def test_the_example_says_what_stopped_it(capsys, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["reflex.py", "sim://"])
+    assert LOOP.main() == 0
+    assert "steps: contact\n<Zones: 1 zone," in capsys.readouterr().out
+
+
+def test_the_measurement_counts_touches():
+    found = reflex.measured(2)
+    assert found.found_us == sorted(found.found_us)
+    assert all(time_us > 0 for time_us in found.found_us)
+    assert len(found.found_us) + found.silent > 0

@@ -1,0 +1,84 @@
+"""The command "sample at": frames after it are sampled at another clock of each row, and nothing else changes."""
+
+import itertools
+
+import numpy as np
+import pytest
+from sample import sample
+
+from contactfpga import Skin
+from contactfpga.skin.derived import SAMPLE_AT, Derived
+from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim.compare import compare
+from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.request import command, request
+from contactfpga_sim.golden.trace import Cuts
+
+TINY = {"clock_hz": 1_000_000, "baud": 250_000, "report": "cells"}
+FAST = {"scan": "reversal", "precharge_us": 3, "project_us": 6}
+SKINS = {
+    "direct": Skin(rows=3, columns=4, settle_us=16, release_us=2, **TINY),
+    "released for a clock": Skin(rows=3, columns=4, settle_us=18, release_us=1, diodes="row2col", **TINY),
+    "one cell": Skin(rows=1, columns=1, settle_us=20, release_us=1, **TINY),
+    "masked": Skin(rows=4, columns=3, settle_us=13, release_us=3, mask=((0, 0), (1, 1), (3, 0)), **TINY),
+    "precharged": Skin(rows=3, columns=4, settle_us=14, precharge_us=3, guard=True, **TINY),
+    "chains": Skin(rows=3, columns=4, settle_us=30, row_drive="74hc595", column_read="74hc165", **TINY),
+    "two chains, guarded": Skin(rows=5, columns=3, settle_us=24, row_drive="74hc595", column_read="74hc165",
+                                row_chains=2, column_chains=2, guard=True, fail_safe=True, **TINY),
+    "debounced": Skin(rows=3, columns=4, settle_us=16, release_us=2, debounce="sym_defer_pk", debounce_press_us=50,
+                      debounce_release_us=100, **TINY),
+    "on change": Skin(rows=2, columns=2, settle_us=14, release_us=2, send="on_change", keep_alive_ms=0.5,
+                      guard=True, **TINY),
+    "without diodes": Skin(rows=3, columns=3, settle_us=12, release_us=2, diodes="none", **TINY),
+    "reversal": Skin(rows=3, columns=4, settle_us=9, **FAST, **TINY),
+    "reversal, guarded": Skin(rows=3, columns=4, settle_us=8, diodes="row2col", guard=True, alive=True, **FAST, **TINY),
+    "reversal, debounced": Skin(rows=4, columns=3, settle_us=7, send="on_change", keep_alive_ms=5,
+                                debounce="asym_eager_defer_pk", debounce_press_us=50, debounce_release_us=100,
+                                mask=((1, 0),), **FAST, **TINY),
+}  # fmt: skip
+QUICK = ["two chains, guarded", "reversal, guarded"]
+
+
+def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
+    """Cells, stuck columns and cuts that change at any clock, more often than rows are driven; commands of any value,
+    other commands and requests at any time."""
+    rng, known = np.random.default_rng(seed), facts(skin)
+    cycles = frames * known.scan_clocks
+    starts = np.cumsum(rng.integers(1, 2 * known.row_clocks, size=cycles // known.row_clocks))
+    pieces = []
+    for start in starts[starts < cycles]:
+        stuck = rng.random(skin.columns) < 0.3 if skin.scan == "raster" and rng.random() < 0.05 else None
+        pieces.append((int(start), rng.random((skin.rows, skin.columns)) < rng.choice([0, 0.5, 0.9, 1]), stuck))
+    cuts = []
+    if skin.guard:
+        cut = sorted({int(at) for at in rng.integers(cycles, size=4)})
+        cuts = [(at, Cuts({int(rng.integers(skin.rows + 1)): int(rng.integers(3))} if n % 2 else {})) for n, at in
+                enumerate(cut)]  # fmt: skip
+    received, start = [], int(rng.integers(known.scan_clocks))
+    values = [0, 1, 2, 3, known.first_sample, known.settle - 1, known.settle, known.settle + 1, (1 << 21) - 1, 5 << 14]
+    for number in itertools.count(129 * 128 + 1):
+        value = int(rng.choice([*values, *rng.integers(known.first_sample, known.settle, size=10)]))
+        what = int(rng.choice([2, 2, 2, 2, 1, 3]))
+        if not received:
+            what, value = 2, known.first_sample
+        data = command(number, what, value, False, known.bit_clocks)
+        if number % 8 == 0 or (received and rng.random() < 0.2):
+            data = request(number | 1, False, known.bit_clocks)
+        if start + len(data) * 10 * known.bit_clocks > cycles:
+            return Timeline(pieces, received, cuts)
+        received.append((start, data))
+        start += len(data) * 10 * known.bit_clocks + int(rng.integers(1, 4 * known.scan_clocks))
+    raise AssertionError
+
+
+@pytest.mark.parametrize("name", sample(SKINS, quick=QUICK))
+def test_the_whole_board_is_the_golden_models_in_every_clock(name):
+    skin = SKINS[name]
+    assert SAMPLE_AT in Derived(skin).commands
+    cycles = max(25 * facts(skin).scan_clocks, 5_000)
+    timeline = commanded(skin, len(name), cycles // facts(skin).scan_clocks)
+    expected = predict(skin, timeline, cycles)
+    plain = predict(skin, Timeline(timeline.pieces, (), timeline.cuts), cycles)
+    assert [row[1] for row in expected.rows] != [row[1] for row in plain.rows], "no sample was moved"
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100

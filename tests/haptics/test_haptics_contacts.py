@@ -1,0 +1,198 @@
+"""Forces at contacts: random bumpers and loads, and what chance does to them."""
+
+import numpy as np
+import pytest
+from bumpers import (
+    exerted,
+    flat,
+    hexapod,
+    in_cone,
+    on_cylinder,
+    random_bumper,
+    scattered,
+    solved,
+    touch,
+    wrench,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contactfpga.haptics import Cylinder, HapticsError, contacts
+from contactfpga.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
+
+SEEDS = st.integers(0, 2**32 - 1)
+MU = 0.5
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_one_force_is_found_exactly(seed):
+    rng = np.random.default_rng(seed)
+    (point,), (normal,) = scattered(rng, 1)
+    force = in_cone(rng, normal, MU, rng.uniform(0.1, 50))
+    for noise in (None, random_bumper(rng).noise):
+        (found,) = result = solved([point], [normal], exerted(point, force, noise))
+        assert found.force_n == pytest.approx(force, abs=1e-9)
+        assert found.interval_n == pytest.approx((found.normal_n, found.normal_n))
+        assert found.normal_n == pytest.approx(-force @ normal)
+        assert (result.model, result.rank, result.beyond_friction) == (PURE_FORCE, 3, False)
+
+
+@given(SEEDS)
+@settings(max_examples=40, deadline=None)
+def test_two_pushes_without_friction_are_found_exactly(seed):
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, 2)
+    pushes = rng.uniform(0.1, 50, 2)
+    for noise in (None, random_bumper(rng).noise):
+        found = solved(points, normals, exerted(points, -pushes[:, None] * normals, noise))
+        turned = abs((points[0] - points[1]) @ np.cross(*normals)) > 1e-4  # else normals may be a squeeze
+        if turned:
+            assert [one.normal_n for one in found] == pytest.approx(pushes, rel=1e-5)
+
+
+@given(SEEDS)
+@settings(max_examples=80, deadline=None)
+def test_no_contact_ever_pulls(seed):
+    """Whatever the wrench, also one that pulls, and however wrong friction is."""
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, int(rng.integers(1, 5)))
+    noise = random_bumper(rng).noise if rng.random() < 0.5 else None
+    loaded = wrench(rng.normal(0, 10, 6) * [1, 1, 1, 0.05, 0.05, 0.05], noise)
+    for one in solved(points, normals, loaded, friction=float(rng.choice([0.0, 0.3, 1.0]))):
+        assert one.normal_n >= 0
+        assert np.array(one.force_n) @ one.normal <= 1e-9
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_a_turned_link_has_turned_forces(seed):
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, int(rng.integers(1, 4)))
+    forces = [in_cone(rng, normal, 0.3, rng.uniform(1, 30)) for normal in normals]
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    moved = rng.normal(0, 0.2, 3)
+    first = solved(points, normals, exerted(points, forces))
+    second = solved(points @ turn.T + moved, normals @ turn.T, exerted(points @ turn.T + moved, forces @ turn.T))
+    assert first.model == second.model
+    if len(points) < 3 or first.model == PURE_FORCE_WITH_KNOWN_DIRECTION:
+        for one, other in zip(first, second):
+            assert turn @ one.force_n == pytest.approx(other.force_n, abs=1e-4)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.002])
+@pytest.mark.parametrize("count", [1, 2])
+def test_covariance_and_chi2_are_those_of_many_trials(count, sigma):
+    rng = np.random.default_rng(7)
+    cells = hexapod(60, 0.075)
+    points, normals = scattered(rng, count)
+    forces = -rng.uniform(8, 12, count)[:, None] * normals
+    exact = exerted(points, forces).array
+    found, chi2 = [], []
+    for _ in range(1500):
+        moved = points + sigma * rng.standard_normal(points.shape)
+        six = (exerted(moved, forces).array if sigma else exact) + cells.geometry @ rng.normal(0, 0.05, 6)
+        touches = [touch(*pair, MU, sigma) for pair in zip(points, normals)]
+        result = contacts(wrench(six, cells.noise), touches)
+        found.append(np.ravel([one.force_n for one in result]))
+        chi2.append(result.chi2)
+    freedom = 6 - result.rank
+    assert result.freedom == freedom
+    assert np.mean(chi2) == pytest.approx(freedom, rel=0.12)
+    assert np.mean(np.array(chi2) > {1: 3.841, 3: 7.815}[freedom]) == pytest.approx(0.05, abs=0.02)
+    keep = np.eye(3 * count) - sum((np.outer(n, n) for n in result.null_space), np.zeros((3 * count,) * 2))
+    spread = keep @ np.cov(np.transpose(found)) @ keep
+    stated = result.covariance_n2
+    assert np.sqrt(np.diag(spread)) == pytest.approx(np.sqrt(np.diag(stated)), rel=0.1, abs=2e-3)
+
+
+def test_a_place_that_is_unsure_raises_no_alarm():
+    """Without the place's own spread nearly every frame of a 12 N push would."""
+    rng = np.random.default_rng(2)
+    cells = hexapod(60, 0.075)
+    reach = 3.8e-3
+    alarms = {0.0: 0, reach / 2: 0}
+    for _ in range(300):
+        point, normal = on_cylinder(rng.uniform(0, 360), rng.uniform(0.02, 0.13))
+        off = reach * np.sqrt(rng.random()) * np.array([np.cos(t := rng.uniform(0, 6.3)), np.sin(t)])
+        shown = point + off[0] * np.cross([0, 0, 1], normal) + off[1] * np.array([0, 0, 1.0])
+        six = exerted(point, -12 * normal).array + cells.geometry @ rng.normal(0, 0.05, 6)
+        for sigma in alarms:
+            alarms[sigma] += contacts(wrench(six, cells.noise), [touch(shown, normal, MU, sigma)]).alarm
+    assert alarms[reach / 2] == 0
+    assert alarms[0.0] > 0.85 * 300
+
+
+def test_what_only_the_units_see():
+    """The sheet has one zone; a second push is in the wrench alone."""
+    cells = hexapod(60, 0.075)
+    points, normals = zip(on_cylinder(0, 0.03), on_cylinder(120, 0.12))
+    both = exerted(points, [-12 * normals[0], -6 * normals[1]], cells.noise)
+    seen = contacts(both, [touch(points[0], normals[0], MU, 0.002)])
+    assert seen.alarm
+    assert seen.unexplained is not None
+    clean = exerted(points[0], -12 * normals[0], cells.noise)
+    assert contacts(clean, [touch(points[0], normals[0], MU, 0.002)]).unexplained is None
+
+
+def test_force_without_a_zone():
+    cells = hexapod(60, 0.075)
+    point, normal = on_cylinder(70, 0.1)
+    found = contacts(exerted(point, -2 * normal, cells.noise), [], Cylinder(0.038))
+    assert found.center.point_m == pytest.approx(point)
+    assert (found.model, len(found), found.freedom, found.alarm) == (FULL_WRENCH, 0, 6, True)
+    assert not contacts(wrench([0] * 6, cells.noise), [], Cylinder(0.038)).alarm
+    rng = np.random.default_rng(1)
+    quiet = [contacts(wrench(cells.geometry @ rng.normal(0, 0.05, 6), cells.noise), []).alarm for _ in range(2000)]
+    assert np.mean(quiet) < 0.004
+
+
+def test_a_squeeze_is_seen_by_the_sheet_alone():
+    points, normals = zip(on_cylinder(0, 0.05), on_cylinder(180, 0.05))
+    found = solved(points, normals, exerted(points, [-7 * normals[0], -7 * normals[1]], hexapod(60, 0.07).noise))
+    assert len(found.unfelt) == 2
+    assert [one.interval_n for one in found] == [(pytest.approx(0, abs=1e-9), None)] * 2
+    pushed = solved(points[:1], normals[:1], exerted(points[0], -7 * normals[0], hexapod(60, 0.07).noise))
+    assert pushed.unfelt == []
+
+
+def test_normals_on_a_cylinder_have_rank_4_at_most():
+    rng = np.random.default_rng(3)
+    points, normals = scattered(rng, 6)
+    found = solved(points, normals, exerted(points, -rng.uniform(1, 9, 6)[:, None] * normals))
+    assert (found.model, found.rank) == (PURE_FORCE_WITH_KNOWN_DIRECTION, 4)
+    assert np.shape(found.null_space) == (2, 6)
+
+
+def test_three_units_on_a_plane_find_pushes():
+    """They see no friction; its forces are not asked."""
+    cells = flat()
+    points = np.array([[0.03, 0.01, 0.0], [-0.04, 0.02, 0.0]])
+    normals = np.tile([0, 0, 1.0], (2, 1))
+    loaded = exerted(points, [[0, 0, -5], [0, 0, -9]])
+    six = cells.wrench(np.linalg.lstsq(cells.matrix, loaded.array, rcond=None)[0])
+    found = contacts(six, [touch(*pair) for pair in zip(points, normals)])
+    assert [one.normal_n for one in found] == pytest.approx([5, 9])
+    assert (found.model, found.rank, found.freedom) == (PURE_FORCE_WITH_KNOWN_DIRECTION, 2, 1)
+
+
+def test_contacts_at_one_place_are_refused():
+    with pytest.raises(HapticsError, match="contacts 0 and 1 both lie at"):
+        contacts(wrench([1] * 6), [touch((0, 0, 0), (0, 0, 1))] * 2)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.002])
+def test_chi2_of_units_that_see_no_friction(sigma):
+    """Three units on a plane: of three components one push takes one."""
+    rng = np.random.default_rng(9)
+    cells, normal = flat(), np.array([0, 0, 1.0])
+    chi2 = []
+    for _ in range(1000):
+        point = np.array([0.02, -0.03, 0.0])
+        moved = point + sigma * rng.standard_normal(3) * [1, 1, 0]
+        six = exerted(moved, -12 * normal).array + cells.geometry @ rng.normal(0, 0.05, 3)
+        found = contacts(wrench(six, cells.noise), [touch(point, normal, 0.5, sigma)])
+        chi2.append(found.chi2)
+    assert found.freedom == 2
+    assert np.mean(chi2) == pytest.approx(2, rel=0.12)

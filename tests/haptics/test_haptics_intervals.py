@@ -1,0 +1,150 @@
+"""How far each push may vary, against linear programs and brute force, which share no code with it."""
+
+import numpy as np
+import pytest
+from bumpers import (
+    exerted,
+    in_cone,
+    scattered,
+    solved,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from contactfpga.errors import MissingExtra
+from contactfpga.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
+
+SEEDS = st.integers(0, 2**32 - 1)
+MU = 0.5
+FACETS = 96
+"""Of the cones of linear programs: 0.05 % wider than friction's."""
+
+
+def facets(normal, friction, count=FACETS):
+    """Rows A of A f <= 0 that hold a force within a cone of many facets, which touches friction's from outside."""
+    first = np.cross(normal, [0.3, 0.5, 0.8])
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    turns = 2 * np.pi * np.arange(count) / count
+    return np.cos(turns)[:, None] * first + np.sin(turns)[:, None] * second + friction * normal
+
+
+def oracle(points, normals, six, friction):
+    """Least and largest push of each contact by linear programs, None where there is no largest one."""
+    count = len(points)
+    equal = np.zeros((6, 3 * count))
+    for number, point in enumerate(points):
+        for axis in range(3):
+            force = np.eye(3)[axis]
+            equal[:, 3 * number + axis] = [*force, *np.cross(point, force)]
+    rows = np.zeros((FACETS * count, 3 * count))
+    for number, normal in enumerate(normals):
+        rows[FACETS * number : FACETS * (number + 1), 3 * number : 3 * number + 3] = facets(normal, friction)
+    found = []
+    for number, normal in enumerate(normals):
+        cost = np.zeros(3 * count)
+        cost[3 * number : 3 * number + 3] = -normal
+        ends = []
+        for sign in (1, -1):
+            run = linprog(sign * cost, rows, np.zeros(len(rows)), equal, six, bounds=(None, None))
+            ends.append(sign * run.fun if run.status == 0 else None)
+        found.append(ends)
+    return found
+
+
+@given(SEEDS, st.sampled_from([0.1, 0.5, 1.2]))
+@settings(max_examples=15, deadline=None)
+def test_intervals_of_two_are_those_of_linear_programs(seed, friction):
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, 2)
+    forces = [in_cone(rng, normal, friction, rng.uniform(1, 30)) for normal in normals]
+    loaded = exerted(points, forces)
+    found = solved(points, normals, loaded, friction)
+    assert not found.beyond_friction
+    for one, force, (low, high) in zip(found, forces, oracle(points, normals, loaded.array, friction)):
+        push = -np.array(one.force_n) @ one.normal
+        least, largest = one.interval_n
+        assert least - 1e-6 <= -force @ np.array(one.normal) <= (np.inf if largest is None else largest) + 1e-6
+        assert least - 1e-6 <= push <= (np.inf if largest is None else largest) + 1e-6
+        assert least == pytest.approx(low, abs=2e-3 * max(1, low))
+        if largest is None:
+            assert high is None
+        elif high is not None and high < 1e3:
+            assert largest == pytest.approx(high, rel=5e-3, abs=2e-3)
+
+
+def test_forces_that_friction_allows_reach_both_ends():
+    """Brute force: forces drawn within the cones that exert the same wrench never leave the interval, and fill it."""
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        points, normals = scattered(rng, 2)
+        forces = np.array([in_cone(rng, normal, MU, rng.uniform(2, 20)) for normal in normals])
+        found = solved(points, normals, exerted(points, forces))
+        along = (points[0] - points[1]) / np.linalg.norm(points[0] - points[1])
+        squeezes = np.linspace(-200, 200, 400_001)
+        both = forces[:, None] + np.stack([squeezes, -squeezes])[:, :, None] * along
+        pushes = -np.einsum("ksi,ki->ks", both, normals)
+        sideways = np.linalg.norm(both + pushes[:, :, None] * normals[:, None], axis=2)
+        allowed = ((pushes >= 0) & (sideways <= MU * pushes)).all(axis=0)
+        for number, one in enumerate(found):
+            least, largest = one.interval_n
+            reached = pushes[number, allowed]
+            assert reached.min() == pytest.approx(least, abs=2e-3)
+            if largest is not None and largest < 150:
+                assert reached.max() == pytest.approx(largest, abs=2e-3)
+
+
+@given(SEEDS)
+@settings(max_examples=8, deadline=None)
+def test_cones_give_the_intervals_of_linear_programs(seed):
+    pytest.importorskip("clarabel", reason="extra haptics")
+    rng = np.random.default_rng(seed)
+    points, normals = scattered(rng, 3)
+    forces = [in_cone(rng, normal, 0.6 * MU, rng.uniform(1, 30)) for normal in normals]
+    loaded = exerted(points, forces)
+    found = solved(points, normals, loaded, cones=True)
+    assert found.model == PURE_FORCE
+    exerts = exerted(points, [one.force_n for one in found]).array
+    assert exerts == pytest.approx(loaded.array, abs=2e-4 * np.abs(loaded.array).max())
+    for one, (low, high) in zip(found, oracle(points, normals, loaded.array, MU)):
+        assert one.interval_n[0] == pytest.approx(low, abs=1e-2 * max(1, low))
+        assert (one.interval_n[1] is None) == (high is None)
+        if high is not None and high < 1e3:
+            assert one.interval_n[1] == pytest.approx(high, rel=2e-2)
+
+
+def test_cones_agree_with_the_exact_intervals_of_two():
+    pytest.importorskip("clarabel", reason="extra haptics")
+    rng = np.random.default_rng(8)
+    for _ in range(10):
+        points, normals = scattered(rng, 2)
+        loaded = exerted(points, [in_cone(rng, normal, 0.4, rng.uniform(1, 30)) for normal in normals])
+        exact, cones = solved(points, normals, loaded), solved(points, normals, loaded, cones=True)
+        for one, other in zip(exact, cones):
+            pairs = [(low, np.inf if high is None else high) for low, high in (one.interval_n, other.interval_n)]
+            assert pairs[1] == pytest.approx(pairs[0], rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5, 2.0])
+def test_three_zones_on_a_plane_have_exact_pushes(friction):
+    """At any friction, with scipy alone."""
+    points = np.array([[0.05, 0, 0.01], [-0.03, 0.04, 0.01], [-0.02, -0.05, 0.01]])
+    normals = np.tile([0, 0, 1.0], (3, 1))
+    pushes = np.array([3.0, 8.0, 5.0])
+    found = solved(points, normals, exerted(points, -pushes[:, None] * normals), friction)
+    assert found.model == PURE_FORCE_WITH_KNOWN_DIRECTION
+    for one, push in zip(found, pushes):
+        assert one.normal_n == pytest.approx(push)
+        assert one.interval_n == pytest.approx((push, push))
+
+
+def test_without_the_solvers_the_extra_is_named(monkeypatch):
+    points, normals = scattered(np.random.default_rng(0), 4)
+    loaded = exerted(points, -5 * normals)
+    monkeypatch.setitem(__import__("sys").modules, "clarabel", None)
+    with pytest.raises(MissingExtra, match=r"\.\[haptics\]"):
+        solved(points, normals, loaded)[0].interval_n  # noqa: B018
+    monkeypatch.setitem(__import__("sys").modules, "scipy.optimize", None)
+    with pytest.raises(MissingExtra, match=r"\.\[haptics\]"):
+        solved(points, normals, loaded)

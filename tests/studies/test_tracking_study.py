@@ -1,0 +1,166 @@
+"""How the tracker is judged: the truth of its scenes, the scores beside the baseline, and where it breaks."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sample import sample
+
+from contactfpga_sim.pages import failures_page, tracking_page, writer
+from contactfpga_sim.pages.figures import RECORDINGS
+from contactfpga_sim.studies.tracking import breaks, frames, judge, recorded, scenes, scores, speed
+from contactfpga_sim.studies.tracking.nearest import Nearest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs/tracking.md"
+PITCH_MM = 10.0
+
+
+@pytest.mark.parametrize("family", scenes.FAMILIES)
+def test_truth_lies_where_a_zone_is_that_no_other_contact_has(family):
+    fingers = scenes.FAMILIES[family](np.random.default_rng(3))
+    seen = 0
+    for shown in frames.played(fingers, 40.0):
+        places = [(zone.x_mm, zone.y_mm) for zone in shown.zones]
+        alone = [place for place in places if place not in shown.shared]
+        assert len(alone) + len(shown.shared) == len(places)
+        for number, place in shown.truth.items():
+            seen += 1
+            near = [one for one in alone if math.dist(one, place) < PITCH_MM]
+            assert near or fingers[number].bounces
+    assert seen > 60
+
+
+@pytest.mark.parametrize("family", ["crossing", "meeting"])
+def test_their_fingers_do_share_zones(family):
+    shown = list(frames.played(scenes.FAMILIES[family](np.random.default_rng(3)), 100.0))
+    assert sum(bool(one.shared) for one in shown) > 10
+    assert sum(len(one.truth) == 2 for one in shown) > 10
+
+
+def test_a_tap_bounces_at_both_ends():
+    finger = scenes.tapping(np.random.default_rng(1))[0]
+    skin = scenes.SKIN
+    some = [finger.cells(finger.begins_s + ms / 1000, skin).any() for ms in (-1, 0.5, 1.5, 2.5, 3.5)]
+    assert some == [False, True, False, True, True]
+    assert not finger.cells(finger.ends_s - 0.0015, skin).any()
+    assert not finger.cells(finger.ends_s, skin).any()
+
+
+def test_the_baseline_takes_the_closest_pairs_first():
+    nearest = Nearest(gate_mm=20.0)
+
+    def update(cells):
+        pressed = np.zeros((16, 16), bool)
+        for row, column in cells:
+            pressed[row, column] = True
+        return nearest.update(frames.zones_of(pressed, 0)[0])
+
+    assert update([(3, 3), (3, 6)]) == {1: (30.0, 30.0), 2: (60.0, 30.0)}
+    assert update([(3, 4), (3, 7)]) == {1: (40.0, 30.0), 2: (70.0, 30.0)}
+    assert update([(3, 6)]) == {2: (60.0, 30.0)}
+    assert update([(9, 9)]) == {3: (90.0, 90.0)}
+
+
+def test_scores_are_those_counted_by_hand():
+    """Two contacts, four frames: one id changes, one is missed once, one is where nothing is."""
+    pytest.importorskip("motmetrics")
+    here, there, away = (0.0, 0.0), (50.0, 0.0), (150.0, 150.0)
+    history = [
+        ({0: here, 1: there}, {7: here, 8: there}),
+        ({0: here, 1: there}, {7: here, 9: there}),
+        ({0: here, 1: there}, {7: here}),
+        ({0: here, 1: there}, {7: here, 9: there, 5: away}),
+    ]
+    found = judge.score([history])
+    assert (found.frames, found.switches, found.switches_per_1000) == (4, 1, 250.0)
+    assert found.mota == pytest.approx(1 - (1 + 1 + 1) / 8)
+    assert found.idf1 == pytest.approx(2 * 6 / (8 + 8))
+
+
+@pytest.mark.parametrize("family", scenes.FAMILIES)
+def test_the_tracker_is_no_worse_than_the_nearest_zone(family):
+    pytest.importorskip("motmetrics")
+    for rate in (50.0, 200.0)[: 2 if family in ("crossing", "meeting") else 1]:
+        ours, nearest = (scores.of_family(family, rate, 3)[name] for name in judge.TRACKERS)
+        assert ours.idf1 >= nearest.idf1 - 1e-9
+        assert ours.mota >= nearest.mota - 0.01
+    if family == "meeting":
+        assert ours.idf1 > nearest.idf1 + 0.1
+
+
+def test_a_row_of_the_scores_is_up_to_date():
+    pytest.importorskip("motmetrics")
+    text = PAGE.read_text(encoding="utf-8")
+    for name, score in scores.of_family("meeting", 50.0).items():
+        first = ("`meeting`", "50") if name == "`Tracker`" else ("", "")
+        assert writer.line((*first, name, *score.cells)) in text.splitlines()
+
+
+@pytest.mark.campaign
+def test_all_scores_are_up_to_date():
+    pytest.importorskip("motmetrics")
+    text = PAGE.read_text(encoding="utf-8")
+    assert writer.update(text, {"scores": tracking_page.scores_table}) == text
+
+
+@pytest.mark.parametrize("name", sample(breaks.STUDIES, quick=["slide", "bounce"]))
+def test_the_breaks_are_up_to_date(name):
+    study = breaks.STUDIES[name]
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    for row in failures_page.rows(study, study.turn(), False):
+        assert row in lines
+
+
+def test_breaks_have_their_closed_forms():
+    """Gate 20 mm; a speed is believed for 50 ms; a frame shows a place to half a pitch."""
+    at_once = breaks.SLIDE.turn()
+    assert at_once["`Tracker`, at once"].breaks_at == pytest.approx(20.0, abs=PITCH_MM / 2)
+    assert at_once["nearest zone, at once"].breaks_at == pytest.approx(20.0, abs=PITCH_MM / 2)
+    for name, mm in (("`Tracker`", 20 + 500 * 0.05), ("nearest zone", 20)):
+        run, ms = breaks.LOST.runs[name], mm / 500 * 1000
+        assert [run(ms - PITCH_MM).right, run(ms + PITCH_MM).right] == [True, False]
+    for method, turned in breaks.BOUNCE.turn().items():
+        hold = {"5": 5.0, "0": 20.0}.get(method.strip("`")[-1], 0.5)
+        assert turned.breaks_at == hold
+
+
+def test_two_fingers_share_a_zone_from_the_distance_that_the_page_says():
+    run = breaks.MEET.runs["`Tracker`"]
+    assert [run(22.0).told, run(20.0).told] == [(), ("merge",)]
+    assert "their middles are 20 mm apart or less" in PAGE.read_text(encoding="utf-8")
+
+
+def test_ten_thousand_frames_per_second_with_two_contacts():
+    """Of processor time, so that nothing else counts; a slower machine decodes slower, too."""
+    found = speed.measure(2, 2048)
+    assert found.tracked > 10_000 or found.ratio < 2
+
+
+def test_overlap_links_the_frames_of_a_recording(tmp_path):
+    cells = np.zeros((4, 8, 12), bool)
+    for number in range(4):
+        cells[number, 2:4, number : number + 2] = True
+        cells[number, 6, 11 - number] = True  # one cell that moves on by one: no overlap, so it is another one
+    np.savez(tmp_path / "one.npz", pressed=cells, rate_hz=50.0, pitch_mm=5.0, segment=np.array([0, 0, 0, 1]))
+    first, second = recorded.histories(tmp_path / "one.npz", 1)
+    assert [sorted(shown.truth) for shown in first] == [[0, 1], [0, 2], [0, 3]]
+    assert [shown.zones.time_us for shown in first] == [0, 20_000, 40_000]
+    assert first[1].truth[0] == (7.5, 12.5)
+    assert sorted(second[0].truth) == [0, 1]
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("name", sample(["sdh13x6", "feet45x52"], quick=["sdh13x6"]))
+def test_on_recordings_it_is_no_worse_than_the_nearest_zone(name):
+    pytest.importorskip("motmetrics")
+    path = ROOT / RECORDINGS / f"{name}.dev.npz"
+    if not path.is_file():
+        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    stretches = [stretch[:200] for stretch in recorded.histories(path, 1)[:2]]
+    ours, nearest = (
+        judge.score([judge.followed(make(), one, judge.JUDGED_HZ) for one in stretches])
+        for make in judge.TRACKERS.values()
+    )
+    assert ours.idf1 >= nearest.idf1 - 0.01
