@@ -7,7 +7,7 @@ import random
 import pytest
 
 import contactfpga
-from contactfpga import Skin
+from contactfpga import Skin, SkinError
 from contactfpga.driver import health
 from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.cosim import bench_native
@@ -88,6 +88,12 @@ def test_a_board_without_units_says_so():
         with pytest.raises(contactfpga.NoSuchCommand, match="build its Skin with units"):
             board.set_zero(0, 0)
         assert board.unit_history is None
+
+
+def test_a_converter_without_a_model_is_not_taken_for_another():
+    skin = SKIN.replace(converter="toy_converter:MINE")
+    with pytest.raises(SkinError, match="converter is 'toy_converter:MINE', which is not simulated"):
+        VirtualBoard(skin)
 
 
 def test_the_compiled_board_is_the_golden_models_in_every_clock():

@@ -14,6 +14,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
+from contactfpga_sim.sheet.converter import check_simulated
 from contactfpga_sim.sheet.line import Line
 from contactfpga_sim.sheet.matrix import Contention
 from contactfpga_sim.sheet.shorts import Shorts
@@ -187,6 +188,8 @@ class CompiledBoard:
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
     """What the board of a Skin is built from: its gateware, or a netlist with the gateware's pins and no probes,
     which notes neither rows nor records nor bytes."""
+
+    check_simulated(skin)
 
     def elaborate() -> Any:
         from contactfpga_hdl.top import Top

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from contactfpga.choices import converters
+from contactfpga.errors import SkinError
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
@@ -54,5 +55,13 @@ def converter_of(skin: Skin) -> Mcp3208 | None:
     """The one of a Skin, or None without units."""
     if not skin.units:
         return None
-    channels = converters.find(skin.converter).channels
-    return _MODELS[skin.converter if isinstance(skin.converter, str) else skin.converter.name]([0] * channels)
+    check_simulated(skin)
+    chosen = converters.find(skin.converter)
+    return _MODELS[chosen.name]([0] * chosen.channels)
+
+
+def check_simulated(skin: Skin) -> None:
+    """Raises SkinError for units on a converter that no simulation knows."""
+    chosen = converters.find(skin.converter)
+    if skin.units and chosen.name not in _MODELS:
+        raise SkinError(f"converter is {chosen.name!r}, which is not simulated; give it a model (docs/extend.md)")
