@@ -9,6 +9,7 @@ import pytest
 import contactfpga
 from contactfpga import Skin, SkinError
 from contactfpga.driver import health
+from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare
@@ -88,6 +89,13 @@ def test_a_board_without_units_says_so():
         with pytest.raises(contactfpga.NoSuchCommand, match="build its Skin with units"):
             board.set_zero(0, 0)
         assert board.unit_history is None
+
+
+def test_readings_are_no_frames_for_what_measures_latencies():
+    sent = predict(SKIN, Timeline([]), 60_000).bytes
+    frames = list(frames_in(SKIN, sent))
+    assert len(frames) > 20
+    assert sum(value >> 4 == 8 and after == 0 for (_, value), (_, after) in zip(sent[:-4], sent[4:], strict=True)) > 20
 
 
 def test_a_converter_without_a_model_is_not_taken_for_another():

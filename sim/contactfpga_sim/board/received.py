@@ -10,6 +10,7 @@ from contactfpga.skin.widths import Widths
 from contactfpga.wire import framing, protocol
 from contactfpga.wire.faults import KIND_FAULTS
 from contactfpga.wire.protocol import Frame
+from contactfpga.wire.units import KIND_UNITS
 
 
 class Received(NamedTuple):
@@ -26,7 +27,7 @@ class Received(NamedTuple):
 
 class Receiver:
     """Splits the bytes of a board of this Skin into packets and reads the frames among them; hellos are counted, and
-    reports of faults passed over."""
+    reports of faults and readings of units passed over."""
 
     def __init__(self, skin: Skin) -> None:
         self._prefix = protocol.check_prefix(skin)
@@ -47,7 +48,7 @@ class Receiver:
                 plain = framing.unseal(packet, self._prefix)
                 kind = framing.kind_of(plain)
                 self.hellos += kind == framing.KIND_HELLO
-                if kind not in (framing.KIND_HELLO, KIND_FAULTS):
+                if kind not in (framing.KIND_HELLO, KIND_FAULTS, KIND_UNITS):
                     frame = protocol.decode_frame(plain, self._widths)
                     yield Received(frame, self._first, time, len(packet) + 1)
 
