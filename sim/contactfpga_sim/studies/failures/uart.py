@@ -116,4 +116,6 @@ def heard(line: Line, data: bytes, greeted: bytes = b"") -> Heard:
 def _decoded(data: bytes) -> tuple[list[str], Conversation]:
     conversation = Conversation("the line")
     events = conversation.receive(data, 0.0)
-    return [str(event.zones.to_dict()) for event in events if isinstance(event, Arrival)], conversation
+    arrived = [event.zones for event in events if isinstance(event, Arrival)]
+    # Without the flags that the host adds, which depend on the frame before.
+    return [str(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in arrived], conversation
