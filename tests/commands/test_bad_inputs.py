@@ -255,7 +255,7 @@ NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
 def test_every_numeric_option_is_found():
     assert {" ".join(words) for words, _ in OPTIONS} == {
         *("zones", "wire", "doctor", "build", "replay", "cover impact", "cover sense", "chart", "fit", "arm", "settle"),
-        *("latency", "flips"),
+        *("latency", "flips", "haptics place"),
     }
     assert len(OPTIONS) > 45
 

@@ -51,6 +51,8 @@ def hello_of(skin, digits=(0,) * 16):
     first = field(1, bytes(sheet) + struct.pack("<HBB", skin.zone_capacity, 0, 0))
     rest = field(3, struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm)) + field(5, skin.fingerprint)
     rest += field(6, struct.pack("<II", skin.clock_hz, skin.baud))
+    if skin.report == "cells":
+        rest += field(8, b"\x02")  # the command that moves the sample
     check = field(255, struct.pack("<I", zlib.crc32(first + rest)))
     return b"\0" + sealed(first + field(2, bytes(128 + digit for digit in digits)) + rest + check + b"\x40")
 

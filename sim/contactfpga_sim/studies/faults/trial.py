@@ -110,7 +110,7 @@ class _Watched:
         self._now_us = now_us
         for zones in frames:
             self._last_frame = now_us
-            said = faults(zones)
+            said = tuple(word for word in faults(zones) if word != "motion")  # tells of a touch, not of a fault
             if said and "flags" not in self._by:
                 self._by["flags"], self._words = now_us, said
             if reported(zones) != self._truth:
