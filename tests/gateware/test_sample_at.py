@@ -37,7 +37,7 @@ SKINS = {
                                 debounce="asym_eager_defer_pk", debounce_press_us=50, debounce_release_us=100,
                                 mask=((1, 0),), **FAST, **TINY),
 }  # fmt: skip
-QUICK = ["two chains, guarded", "reversal, guarded"]
+QUICK = ["reversal, guarded"]
 
 
 def commanded(skin: Skin, seed: int, frames: int) -> Timeline:
