@@ -114,10 +114,10 @@ class ReversalScanner(wiring.Component):
         """All pins come from registers; at power-up none is driven."""
         skin = self.skin
         m.submodules.precharge = precharge = Precharge(skin)
-        driven = Signal()
+        drives_rows = Signal()
         begun = Signal()
-        m.d.sync += [driven.eq(~sheet.listens), begun.eq(turn.begins)]
-        selected, drive, stuck = sheet.selected, driven.replicate(skin.rows), sheet.pressed
+        m.d.sync += [drives_rows.eq(~sheet.listens), begun.eq(turn.begins)]
+        selected, drive, stuck = sheet.selected, drives_rows.replicate(skin.rows), sheet.pressed
         inverted, charged = Const(0, 1), precharge.pins
         if skin.guard:
             holds = Signal()  # from the first clock on

@@ -97,7 +97,7 @@ def pin_lemmas(tested: Tested) -> None:
     proof.lemma((state == TEST) == (slot != REST))
     proof.lemma(inside["selected"] == Mux(selects, (Const(1, skin.rows) << inside["y"])[: skin.rows], 0))
     proof.lemma((inside["precharge.pins"] == 0) | (before == LISTEN) | (before == CHARGE))
-    proof.lemma(inside["driven"] == ((before != LISTEN) & (before != TEST) & proof.before(1)))
+    proof.lemma(inside["drives_rows"] == ((before != LISTEN) & (before != TEST) & proof.before(1)))
     proof.lemma((state != SELECT) | (before == Mux(clock == 0, GAP, SELECT)) & (clock <= derived.settle_clocks))
     proof.lemma((state != GAP) | (before == CHARGE))
     proof.lemma((before != TEST) | (state == TEST) | (state == LISTEN))
