@@ -19,7 +19,7 @@ from contactfpga.errors import ContactFPGAError
 
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-_LOCK = "lock"
+_LOCK, _TAKEN = "lock", "taken"
 _FRESH_S = 60.0
 """A folder may be so old before its lock is there."""
 
@@ -81,7 +81,8 @@ def scratch(folder: Path, kind: str) -> Iterator[Path]:
     _sweep(folder, kind)
     with tempfile.TemporaryDirectory(dir=folder, prefix=f"{kind}-") as name:
         # Held for as long as the process lives, however it ends.
-        with locked(Path(name) / _LOCK):
+        with locked(Path(name) / _TAKEN):
+            (Path(name) / _TAKEN).rename(Path(name) / _LOCK)  # where it is seen, it is held
             yield Path(name)
 
 
@@ -89,9 +90,11 @@ def _sweep(folder: Path, kind: str) -> None:
     for left in folder.glob(f"{kind}-*"):
         with contextlib.suppress(OSError, CacheError):  # its owner removed it meanwhile, or still works in it
             fresh = time.time() - left.lstat().st_mtime < _FRESH_S
-            if fresh and not (left / _LOCK).exists():
+            if not (left / _LOCK).exists():
+                if not fresh:
+                    shutil.rmtree(left)
                 continue
-            with _opened(left / _LOCK) as descriptor:
+            with _opened(left / _LOCK, os.O_RDWR) as descriptor:  # none is made: its owner may be removing the folder
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 shutil.rmtree(left)
 
@@ -113,10 +116,10 @@ def _check(path: Path, found: os.stat_result) -> None:
 
 
 @contextlib.contextmanager
-def _opened(file: Path) -> Iterator[int]:
-    """A descriptor of the file, made where there is none; a link is not followed."""
+def _opened(file: Path, mode: int = os.O_RDWR | os.O_CREAT) -> Iterator[int]:
+    """A descriptor of the file, by default made where there is none; a link is not followed."""
     try:
-        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        flags = mode | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         descriptor = os.open(file, flags, FILE_MODE)
     except OSError as error:
         raise CacheError(f"{file} in the cache cannot be opened: {error.strerror}; {_remove(file)}") from None
