@@ -112,10 +112,10 @@ def test_each_id_is_in_one_place_and_each_zone_has_one_contact(told):
 
 def test_time_counts_from_anywhere(told):
     frames, _ = told
-    part = frames[:60]
-    times = [zones.time_us for zones in part]
-    if times != sorted(times):
-        pytest.skip("its board restarts in these frames")
+    times = [zones.time_us for zones in frames]
+    until = next((at for at in range(1, len(times)) if times[at] < times[at - 1]), 60)  # its board restarts
+    part = frames[: min(until, 60)]
+    assert part
     later = [moments(zones.time_us + 10**9, zones.records.tolist(), zones.flags) for zones in part]
     first, second = run(Tracker(), part), run(Tracker(), later)
     assert [[(one.kind, one.id) for one in said.events] for said in first] == [
