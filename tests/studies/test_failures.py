@@ -2,6 +2,7 @@
 listed here."""
 
 import functools
+import re
 import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -74,9 +75,9 @@ TOLD = {
     ("moving", "`adaptive`"): {"motion"},
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
     ("settle", "40 kΩ pull-up, the same"): {"stuck"},
-    ("settle", "the same with guard lines"): {"stuck"},
-    ("broken", "row, with guard lines"): {"row 7 open", "row 8 open", "row 9 open"},
-    ("broken", "column, with guard lines"): {"column 7 open", "column 8 open", "column 9 open"},
+    ("settle", "the same with guard lines"): {"row N open", "guard row open", "guard column open"},
+    ("broken", "row, with guard lines"): {"row N open"},
+    ("broken", "column, with guard lines"): {"column N open"},
     ("ghost", "zones"): {"ghost"},
     ("ghosts", "cells, random places"): {"ghost"},
     ("stuck", "columns shorted to the rows' level"): {"stuck"},
@@ -87,7 +88,7 @@ TOLD = {
     ("noise", "half a bit to two bits long"): {"lost", "damaged"},
     ("host", "every frame of `contactfpga.open()`"): {"lost"},
 }
-"""What is wrong here is reported at every value, by nothing but these."""
+"""What is wrong here is reported at every value, by nothing but these; N is any line."""
 
 NOT_NOTICED = {
     ("diodes", "the same with guard lines"): (1, 2),
@@ -141,7 +142,7 @@ def test_it_breaks_where_it_is_pinned(turn, name, method):
 def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turn, name, method):
     found, key = turn(name, method), (name, method)
     silent = [value for value, verdict in zip(found.values, found.verdicts) if verdict == "silent"]
-    told = {word for outcome in found.outcomes for word in outcome.told}
+    told = {re.sub(r"\d+", "N", word) for outcome in found.outcomes for word in outcome.told}
     if key in TOLD:
         assert not silent
         assert told == TOLD[key]
