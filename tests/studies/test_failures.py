@@ -2,8 +2,8 @@
 listed here."""
 
 import functools
-import re
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
