@@ -7,7 +7,7 @@ import contextlib
 import threading
 from pathlib import Path
 
-from contactfpga.driver import ports
+from contactfpga.driver import ports, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
@@ -46,6 +46,8 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    if record is not None:
+        recording.check(record)
     if port is None:
         port = _find(baud)
     transport = connect(port, baud)
