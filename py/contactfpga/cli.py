@@ -25,6 +25,7 @@ from contactfpga.commands import (
     latency,
     replay,
     settle,
+    surface,
     wire,
     zones,
 )
@@ -61,6 +62,7 @@ COMMANDS: dict[str, Command] = {
     "replay": replay,
     "latency": latency,
     "settle": settle,
+    "surface": surface,
     "cover": cover,
     "haptics": haptics,
     "chart": chart,

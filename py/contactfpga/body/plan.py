@@ -16,7 +16,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics.units import LoadCells
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin import Skin
-from contactfpga.surfaces import Surface
+from contactfpga.surfaces import Mesh, Surface
 
 KEYS = (
     "name", "frame", "skin", "port", "point_m", "rpy_rad", "mirrored", "surface", "units", "friction", "late_s",
@@ -118,7 +118,10 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Surface:
         return surfaces.Cone(**values)
     if not isinstance(values, str):
         raise BodyError(f"surface is {shown(values)}; it must be the name of a table, or a cone's radius_mm and slope")
-    raise BodyError(f"surface is {shown(values)}; meshes are not read yet")
+    table = Mesh.load(folder / values)
+    if table.lines != (skin.rows, skin.columns):
+        raise BodyError(f"surface {shown(values)} is of {table.lines} cells; the Skin has {(skin.rows, skin.columns)}")
+    return table
 
 
 def text(values: dict[str, Any], key: str, usual: str | None = None) -> str:
