@@ -12,6 +12,7 @@ from contactfpga import __version__
 from contactfpga.commands import (
     arm,
     board,
+    body,
     build,
     chart,
     cover,
@@ -24,6 +25,7 @@ from contactfpga.commands import (
     latency,
     replay,
     settle,
+    surface,
     wire,
     zones,
 )
@@ -51,6 +53,7 @@ class Command(Protocol):
 
 COMMANDS: dict[str, Command] = {
     "zones": zones,
+    "body": body,
     "wire": wire,
     "board": board,
     "doctor": doctor,
@@ -59,6 +62,7 @@ COMMANDS: dict[str, Command] = {
     "replay": replay,
     "latency": latency,
     "settle": settle,
+    "surface": surface,
     "cover": cover,
     "haptics": haptics,
     "chart": chart,
@@ -76,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
-    args = parser.parse_args(arguments)
+    args = parser.parse_args(_with_usual_topic(sys.argv[1:] if arguments is None else list(arguments)))
     if args.command is None:
         parser.print_help(sys.stderr)
         return 2
@@ -92,6 +96,13 @@ def _run(arguments: Sequence[str] | None) -> int:
         return interrupt.failed(MissingExtra(error.what, command.EXTRA) if command.EXTRA else error)
     except ValueError as error:
         return interrupt.failed(error)
+
+
+def _with_usual_topic(arguments: list[str]) -> list[str]:
+    """`contactfpga body ROBOT.toml` is short for a topic of that command."""
+    if arguments[:1] == ["body"] and arguments[1:2] not in ([], ["-h"], ["--help"], *([name] for name in body.TOPICS)):
+        return ["body", body.USUAL_TOPIC, *arguments[1:]]
+    return arguments
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:
