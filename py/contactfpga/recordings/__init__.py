@@ -1,0 +1,1 @@
+"""What happened, in a file: MCAP with every byte of each board, and with messages of ROS 2 (docs/recordings.md)."""
