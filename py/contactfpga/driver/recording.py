@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
@@ -12,6 +12,31 @@ from contactfpga.inputs.files import open_regular, told
 SCHEME = "replay://"
 PACE = "?pace="
 """Comes after the path in a name, with how fast it is to be played."""
+
+
+class Tap(Protocol):
+    """Gets every byte that is read from a port."""
+
+    def take(self, data: bytes, clock_s: float) -> None:
+        """Bytes that came then, on the port's clock; b"" where none came."""
+
+    def close(self) -> None:
+        """No more will come; may be called twice."""
+
+
+class FileTap:
+    """Writes the bytes to a file."""
+
+    def __init__(self, path: str | Path, port: str):
+        self._file = create(path, port)
+
+    def take(self, data: bytes, clock_s: float) -> None:
+        """Append them."""
+        self._file.write(data)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
 
 
 def open_recorded(name: str) -> BinaryIO:
