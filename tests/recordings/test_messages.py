@@ -113,7 +113,9 @@ def turned_up(q):
     return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
 
 
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, -0.8, 0.0), (0.0, 0.6, -0.8)])
+@pytest.mark.parametrize(
+    "normal", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, -0.8, 0.0), (0.0, 0.6, -0.8)]
+)
 def test_a_turn_leads_to_the_normal(normal):
     from types import SimpleNamespace
 

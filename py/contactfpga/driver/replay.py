@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import math
 import time
-from typing import BinaryIO
 
 from contactfpga.driver import recording
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.errors import ContactFPGAError, PortNotFound, ReplayEnded
+from contactfpga.errors import ContactFPGAError, ReplayEnded
 
 
 class ReplayTransport:
-    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``, as fast as it is read, or
-    ``replay://FILE?pace=1`` in the time in which it was recorded."""
+    """A recorded byte stream, as ``open(port, record=FILE)`` and `contactfpga record` write it: ``replay://FILE``, as
+    fast as it is read, or ``replay://FILE?pace=1`` in the time in which it was recorded."""
 
     live = threaded = False
 
     def __init__(self, name: str):
         self.name = name
-        pace = name.partition(recording.PACE)[2]
-        self._pace = _pace(name, pace) if pace else None
+        pace = recording.parse(name).pace
+        self._pace = None if pace is None else _Pace(name, pace)
         self._file = recording.open_recorded(name)
 
     def read(self, timeout_s: float) -> bytes:
@@ -51,7 +50,7 @@ class _Pace:
         self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
         self._last_us = 0
 
-    def read(self, file: BinaryIO, timeout_s: float) -> bytes:
+    def read(self, file: recording.Recorded, timeout_s: float) -> bytes:
         if not self._held:
             self._held = _more(file, 1, self._name)
             while not self._held.endswith(b"\0") and (more := file.read(1)):
@@ -75,17 +74,7 @@ class _Pace:
         self._last_us = time_us
 
 
-def _pace(name: str, text: str) -> _Pace:
-    try:
-        factor = float(text)
-    except ValueError:
-        factor = math.nan
-    if not 0 < factor < math.inf:
-        raise PortNotFound(f"{name}: pace is {text!r}; it must be a positive number, 1 for the time of the recording")
-    return _Pace(name, factor)
-
-
-def _more(file: BinaryIO, count: int, name: str) -> bytes:
+def _more(file: recording.Recorded, count: int, name: str) -> bytes:
     data = file.read(count)
     if not data:
         raise ReplayEnded(f"{name} ends here")

@@ -51,7 +51,7 @@ class Buffer:
 
     def due(self, clock_s: float) -> bool:
         """Whether enough waits, or for long enough."""
-        return self._bytes >= BATCH_BYTES or bool(self._pieces) and clock_s - self._pieces[0][1] >= TURN_S
+        return self._bytes >= BATCH_BYTES or (bool(self._pieces) and clock_s - self._pieces[0][1] >= TURN_S)
 
     def drain(self) -> tuple[bytes, float]:
         """All that waits, and when its last byte came."""
@@ -132,7 +132,7 @@ class LinkRecorder:
     def _drain(self) -> None:
         data, clock_s = self._buffer.drain()
         if data:
-            self._link.bytes(data, clock_s if self.board.live else self._last_us / 1e6)
+            self._link.take_bytes(data, clock_s if self.board.live else self._last_us / 1e6)
 
     def _write(self, item: Zones | Told | Silence | None, clock_s: float) -> None:
         link = self._link

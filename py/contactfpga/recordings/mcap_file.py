@@ -32,7 +32,7 @@ class McapFile:
         self._failed = False
         self._file = WholeFile(path)
         # Chunks end where we say so.
-        self._writer = Writer(self._file, chunk_size=1 << 40, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._writer = Writer(self._file, chunk_size=1 << 40, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2", library="contactfpga")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
@@ -99,4 +99,5 @@ class McapFile:
             text = schema(kind).encode()
             self._schemas[kind] = self._writer.register_schema(f"{package}/msg/{short}", "ros2msg", text)
         metadata = {"link": link} if link else {}
-        return self._writer.register_channel(topic, "cdr", self._schemas[kind], metadata)
+        number: int = self._writer.register_channel(topic, "cdr", self._schemas[kind], metadata)
+        return number

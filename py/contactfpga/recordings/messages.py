@@ -60,9 +60,11 @@ def of_zones(zones: Zones, time_ns: int, frame: str, sigma_s: float = math.nan) 
     named = frame.encode() + b"\0"
     flat = [value for position, normal, *rest in found for value in (*position, *normal, *rest)]
     packed = _layout(len(named), len(found))
-    return BEGIN + packed.pack(
-        *divmod(time_ns, 1_000_000_000), len(named), named, *facts, 0, len(found), *flat, len(cells)
-    ) + cells
+    return (
+        BEGIN
+        + packed.pack(*divmod(time_ns, 1_000_000_000), len(named), named, *facts, 0, len(found), *flat, len(cells))
+        + cells
+    )
 
 
 @functools.lru_cache(maxsize=256)
@@ -104,7 +106,9 @@ def _event(one: Event) -> tuple[Any, ...]:
 
 def of_transforms(links: list[tuple[str, str, tuple[float, ...], tuple[float, ...]]], time_ns: int) -> bytes:
     """Where links are: parent, child, place in m and turn as a quaternion (x, y, z, w)."""
-    return encode(TRANSFORMS, [[(header(time_ns, parent), child, (place, turn)) for parent, child, place, turn in links]])
+    return encode(
+        TRANSFORMS, [[(header(time_ns, parent), child, (place, turn)) for parent, child, place, turn in links]]
+    )
 
 
 _CYLINDER, _ADD, _DELETE_ALL = 3, 0, 3
@@ -125,7 +129,9 @@ def of_markers(zones: Zones, time_ns: int, frame: str) -> bytes:
     return encode(MARKERS, [drawn])
 
 
-def _marker(time_ns: int, frame: str, number: int, action: int, pose: tuple[Any, Any], across_m: float) -> tuple[Any, ...]:
+def _marker(
+    time_ns: int, frame: str, number: int, action: int, pose: tuple[Any, Any], across_m: float
+) -> tuple[Any, ...]:
     stamped = header(time_ns, frame)
     scale = across_m, across_m, _THICK_M
     image = (header(0, ""), "", b"")

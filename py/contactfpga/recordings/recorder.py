@@ -130,7 +130,7 @@ class LinkFile:
         """Since 1970, of a moment on the board's :meth:`~contactfpga.Board.clock`."""
         return self._epoch_ns + round(clock_s * 1e9)
 
-    def bytes(self, data: bytes, clock_s: float) -> None:
+    def take_bytes(self, data: bytes, clock_s: float) -> None:
         """Bytes that came until then."""
         with self._recorder.lock:
             if self._cutter is None:

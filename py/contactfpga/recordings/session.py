@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 from types import TracebackType
 
 from contactfpga.driver import driver
+from contactfpga.driver.board import Board
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
 from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
@@ -25,10 +27,12 @@ class Session:
     """
 
     def __init__(self, path: str | Path, split: Split | None = None, bytes_only: bool = False):
-        if Path(path).suffix != SUFFIX:
-            raise ContactFPGAError(f"{path} does not end in {SUFFIX}, by which programs know such files; name it so")
+        check_new(path)
         self.links: list[LinkRecorder] = []
-        self._recorder = Recorder(path, split)
+        self._path = Path(path)
+        self._split = split
+        self._opened: list[tuple[str, Board, Buffer]] = []
+        self._recorder: Recorder | None = None
         self._bytes_only = bytes_only
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -45,18 +49,19 @@ class Session:
         """Open a board, as :func:`contactfpga.open` does. ``name``: of its link; by default that of its Skin."""
         buffer = Buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
-        try:
-            link = self._recorder.add(link_name(board.hello) if name is None else name, board)
-        except BaseException:
-            board.close()
-            raise
-        self.links.append(LinkRecorder(board, buffer, link, self._bytes_only))
+        self._opened.append((link_name(board.hello) if name is None else name, board, buffer))
 
     def start(self, seconds: float | None = None) -> None:
-        """Record for so long, or until :meth:`stop`."""
-        for link in self.links:
-            thread = threading.Thread(target=link.run, args=(self._stop, seconds), name="recorder", daemon=True)
+        """Make the file, and record for so long, or until :meth:`stop`."""
+        self._recorder = Recorder(self._path, self._split)
+        for name, board, buffer in self._opened:
+            link = LinkRecorder(board, buffer, self._recorder.add(name, board), self._bytes_only)
+            thread = threading.Thread(
+                target=link.run, args=(self._stop, seconds), name=f"recorder of {name}", daemon=True
+            )
+            self.links.append(link)
             self._threads.append(thread)
+        for thread in self._threads:
             thread.start()
 
     @property
@@ -66,8 +71,9 @@ class Session:
 
     def turn(self, seconds: float) -> None:
         """Wait, at most until something ends; call it again and again while it is :attr:`running`."""
-        self._recorder.turn()
-        self._threads[0].join(seconds)
+        if self._recorder is not None:
+            self._recorder.turn()
+            self._threads[0].join(seconds)
 
     def stop(self) -> None:
         """End all, and close the file; may be called twice. Raises why a link ended that was to go on."""
@@ -78,7 +84,10 @@ class Session:
             for link in self.links:
                 link.finish()
         finally:
-            self._recorder.close()
+            for _, board, _ in self._opened:
+                board.close()
+            if self._recorder is not None:
+                self._recorder.close()
         for link in self.links:
             if link.error is not None:
                 raise link.error
@@ -96,12 +105,12 @@ class Session:
     @property
     def size(self) -> int:
         """Bytes in its files."""
-        return self._recorder.size
+        return 0 if self._recorder is None else self._recorder.size
 
     @property
     def files(self) -> list[Path]:
         """Its files, the first one first."""
-        return self._recorder.files
+        return [] if self._recorder is None else self._recorder.files
 
     def __enter__(self) -> Session:
         return self
@@ -110,3 +119,13 @@ class Session:
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
         self.stop()
+
+
+def check_new(path: str | Path) -> None:
+    """Raises :class:`ContactFPGAError` for what cannot be the name of a new recording."""
+    if Path(path).suffix != SUFFIX:
+        raise ContactFPGAError(f"{path} does not end in {SUFFIX}, by which programs know such files; name it so")
+    if os.path.lexists(path):
+        raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")
+    if not Path(path).parent.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: there is no folder {Path(path).parent}")

@@ -16,7 +16,7 @@ class RecordingFailed(ContactFPGAError):
 
 
 class WholeFile:
-    """A new file. Takes bytes, and writes those of each :meth:`flush` together; where that fails none of them are left."""
+    """A new file: writes the bytes up to each :meth:`flush` together; where that fails none of them are left."""
 
     def __init__(self, path: Path):
         self.path = path
