@@ -181,7 +181,7 @@ def test_units_and_faults_are_messages(tmp_path):
 
 def test_split_files_each_begin_with_a_hello_and_lose_nothing(tmp_path):
     port = StreamPort(frames=2000)
-    session = recorded(tmp_path, port, split=Split(bytes=6_000), bytes_only=True)
+    session = recorded(tmp_path, port, split=Split(bytes=3_000), bytes_only=True)
     assert len(session.files) > 2
     assert [file.name for file in session.files[:2]] == ["touches_0001.mcap", "touches_0002.mcap"]
     pieces = [b"".join(data for _, data in Recording(file).raw_bytes()) for file in session.files]
@@ -197,7 +197,7 @@ def test_a_link_that_says_no_hello_delays_no_file_for_long(tmp_path, monkeypatch
 
     monkeypatch.setattr(recorder, "PATIENCE_S", 0.0)
     port = StreamPort(frames=1000, hello_every=1 << 30)
-    session = recorded(tmp_path, port, split=Split(bytes=6_000), bytes_only=True)
+    session = recorded(tmp_path, port, split=Split(bytes=3_000), bytes_only=True)
     assert len(session.files) > 1
     assert b"".join(data for file in session.files for _, data in Recording(file).raw_bytes()) == port.sent
 
