@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from contactfpga.ros.convert import Message
@@ -11,7 +12,7 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     from contactfpga.driver.driver import Board
 
-OK, WARN, ERROR, STALE = range(4)
+OK, WARN, ERROR = range(3)
 _COUNTED = ("frames", "lost", "dropped", "overwritten", "resynchronized", "restarts", "skin_changes")
 _TROUBLE = ("lost", "damaged", "dropped", "restarts")
 """Of these a new one since the last message is a warning."""
@@ -46,17 +47,15 @@ class Diagnostics:
         now, frames = self._board.clock(), counts["frames"] - self._before.get("frames", 0)
         rate = frames / (now - self._since_s) if now > self._since_s else 0.0
         level, text = self._said(counts, now)
-        values = {"port": self._board.port, "frames per second": f"{rate:.0f}", "faults": ", ".join(self._faults)}
-        status = {
-            "level": level,
-            "name": f"contactfpga: {self._name}",
-            "message": text,
-            "hardware_id": self._board.fingerprint.hex(),
-            "values": [{"key": key, "value": str(value)} for key, value in (values | counts).items()],
+        values: dict[str, object] = {
+            "port": self._board.port,
+            "frames per second": f"{rate:.0f}",
+            "faults": ", ".join(self._faults),
         }
+        found = _array(head, self._name, level, text, self._board.fingerprint.hex(), values | counts)
         self._before, self._since_s = counts, now
         self._flags.clear()
-        return {"header": head, "status": [status]}
+        return found
 
     def _counts(self) -> dict[str, int]:
         stats = self._board.stats
@@ -72,3 +71,19 @@ class Diagnostics:
 
     def _more(self, counts: dict[str, int], name: str) -> bool:
         return counts[name] > self._before.get(name, 0)
+
+
+def lost(name: str, why: str, head: Message) -> Message:
+    """A ``DiagnosticArray`` where no board is connected."""
+    return _array(head, name, ERROR, why, "", {})
+
+
+def _array(head: Message, name: str, level: int, text: str, hardware: str, values: Mapping[str, object]) -> Message:
+    status = {
+        "level": level,
+        "name": f"contactfpga: {name}",
+        "message": text,
+        "hardware_id": hardware,
+        "values": [{"key": key, "value": str(value)} for key, value in values.items()],
+    }
+    return {"header": head, "status": [status]}

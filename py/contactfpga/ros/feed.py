@@ -62,7 +62,7 @@ class Feed:
         self._restarted = False
         self._frame = self.settings.frame or board.name or "skin"
         self._rim = outline(board.sheet)
-        self._tracks: Tracks | None = None
+        self._last: tuple[Zones, Tracks] | None = None
         self._forces: Contacts | None = None
         self._published = -1  # zones in the frame published last
         self._due = dict.fromkeys(("zones", "markers", "diagnostics"), -1e300)
@@ -89,19 +89,20 @@ class Feed:
 
     def frame(self, zones: Zones) -> None:
         """Follow a frame, and publish it if that is due or the number of zones changed."""
-        self._tracks = self._tracker.update(zones)
-        self._events += self._tracks.events
-        self._restarted |= self._tracks.restarted
+        tracks = self._tracker.update(zones)
+        self._last = zones, tracks
+        self._events += tracks.events
+        self._restarted |= tracks.restarted
         self._diagnostics.frame(zones)
         if not self._is_due("zones", self.settings.zones_hz) and len(zones) == self._published:
             self.left_out += 1
             return
         self._published = len(zones)
-        self._forces = None if self._felt is None else self._felt(zones, self._tracks)
+        self._forces = None if self._felt is None else self._felt(zones, tracks)
         head = convert.header(self._moments.of(zones), self._frame)
         self._put("zones", convert.zones(zones, head, getattr(zones, "host_sigma_s", None)))
-        self._put("tracks", convert.tracks(self._tracks, self._events, self._restarted, head))
-        self._put("contacts", convert.contacts(self._tracks.active, head, self._forces))
+        self._put("tracks", convert.tracks(tracks, self._events, self._restarted, head))
+        self._put("contacts", convert.contacts(tracks.active, head, self._forces))
         if self._forces is not None:
             self._put("wrench", convert.wrench(self._forces.wrench, head))
         self._events, self._restarted = [], False
@@ -110,9 +111,11 @@ class Feed:
         """Publish what is due by the clock alone."""
         if self._is_due("diagnostics", self.settings.diagnostics_hz):
             self._put("/diagnostics", self._diagnostics.message(self._head(""), self.left_out))
-        if self._tracks is None or self._diagnostics.silent or not self._is_due("markers", self.settings.markers_hz):
+        if self._last is None or self._diagnostics.silent or not self._is_due("markers", self.settings.markers_hz):
             return
-        self._put("markers", markers(self._rim, self._tracks.active, self._head(self._frame), self._forces))
+        zones, tracks = self._last
+        head = convert.header(self._moments.of(zones), self._frame)
+        self._put("markers", markers(self._rim, tracks.active, head, self._forces))
 
     def _head(self, frame: str) -> convert.Message:
         return convert.header(self._moments.now(), frame)
@@ -125,5 +128,6 @@ class Feed:
         now = self._board.clock()
         if now < self._due[what]:
             return False
-        self._due[what] = max(self._due[what] + 1 / rate_hz, now)
+        following = self._due[what] + 1 / rate_hz
+        self._due[what] = following if following > now else now + 1 / rate_hz
         return True
