@@ -24,6 +24,7 @@ from contactfpga.commands import (
     latency,
     replay,
     settle,
+    view,
     wire,
     zones,
 )
@@ -51,6 +52,7 @@ class Command(Protocol):
 
 COMMANDS: dict[str, Command] = {
     "zones": zones,
+    "view": view,
     "wire": wire,
     "board": board,
     "doctor": doctor,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
 
 from contactfpga.choices import converters
 from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import Source
+from contactfpga_sim.scenes.scene import CellsAt, Scene, Source
 from contactfpga_sim.scenes.scene import scene as make_scene
 from contactfpga_sim.sheet.line import Line
 
@@ -20,6 +24,15 @@ CHUNK_S = 0.2e-3
 
 UnitSource = Callable[[float], Sequence[int]]
 """From the simulated time in s to what each pressure unit reads, in steps of its converter."""
+
+
+class Finger(Protocol):
+    """A round contact, placed on the sheet laid flat."""
+
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    force_n: float
 
 
 def _at_rest(skin: Skin) -> UnitSource:
@@ -52,6 +65,10 @@ class VirtualBoard:
     ):
         self.skin = skin or Skin()
         self._scene = make_scene(self.skin, scene, cover)
+        self._cover = cover
+        self._touch: CellsAt | None = None
+        self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
+        """(rows, columns) bool: the switches that are closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
         self._units = units or _at_rest(self.skin)
         if circuit is not None:
@@ -75,9 +92,19 @@ class VirtualBoard:
             self.advance(cycles)
             left -= cycles
 
+    def touch(self, fingers: Iterable[Finger]) -> None:
+        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+        placed = [
+            contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
+            for one in fingers
+        ]
+        self._touch = Scene(tuple(placed)).on(self.skin, self._cover) if placed else None
+
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the scene as it is now."""
-        self._board.press(self._scene(self.clock()))
+        touch, pressed = self._touch, self._scene(self.clock())
+        self.pressed = pressed if touch is None else pressed | touch(self.clock())
+        self._board.press(self.pressed)
         if self.skin.units:
             self._board.load(self._units(self.clock()))
         self._board.run(cycles)
