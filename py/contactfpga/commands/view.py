@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from contactfpga.console import flags, numbers, terminal
-from contactfpga.skin import Skin
+from contactfpga.console import flags, terminal
 
 HELP = "Show the sheet in the browser, live or from a recording."
 EXTRA = "view"

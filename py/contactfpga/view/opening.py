@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.driver import driver, transport
-from contactfpga.driver.board import Board
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
@@ -17,7 +16,7 @@ from contactfpga.view.fingers import Hand
 from contactfpga.view.sources import BoardSource, Source
 
 CLOCK_HZ = 6_000_000
-"""Of the virtual board that is shown where nothing is named: half the usual clock, so that it keeps up with real time."""
+"""Of the virtual board that is shown where nothing is named: half the usual clock, which keeps up with real time."""
 
 FINGER = 0.9
 """Radius of the mouse's finger, of the pitch."""
@@ -54,9 +53,7 @@ def opened(
         source.close()
 
 
-def _source(
-    port: str | None, skin: str | Path | None, baud: int | None, timeout: float
-) -> tuple[Source, Hand | None]:
+def _source(port: str | None, skin: str | Path | None, baud: int | None, timeout: float) -> tuple[Source, Hand | None]:
     if port is not None and not port.startswith("sim:"):
         return BoardSource(driver.open(port, skin, baud=baud, timeout=timeout)), None
     if port is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -62,7 +63,8 @@ def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
     placed = [zone for zone in zones if zone.x_mm is not None]
     if not placed:
         return Spots(np.zeros((0, 3)), np.zeros((0, 2, 3)))
-    points = _lifted(surface, *np.array([(zone.x_mm, zone.y_mm) for zone in placed]).T, lift_mm)
+    x_mm, y_mm = np.array([(zone.x_mm, zone.y_mm) for zone in placed], float).T
+    points = _lifted(surface, x_mm, y_mm, lift_mm)
     return Spots(points, np.concatenate([_circle(zone, surface, lift_mm) for zone in placed]))
 
 
@@ -110,5 +112,5 @@ class Trails:
     @property
     def lines(self) -> np.ndarray:
         """(n, 2, 3)"""
-        found = [[one[1], other[1]] for way in self._ways.values() for one, other in zip(way, way[1:])]
+        found = [[one[1], other[1]] for way in self._ways.values() for one, other in itertools.pairwise(way)]
         return np.array(found) if found else np.zeros((0, 2, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import socket
 from collections.abc import Callable, Iterator
 from http import HTTPStatus
@@ -30,6 +31,7 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
         import viser
     except ModuleNotFoundError as error:
         raise MissingExtra(f"the view ({error})", "view") from None
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # its tracebacks of clients that break off
     guard = guard or Guard(host)
     port = _free_port(host, port)
     with _guarded(guard) as is_guarded, contextlib.redirect_stdout(io.StringIO()):  # it prints an address of its own
@@ -71,11 +73,11 @@ def _guarded(guard: Guard) -> Iterator[Callable[[], bool]]:
         wrapped.append(True)
         return serve(*args, process_request=_checked(guard, process_request), **options)
 
-    listening.serve = serve_guarded  # type: ignore[misc,assignment]
+    listening.serve = serve_guarded
     try:
         yield lambda: bool(wrapped)
     finally:
-        listening.serve = serve  # type: ignore[misc]
+        listening.serve = serve
 
 
 def _checked(guard: Guard, inner: Any) -> Any:

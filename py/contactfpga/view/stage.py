@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,6 @@ from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
 from contactfpga.view.sources import Moment
 from contactfpga.view.tiles import MM, Tiles
-from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     import viser
@@ -23,6 +21,8 @@ FILLED = 0.9
 """Share of the pitch that a tile takes."""
 THICK = 0.08
 """Its height, of the pitch."""
+AMBIENT, SIDE = 2.2, 0.9
+"""Lights: mostly from all sides, so that a color means the same everywhere."""
 LABELS = 24
 """Contacts that have their number written beside them."""
 
@@ -61,7 +61,12 @@ class Stage:
         self._colors: np.ndarray | None = None
 
     def look(self) -> None:
-        """Set the camera of those who come so that the sheet is in view."""
+        """Set light and camera of those who come so that the sheet is in view and its colors are as chosen."""
+        scene = self._server.scene
+        scene.configure_default_lights(enabled=False, cast_shadow=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light/all", intensity=AMBIENT)
+        scene.add_light_directional("/light/side", intensity=SIDE, position=(0.3, -0.5, 1.0))
         tiles, camera = self._tiles, self._server.initial_camera
         middle = tiles.middle_mm * MM
         normal = tiles.normals.mean(0)
@@ -84,7 +89,7 @@ class Stage:
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
-        self._draw_labels(zones, moment.tracks)
+        self._draw_labels(moment.tracks)
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -113,8 +118,7 @@ class Stage:
             precision="float32",
         )
 
-    def _draw_labels(self, zones: Zones, tracks: Tracks) -> None:
-        del zones
+    def _draw_labels(self, tracks: Tracks) -> None:
         shown = [track for track in tracks.active if track.zone.x_mm is not None][:LABELS]
         while len(self._labels) < len(shown):
             path = f"{self._node}/contact{len(self._labels)}"
@@ -153,8 +157,3 @@ class Stage:
             place = tiles.met(eye, np.array(to) / MM - eye)
             if place is not None:
                 hand.drag(event.client_id, *place)
-
-
-def is_finite(value: float) -> bool:
-    """Whether a number can be drawn."""
-    return math.isfinite(value)

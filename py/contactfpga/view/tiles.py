@@ -12,6 +12,7 @@ from contactfpga.skin.sheet import Sheet
 MM = 1e-3
 """The scene counts in m."""
 
+
 class Tiles:
     """A tile for each cell, row by row."""
 
