@@ -32,7 +32,7 @@ class Meter:
         self.dropped = 0
         """Frames that came faster than they could be shown."""
         self._times_us: collections.deque[tuple[int, int]] = collections.deque()
-        self._late_s: collections.deque[float] = collections.deque(maxlen=200)
+        self._late_s: collections.deque[float] = collections.deque(maxlen=50)
         self._steps: collections.deque[tuple[int, int, float]] = collections.deque(maxlen=int(CHART_S / CHART_STEP_S))
 
     def take(self, batch: Batch, stats: Stats, dropped: int) -> None:
@@ -60,6 +60,16 @@ class Meter:
                 _, before_count, before_area = self._steps.pop()
                 count, area = max(count, before_count), max(area, before_area)
             self._steps.append((int(step), int(count), float(area)))
+
+    def take_latency(self, batch: Batch) -> None:
+        """The same frames, of a board whose clock is the host's."""
+        frames = batch.frames
+        self._late_s.append(float(np.median(frames["host_time_s"] - frames["time_us"] / 1e6)))
+
+    @property
+    def late_s(self) -> float | None:
+        """Median time in s from a frame's first sample to its arrival; None: it is not known."""
+        return float(np.median(self._late_s)) if self._late_s else None
 
     @property
     def frames_per_s(self) -> float:

@@ -13,6 +13,8 @@ from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
 from contactfpga.view.fingers import Hand
+from contactfpga.view.player import Player
+from contactfpga.view.replayed import ByteRecording
 from contactfpga.view.sources import BoardSource, Source
 
 CLOCK_HZ = 6_000_000
@@ -54,8 +56,11 @@ def opened(
 
 
 def _source(port: str | None, skin: str | Path | None, baud: int | None, timeout: float) -> tuple[Source, Hand | None]:
+    if port is not None and port.startswith("replay:"):
+        recording = ByteRecording(port, timeout)
+        return Player(port, recording.sheet, recording), None
     if port is not None and not port.startswith("sim:"):
-        return BoardSource(driver.open(port, skin, baud=baud, timeout=timeout)), None
+        return BoardSource(driver.open(port, skin, baud=baud, timeout=timeout), port), None
     if port is None:
         asked = Skin.load(skin) if skin is not None else Skin(clock_hz=CLOCK_HZ, send="on_change")
         virtual: Any = transport.virtual_board("sim://?scene=nothing", asked)
@@ -63,4 +68,5 @@ def _source(port: str | None, skin: str | Path | None, baud: int | None, timeout
         virtual = transport.virtual_board(port)
     board = driver.open(virtual, skin, timeout=timeout)
     sheet = board.sheet
-    return BoardSource(board, virtual), Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+    name = port or "sim://"
+    return BoardSource(board, name, virtual), Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))

@@ -22,6 +22,9 @@ from contactfpga.zones.zone import Zones
 TURN_S = 0.02
 """A moment is shown for so long."""
 
+KEEPS_UP = 0.97
+"""A board that reaches this share of real time is said to keep up."""
+
 WAITING = 65_536
 """Frames that may wait for a moment's end."""
 
@@ -57,8 +60,8 @@ class Source(Protocol):
 class BoardSource:
     """A board, or with ``virtual`` one in simulated time, which passes here as real time does."""
 
-    def __init__(self, board: Board, virtual: Touchable | None = None):
-        self.title, self.sheet = board.port, board.sheet
+    def __init__(self, board: Board, title: str, virtual: Touchable | None = None):
+        self.title, self.sheet = title, board.sheet
         self.meter = Meter()
         self._board, self._virtual = board, virtual
         self._frames = board.subscribe(WAITING)
@@ -82,14 +85,31 @@ class BoardSource:
                 time.sleep(TURN_S - due)
             seconds = max(due, TURN_S)
         with contextlib.suppress(ReadTimeout):
-            self.meter.take(self._frames.batch(seconds, seconds), self._board.stats, self._frames.dropped)
+            batch = self._frames.batch(seconds, seconds)
+            self.meter.take(batch, self._board.stats, self._frames.dropped)
+            if self._virtual is not None:  # whose clock is that of its arrivals
+                self.meter.take_latency(batch)
             return True
         return False
 
     def told(self) -> list[tuple[str, str]]:
-        if self._pace is None:
-            return []
-        return [("board time", f"{self._pace.share:.0%} of real time, {self._pace.slip_s:.1f} s slipped")]
+        stats = self.meter.stats
+        rows = [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
+        if self.meter.dropped:
+            rows.append(("not shown", f"{self.meter.dropped} frames, which came faster than they were read"))
+        late = self.meter.late_s
+        if late is not None:
+            rows.append(("latency", f"{late * 1e6:,.0f} us from the sample of the first row to the last byte"))
+        if self._pace is not None:
+            rows.append(("board time", paced(self._pace)))
+        return rows
 
     def close(self) -> None:
         self._board.close()
+
+
+def paced(pace: Pace) -> str:
+    """How the virtual board's time goes."""
+    if pace.share > KEEPS_UP:
+        return "real time"
+    return f"{pace.share:.0%} of real time, as fast as this machine simulates it; {pace.slip_s:.1f} s slipped"
