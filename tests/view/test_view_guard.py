@@ -14,11 +14,8 @@ from contactfpga.view.guard import Guard
 pytest.importorskip("viser")
 pytest.importorskip("websockets")
 
-import msgspec
-import viser
-from viser import _messages
+from viewed import Page, camera, click, cookie, socket_of
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
 from contactfpga.view import server as serving
 
@@ -46,26 +43,6 @@ def get(port, path="/", **headers):
     body = answer.read()
     connection.close()
     return answer.status, dict(answer.getheaders()), body
-
-
-def cookie(port, guard):
-    return f"contactfpga-view-{port}={guard.token}"
-
-
-def socket_of(port, guard, *, origin=None, token=True, host=None, query=""):
-    """A WebSocket as the page opens it, but for what is asked otherwise."""
-    headers = {"Cookie": cookie(port, guard)} if token else {}
-    name = host or f"127.0.0.1:{port}"
-    return connect(
-        f"ws://{name}/{query}",
-        sock=socket.create_connection(("127.0.0.1", port)),
-        origin=f"http://127.0.0.1:{port}" if origin is None else origin or None,
-        additional_headers=headers,
-        subprotocols=[f"viser-v{viser.__version__}"],
-        proxy=None,
-        compression=None,
-        open_timeout=10,
-    )
 
 
 def test_the_address_with_the_token_leads_to_the_page(served):
@@ -120,10 +97,9 @@ def test_a_foreign_page_is_refused_though_it_has_the_cookie(served):
 
 def test_our_page_reads_and_presses(served):
     port, guard, clicks = served
-    with socket_of(port, guard) as page:
-        assert len(page.recv(timeout=10)) > 100
-        page.send(camera())
-        page.send(click())
+    with Page(port, guard) as page:
+        page.hear(lambda message: message.get("name") == "/cells")
+        page.say(camera(), click("/cells"))
         wait(lambda: clicks)
     assert clicks[0].instance_index == 0
 
@@ -222,21 +198,6 @@ def test_the_address_can_be_opened(host, address):
     assert guard.url(80) == f"{address}?token={guard.token}"
     told = {"host": address[7:-1], "Cookie": cookie(80, guard), "ORIGIN": address[:-1]}
     assert guard.check("/", told, 80, upgrade=True) is None
-
-
-def camera():
-    """What the page says first."""
-    ahead = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.7, 0.01, 10.0, 100, 100, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    return packed(_messages.ViewerCameraMessage(*ahead))
-
-
-def click():
-    ray = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
-    return packed(_messages.SceneNodeClickMessage("/cells", 0, *ray, (0.5, 0.5), None))
-
-
-def packed(message):
-    return msgspec.msgpack.encode(message.as_serializable_dict([]))
 
 
 def wait(found, seconds=10.0):

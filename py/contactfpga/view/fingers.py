@@ -46,7 +46,7 @@ class Hand:
 
     def __init__(self, board: Touchable, radius_mm: float, force_n: float = 5.0):
         self.radius_mm, self.force_n = radius_mm, force_n
-        self._board = board
+        self.board = board
         self._lock = threading.Lock()
         self._down: list[Finger] = []
         self._dragged: dict[object, Finger] = {}
@@ -114,4 +114,4 @@ class Hand:
         return [*self._down, *self._dragged.values()]
 
     def _tell(self) -> None:
-        self._board.touch(self._all())
+        self.board.touch(self._all())

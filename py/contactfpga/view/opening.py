@@ -6,16 +6,20 @@ import contextlib
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactfpga.driver import driver, transport
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
 from contactfpga.view.fingers import Hand
+from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
 from contactfpga.view.replayed import ByteRecording
 from contactfpga.view.sources import BoardSource, Source
+
+if TYPE_CHECKING:
+    import viser
 
 CLOCK_HZ = 6_000_000
 """Of the virtual board that is shown where nothing is named: half the usual clock, which keeps up with real time."""
@@ -28,7 +32,12 @@ FINGER = 0.9
 class Shown:
     """A view that is being served."""
 
+    web: viser.ViserServer
+    guard: Guard
     view: View
+    source: Source
+    hand: Hand | None
+    """The mouse's, on a virtual board."""
     url: str
     """With the token: whoever has it can read and press."""
 
@@ -48,7 +57,7 @@ def opened(
     try:
         web, guard = server.serve(host, http_port)
         try:
-            yield Shown(View(web, source, hand), guard.url(web.get_port()))
+            yield Shown(web, guard, View(web, source, hand), source, hand, guard.url(web.get_port()))
         finally:
             server.stop(web)
     finally:

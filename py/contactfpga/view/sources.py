@@ -17,6 +17,7 @@ from contactfpga.tracking.tracks import Tracks
 from contactfpga.view.fingers import Touchable
 from contactfpga.view.meter import Meter
 from contactfpga.view.pace import Pace
+from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
 TURN_S = 0.02
@@ -85,12 +86,16 @@ class BoardSource:
                 time.sleep(TURN_S - due)
             seconds = max(due, TURN_S)
         with contextlib.suppress(ReadTimeout):
-            batch = self._frames.batch(seconds, seconds)
+            batch = self.frames(seconds)
             self.meter.take(batch, self._board.stats, self._frames.dropped)
             if self._virtual is not None:  # whose clock is that of its arrivals
                 self.meter.take_latency(batch)
             return True
         return False
+
+    def frames(self, seconds: float) -> Batch:
+        """All that come meanwhile. Raises :class:`~contactfpga.ReadTimeout` where none does."""
+        return self._frames.batch(seconds, seconds)
 
     def told(self) -> list[tuple[str, str]]:
         stats = self.meter.stats

@@ -21,8 +21,10 @@ FILLED = 0.9
 """Share of the pitch that a tile takes."""
 THICK = 0.08
 """Its height, of the pitch."""
-AMBIENT, SIDE = 2.2, 0.9
+AMBIENT, SIDE = 1.2, 0.7
 """Lights: mostly from all sides, so that a color means the same everywhere."""
+FAR, PANEL = 0.9, 0.14
+"""How far the camera is from the sheet, of its diagonal, and how far it looks past it, of that."""
 LABELS = 24
 """Contacts that have their number written beside them."""
 
@@ -37,7 +39,7 @@ class Stage:
     """Draws moments of one sheet."""
 
     def __init__(self, server: viser.ViserServer, tiles: Tiles, node: str = NODE):
-        self._server, self._tiles, self._node = server, tiles, node
+        self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
         self._lift_mm = 0.06 * self._pitch_mm
@@ -67,16 +69,14 @@ class Stage:
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light/all", intensity=AMBIENT)
         scene.add_light_directional("/light/side", intensity=SIDE, position=(0.3, -0.5, 1.0))
-        tiles, camera = self._tiles, self._server.initial_camera
-        middle = tiles.middle_mm * MM
-        normal = tiles.normals.mean(0)
-        normal = normal / (np.linalg.norm(normal) or 1.0)
-        away = tiles.along_y.mean(0)
-        far = 1.15 * tiles.size_mm * MM
+        tiles, camera = self.tiles, self._server.initial_camera
+        normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
+        far = FAR * tiles.size_mm * MM
+        middle = tiles.middle_mm * MM + PANEL * far * aside  # beside the panel, not under it
         camera.look_at = tuple(middle)
-        camera.position = tuple(middle + far * (0.9 * normal - 0.55 * away))
+        camera.position = tuple(middle + far * (0.9 * normal - 0.45 * away))
         camera.near = 0.02 * far
-        self._server.scene.set_up_direction(tuple(away) if abs(normal[2]) < 0.5 else (0.0, 0.0, 1.0))
+        scene.set_up_direction(tuple(away) if abs(normal[2]) < 0.5 else (0.0, 0.0, 1.0))
 
     def draw(self, moment: Moment) -> None:
         """Show it. Only what differs is sent."""
@@ -84,7 +84,7 @@ class Stage:
         colors = picture.tile_colors(zones, moment.truth)
         if self._colors is None or not np.array_equal(colors, self._colors):
             self.cells.batched_colors = self._colors = colors
-        found = picture.spots(zones, self._tiles.surface, self._lift_mm)
+        found = picture.spots(zones, self.tiles.surface, self._lift_mm)
         self._draw_lines("circles", found.circles, picture.CIRCLE, 3.0)
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
@@ -99,7 +99,9 @@ class Stage:
             return
         if handle is None or len(handle.points) != len(lines):
             path = f"{self._node}/{name}"
-            self._lines[name] = self._server.scene.add_line_segments(path, lines, color, line_width=width)
+            self._lines[name] = self._server.scene.add_line_segments(
+                path, lines, color, thickness=width, thickness_units="screen"
+            )
             return
         handle.points = lines.astype(np.float32)
         handle.visible = True
@@ -127,16 +129,17 @@ class Stage:
             x_mm, y_mm = track.zone.x_mm, track.zone.y_mm
             assert x_mm is not None
             assert y_mm is not None
-            point, normal = self._tiles.surface.place(x_mm, y_mm)
+            point, normal = self.tiles.surface.place(x_mm, y_mm)
             label.position = (np.array(point) + 0.4 * self._pitch_mm * np.array(normal)) * MM
-            label.text = f"#{track.id}: {track.zone.area_cells} cells"
+            area = track.zone.area_cells
+            label.text = f"#{track.id}: {area} cell{'' if area == 1 else 's'}"
             label.visible = True
         for label in self._labels[len(shown) :]:
             label.visible = False
 
     def press_with(self, hand: Hand, pressing: Callable[[], None] = lambda: None) -> None:
         """Have the mouse press this sheet; ``pressing`` is called as it does."""
-        tiles = self._tiles
+        tiles = self.tiles
 
         @self.cells.on_click
         async def click(event: Any) -> None:
@@ -157,3 +160,11 @@ class Stage:
             place = tiles.met(eye, np.array(to) / MM - eye)
             if place is not None:
                 hand.drag(event.client_id, *place)
+
+
+def mean(directions: np.ndarray) -> np.ndarray:
+    """The direction between them, or the first one where they turn all around."""
+    found = directions.mean(0)
+    length = float(np.linalg.norm(found))
+    unit: np.ndarray = found / length if length > 0.1 else directions[0]
+    return unit
