@@ -28,6 +28,7 @@ from contactfpga.commands import (
     ros,
     settle,
     surface,
+    view,
     wire,
     zones,
 )
@@ -56,6 +57,7 @@ class Command(Protocol):
 COMMANDS: dict[str, Command] = {
     "zones": zones,
     "body": body,
+    "view": view,
     "wire": wire,
     "board": board,
     "doctor": doctor,
