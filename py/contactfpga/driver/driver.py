@@ -48,7 +48,7 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
-    if record is not None:
+    if isinstance(record, str | Path):
         recording.check(record)
     if port is None:
         port = _find(baud)

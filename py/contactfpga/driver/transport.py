@@ -172,7 +172,8 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for; ``skin``: where it names no file."""
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
+    ``skin``: where it names no file."""
     asked = sim_address.parse(name)
     cover, circuit = None, None
     if asked.skin is not None:
