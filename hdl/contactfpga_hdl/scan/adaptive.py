@@ -12,7 +12,7 @@ from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.scan.shift import RowChain
 from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
-from contactfpga_hdl.util.upset import upset
+from contactfpga_hdl.util.upset import upset_count
 
 
 class _Sample:
@@ -188,7 +188,7 @@ class AdaptiveScanner(wiring.Component):
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
         if not self.skin.dual:
-            m.d.comb += self.upset.eq(driver.upset | upset(m, "time", time, prescaler == per_us - 1))
+            m.d.comb += self.upset.eq(driver.upset | upset_count(m, "time", time, prescaler == per_us - 1))
         watch_epoch(m, time, self.epoch)
         with m.If(seek.strobe):
             m.d.sync += slots.eq(slots + 1)

@@ -12,7 +12,7 @@ from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
-from contactfpga_hdl.util.upset import upset
+from contactfpga_hdl.util.upset import upset, upset_count
 
 
 class _Slots:
@@ -102,7 +102,7 @@ class Scanner(wiring.Component):
             self._precharge(m, slots, sample, time)
         if not skin.dual:
             found = upset(m, "row", slots.following, driver.drive)
-            m.d.comb += self.upset.eq(driver.upset | found | upset(m, "time", time, slots.ticks))
+            m.d.comb += self.upset.eq(driver.upset | found | upset_count(m, "time", time, slots.ticks))
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
