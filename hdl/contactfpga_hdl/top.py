@@ -25,7 +25,6 @@ from contactfpga_hdl.scan.sample_at import moves_sample
 from contactfpga_hdl.units.ports import unit_pins
 from contactfpga_hdl.units.units import Units
 
-
 _Stage = TypeVar("_Stage", bound=wiring.Component)
 
 

@@ -78,6 +78,15 @@ def test_lines_of_an_unpacked_bitstream():
     assert text.count("1'bz") == 1
 
 
+def test_a_port_of_an_unpacked_bitstream_with_a_line_that_is_never_read():
+    chip = ICEBOX.replace(r"inout [1:0] \rows", r"output [1:0] \rows")
+    chip = chip.replace(r"tran(\rows_0__io [0], \rows_0__io[0] );", r"assign \rows_0__io [0] = \rows_0__io[0] ;")
+    text = both_ways.of_icebox(chip, SKIN)
+    assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o" in text
+    assert r"assign \rows_0__io[0]  = \rows_0__io [0];" in text, "what is read comes from outside"
+    assert "assign rows_0__o[0] = n6;" in text
+
+
 def test_lines_of_a_synthesized_netlist():
     text = flat(both_ways.of_ecp5(ECP5, SKIN))
     assert (

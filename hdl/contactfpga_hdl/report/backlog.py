@@ -13,8 +13,8 @@ from contactfpga_hdl.util.queue import Queue
 class Backlog(wiring.Component):
     """A queue for what comes faster than it is divided or packed.
 
-    Its places, ``Derived.backlog`` or more, are enough for any frame, so ``passed`` is always ready. What comes in one clock is
-    offered two clocks later at the earliest.
+    Its places, ``Derived.backlog`` or more, are enough for any frame, so ``passed`` is always ready. What comes in one
+    clock is offered two clocks later at the earliest.
 
     passed (in): zones, or items where nothing is divided, and end marks.
     waiting (out): the same, in the same order.

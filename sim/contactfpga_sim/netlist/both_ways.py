@@ -23,14 +23,18 @@ def lines(skin: Skin) -> dict[str, int]:
 
 
 def of_icebox(chip: str, skin: Skin) -> str:
-    """The Verilog of ``icebox_vlog`` with an input ``NAME_0__io`` and outputs ``NAME_0__o`` and ``NAME_0__oe``."""
+    """The Verilog of ``icebox_vlog`` with an input ``NAME_0__io`` and outputs ``NAME_0__o`` and ``NAME_0__oe``.
+
+    Where a line of a port is never read, as a guard row is not, ``icebox_vlog`` makes the port an output.
+    """
     for name, width in lines(skin).items():
         port = rf"\{name}_0__io " if width > 1 else f"{name}_0__io"
         size = _size(width)
         declared = f"input {size}{port}, output {size}{name}_0__o, output {size}{name}_0__oe"
-        chip = _put(chip, _once(chip, f"inout {re.escape(size + port)}"), declared)
+        chip = _put(chip, _once(chip, f"(?:inout|output) {re.escape(size + port)}"), declared)
         for line in range(width):
             pin = rf"\{name}_0__io[{line}] " if width > 1 else port
+            chip = chip.replace(f"assign {port}[{line}] = {pin};", f"assign {pin} = {port}[{line}];")
             hit = _once(chip, rf"assign {re.escape(pin)} *= (\S+) \? (\S+) : 1'bz;")
             chip = _put(chip, hit, _driven(name, line, width, level=hit[2], enable=hit[1]))
     return chip

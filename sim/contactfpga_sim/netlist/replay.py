@@ -55,8 +55,8 @@ RUNS: tuple[tuple[str, Skin], ...] = (
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, self_test=True, clock_hz=30_000_000, baud=3_000_000)),
 )
 """Boards and sheets that are replayed when no board is named. The first one sends every frame, the others overwrite
-some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last four drive and read
-their pins; of these the third has guard lines, and the last one a self-test."""
+some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last four drive and
+read their pins; of these the third has guard lines, and the last one a self-test."""
 
 
 @dataclasses.dataclass(frozen=True)

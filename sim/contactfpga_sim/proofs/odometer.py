@@ -17,8 +17,9 @@ def digits_are_the_counts(proof: Proof, counter: str) -> None:
     """Free: pulses of both counters at any time, hold, and the place that is read. Assumed: no pulse comes while one of
     its kind waits.
 
-    Claimed: once the digits were cleared, and with no carry under way or waiting, the digits of the counter make up how many pulses there were, modulo
-    what they can hold; ``digit`` is that of the place a clock before; other places hold 0.
+    Claimed: once the digits were cleared, and with no carry under way or waiting, the digits of the counter make up how
+    many pulses there were, modulo what they can hold; ``digit`` is that of the place a clock before; other places hold
+    0.
     """
     m = proof.m
     dut = Odometer()
