@@ -120,7 +120,9 @@ def _force(load: Load) -> list[Trial]:
         assert found.covariance_n2 is not None
         off = np.array(found[0].force_n) - force
         trials.append(
-            Trial(off @ np.linalg.solve(found.covariance_n2, off) < CHI2_3, _told(found, True), float(np.linalg.norm(off)))
+            Trial(
+                off @ np.linalg.solve(found.covariance_n2, off) < CHI2_3, _told(found, True), float(np.linalg.norm(off))
+            )
         )
     return trials
 
