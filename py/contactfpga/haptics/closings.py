@@ -23,8 +23,8 @@ class ClosingWatch:
     :meth:`~contactfpga.haptics.Locator.locate`.
 
     A switch closed between the scans of its row in two frames; the push at that moment is halfway between those of the
-    two. From exact sums it finds one switch that opened or closed, and two or three that closed where only one choice
-    of the contact's neighbors has these sums; else it says so (:attr:`complete`) until the contact ends. With
+    two. From exact sums it finds one switch that opened or closed, and two or three that closed where one choice
+    with these sums is the most compact; else it says so (:attr:`complete`) until the contact ends. With
     ``report = "cells"`` it finds all.
     """
 
@@ -92,19 +92,22 @@ class ClosingWatch:
             one = closed(before, after)
             return [one] if one else [], []
         _, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))
-        fits = [
-            list(some)
+        fits = sorted(
+            (_spread([*self._pushes, *some]), list(some))
             for some in itertools.combinations(self._beside(after), count)
             if sum(row for row, _ in some) == y and sum(column for _, column in some) == x
-        ]
-        return fits[0] if len(fits) == 1 else [], []
+        )
+        alone = len(fits) == 1 or (len(fits) > 1 and fits[0][0] < fits[1][0])
+        return fits[0][1] if alone else [], []
 
     def _beside(self, zones: Zones) -> list[Cell]:
-        """Open switches around the contact."""
+        """Open switches around the contact, or where its barycenter is if none was known."""
         rows, columns = zones.sheet.rows, zones.sheet.columns
+        area, x, y = (int(number) for number in zones.records.sum(axis=0))
+        known = list(self._pushes) or [(round(y / area), round(x / area))]
         around = {
             (row + down, column + right)
-            for row, column in self._pushes
+            for row, column in known
             for down in (-1, 0, 1)
             for right in (-1, 0, 1)
             if 0 <= row + down < rows and 0 <= column + right < columns
@@ -120,3 +123,8 @@ class ClosingWatch:
         adjacent = after.overwritten == before.overwritten and (after.sequence - before.sequence) % 256 == 1
         share = 0.5 + (row / after.sheet.rows if adjacent else 0.0)
         return max(0.0, self._push_before + share * (self.push_n - self._push_before))
+
+
+def _spread(cells: list[Cell]) -> int:
+    """How far cells lie apart, in whole numbers: squares of all distances."""
+    return sum((r - row) ** 2 + (c - column) ** 2 for r, c in cells for row, column in cells)

@@ -50,7 +50,7 @@ class Setting:
     def skin(self) -> Skin:
         return Skin(
             rows=self.lines, columns=self.lines, pitch_x_mm=self.pitch_mm, pitch_y_mm=self.pitch_mm,
-            units=3, unit_sums=[[1, 1, 1]], baud=6_000_000,
+            units=3, unit_sums=((1, 1, 1),), baud=6_000_000,
         )  # fmt: skip
 
     @property
@@ -162,7 +162,8 @@ def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
     assert cells.noise.covariance is not None
     push_sigma = math.sqrt(float(cells.noise.covariance[2, 2]) + (RATE_N_S * 0.15e-3) ** 2 / 12)
     finder = Locator(setting.skin.sheet, reach_of(POINT), setting.spread, push_sigma)
-    truth, found = touching.places_m[0], {method: [] for method in METHODS}
+    truth = touching.places_m[0]
+    found: dict[str, list[float]] = {method: [] for method in METHODS}
     watch, taken = ClosingWatch(cells), 0
     for time_s in TIMES_S:
         now = touching.first_s + time_s
@@ -186,13 +187,14 @@ def _places(
     if known and known[-1].units is not None and cells.surface is not None:
         pressure = cells.surface.center(cells.wrench(known[-1].units.readings))
         center = None if pressure is None else finder.center(pressure, cells.sheet_m)
-    found = {"barycenter": coarse, "center of pressure": center and (center.x_m, center.y_m)}
+    middle = None if center is None else (center.x_m, center.y_m)
+    found = {"barycenter": coarse, "center of pressure": middle}
     for method, also in (("closings", None), ("closings + center of pressure", center)):
         if watch.complete and watch.cells and watch.push_n is not None:
             place = finder.locate(watch.cells, watch.push_n, watch.closings, also)
             found[method] = (place.x_m, place.y_m)
         else:
-            found[method] = coarse if also is None else (also.x_m, also.y_m)
+            found[method] = coarse if also is None else middle
     return found
 
 
@@ -217,8 +219,6 @@ def two(apart_mm: float, seed: int, push_n: float = 12.0) -> Forces:
     found = felt(setting.cells, zones, friction=0.0)
     if found is None or len(zones) != 2:
         return Forces(len(zones), ())
-    pairs = [
-        min(found, key=lambda one: math.dist(one.point_m[:2], place))
-        for place in touching.places_m + np.array(setting.cells.sheet_m)
-    ]
+    places = touching.places_m + np.array(setting.cells.sheet_m)
+    pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in places]
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
