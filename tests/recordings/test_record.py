@@ -56,7 +56,7 @@ def recorded(tmp_path, port=None, seconds=None, name="touches.mcap", **options):
     with session:
         session.add(port, name="left hand")
         session.start(seconds)
-        wait_until(lambda: session.turn(0.005) or not session.running or not port.left)
+        wait_until(lambda: session.wait(0.005) or not session.running or not port.left)
     return session
 
 
@@ -168,7 +168,7 @@ def test_units_and_faults_are_messages(tmp_path):
         port.model.word = 1
         port.out += report()
         session.start()
-        wait_until(lambda: session.turn(0.005) or not port.left)
+        wait_until(lambda: session.wait(0.005) or not port.left)
     with AnyReader([tmp_path / "x.mcap"]) as reader:
         told = [
             reader.deserialize(raw, c.msgtype).names for c, _, raw in reader.messages() if c.topic == "/skin/faults"
@@ -225,11 +225,11 @@ def test_the_command_says_what_it_wrote(board, tmp_path, capsys):
 def test_ctrl_c_is_the_usual_end(board, tmp_path, capsys, monkeypatch):
     turns = itertools.count()
 
-    def turn(self, seconds):
+    def wait(self, seconds):
         if next(turns) == 3:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Session, "turn", turn)
+    monkeypatch.setattr(Session, "wait", wait)
     assert run(tmp_path / "x.mcap", board.path, "--timeout", LONG) == 0
     assert Recording(tmp_path / "x.mcap").links
 
@@ -263,7 +263,7 @@ def test_a_port_that_is_lost_leaves_a_whole_file(tmp_path, capsys):
         session.add(board.path, timeout=LONG)
         session.start()
         board.unplug()
-        wait_until(lambda: session.turn(0.005) or not session.running)
+        wait_until(lambda: session.wait(0.005) or not session.running)
         with pytest.raises(contactfpga.PortLost):
             session.stop()
     assert Recording(tmp_path / "x.mcap").links

@@ -119,6 +119,8 @@ class LinkRecorder:
             self._write(item, clock_s)
         if self._buffer.due(clock_s):
             self._drain()
+        if item is None:
+            self._link.turn()
 
     def _clock_s(self, item: object) -> float:
         """Now; of a recording, which has no clock, the time of its last frame."""
