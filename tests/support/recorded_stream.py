@@ -6,7 +6,6 @@ from model_board import ModelBoard
 from contactfpga import Skin
 from contactfpga.recordings.session import Session
 
-
 SKIN = Skin()
 
 

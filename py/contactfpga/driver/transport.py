@@ -122,7 +122,7 @@ class SimTransport:
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
-        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
+        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``"""
         asked = sim_address.parse(name)
         skin = Skin.load(asked.skin) if asked.skin is not None else None
         cover = load_cover(asked.skin) if asked.skin is not None else None
@@ -186,7 +186,12 @@ def _virtual_board(
     """The one place at which the host loads the simulation, which need not be installed."""
     from contactfpga_sim.board import virtual
 
-    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit)
+    units = None
+    if asked.units is not None:
+        from contactfpga.haptics import LoadCells  # which most boards have no use for
+
+        units = LoadCells.load(asked.units)
+    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
 
 
 def _reason(error: Exception) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.recordings.recording import Recording
-from contactfpga.ros.types import PACKAGE, message_type
+from contactfpga.ros.convert import FLAGS
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 
@@ -32,7 +32,6 @@ COLUMNS = {
 ROWS = 1 << 16
 """Of a piece."""
 
-_BITS = {name.removeprefix("FLAG_").lower(): bit for name, bit in message_type(f"{PACKAGE}/Zones").constants}
 _NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False)
 Piece = dict[str, np.ndarray]
 
@@ -45,7 +44,7 @@ def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
     for t_s, link, zones in recording.frames():
         tracker = trackers.setdefault(link, Tracker())
         number = counts[link] = counts.get(link, -1) + 1
-        flags = sum(_BITS[flag] for flag in zones.flags)
+        flags = sum(FLAGS[flag] for flag in zones.flags)
         head = t_s, link, number, zones.time_us
         found += [(*head, *values, flags) for values in _zones(zones, tracker)]
         if len(found) >= rows:
