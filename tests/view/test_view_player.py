@@ -30,8 +30,7 @@ def frames(file):
 def player(file, monkeypatch):
     now = [10.0]
     monkeypatch.setattr(playing.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    recording = ByteRecording(file)
-    return Player(file, recording.sheet, recording, clock=lambda: now[0])
+    return Player(ByteRecording(file), clock=lambda: now[0])
 
 
 def test_a_recording_begins_anywhere(file, frames):
@@ -40,7 +39,7 @@ def test_a_recording_begins_anywhere(file, frames):
     assert recording.count == len(frames)
     assert recording.duration_s == pytest.approx(times[-1])
     for start_s, end_s in ((0.0, None), (0.2, None), (0.2503, 0.3), (times[-1], None)):
-        found = [(seconds, zones.sequence) for seconds, _, zones in recording.frames(start_s, end_s)]
+        found = [(seconds, zones.sequence) for seconds, zones in recording.frames(start_s, end_s)]
         wanted = [
             (pytest.approx(seconds), zones.sequence)
             for seconds, zones in zip(times, frames)
