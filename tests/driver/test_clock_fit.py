@@ -60,7 +60,7 @@ def shifted(frames, after_s, host_s):
 
 @pytest.mark.parametrize("step_s", [-3600.0, -2.0, -0.05, 0.05, 2.0, 3600.0])
 def test_after_a_step_of_the_host_clock_times_are_right_again(step_s):
-    """Asleep, a host's clock stands while the board's goes on: a step back; what is asked afterwards shows the other."""
+    """Asleep, a host's clock stands while the board's goes on: a step back. Requests show the other."""
     frames = followed(shifted(moments(QUIET, 30.0, 2, 30.0), 10.0, step_s))
     late = frames.sampled_s > frames.sampled_s[-1] - 15
     assert np.abs(frames.errors_s[late]).max() < 0.001

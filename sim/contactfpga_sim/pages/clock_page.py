@@ -13,14 +13,14 @@ HEAD = (
     "arrival is late by",
     "error, median",
     "99 %",
-    "`host_sigma_s`, median",
+    "`host_sigma_s`",
     "error within 2 sigma",
 )
 
 
 def accuracy_table() -> str:
     """Over simulated ways."""
-    rows = [HEAD]
+    rows: list[tuple[str, ...]] = [HEAD]
     for path in PATHS.values():
         found = accuracy(path)
         times = (found.late_s, found.error_s, found.worst_s, found.sigma_s)
