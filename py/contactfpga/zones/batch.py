@@ -17,6 +17,8 @@ FRAME_DTYPE = np.dtype(
     [
         ("time_us", np.int64),
         ("host_time_s", np.float64),
+        ("host_sigma_s", np.float64),
+        ("arrived_s", np.float64),
         ("sequence", np.int64),
         ("overwritten", np.int64),
         ("pressed", np.int64),
@@ -27,7 +29,8 @@ FRAME_DTYPE = np.dtype(
         ("motion", np.bool_),
     ]
 )
-"""Fields of :attr:`Batch.frames`: those of :class:`Zones` and its flags; ``host_time_s`` is NaN in a recording."""
+"""Fields of :attr:`Batch.frames`: those of :class:`Zones` and its flags; times on the host's clock are NaN in a
+recording."""
 
 _WHICH = [("frame", np.int64), ("time_us", np.int64), ("sequence", np.int64)]
 ZONE_DTYPE = np.dtype(_WHICH + [(name, DTYPE[name]) for name in DTYPE.names or ()])
@@ -80,7 +83,7 @@ def _row(one: Zones) -> tuple[float, ...]:
     """Of :data:`FRAME_DTYPE`."""
     return (
         one.time_us,
-        math.nan if one.host_time_s is None else one.host_time_s,
+        *(math.nan if value is None else value for value in (one.host_time_s, one.host_sigma_s, one.arrived_s)),
         one.sequence,
         one.overwritten,
         one.pressed,
@@ -96,7 +99,10 @@ _FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": 
 def _describe(run: Run, out: np.ndarray) -> None:
     """The same of the frames of a run."""
     out["time_us"] = run.times_us
-    out["host_time_s"] = math.nan if run.host_time_s is None else run.host_time_s
+    line = run.line
+    out["host_time_s"] = math.nan if line is None else line.at(run.times_us)
+    out["host_sigma_s"] = math.nan if line is None else line.sigma_s
+    out["arrived_s"] = math.nan if line is None else line.arrived_s
     for name, sent in _SENT.items():
         out[name] = run.packets[sent]
     for name, bit in _FLAGS.items():

@@ -16,6 +16,7 @@ from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import ghosts, labels, motion
+from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory, UnitSamples
 
 DTYPE = np.dtype(
@@ -74,7 +75,7 @@ class Zones(Sequence[Zone]):
         sheet: Sheet,
         time_us: int | None = None,
         before: Frame | None = None,
-        host_time_s: float | None = None,
+        line: HostLine | None = None,
         faults: tuple[str, ...] = (STUCK,),
         history: UnitHistory | None = None,
     ):
@@ -84,17 +85,32 @@ class Zones(Sequence[Zone]):
         """The sheet, as the board's hello tells it."""
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, since power-up."""
-        self.host_time_s = host_time_s
-        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
-        None in a recording."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
         """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
         ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
         are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
         the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
         self._before = before
+        self._line = line
         self._history = history
         self._units: UnitSamples | None = None
+
+    @property
+    def arrived_s(self) -> float | None:
+        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
+        None in a recording."""
+        return None if self._line is None else self._line.arrived_s
+
+    @property
+    def host_time_s(self) -> float | None:
+        """:attr:`time_us` on that clock, as far as it was known when the frame arrived (docs/clock.md); None in a
+        recording."""
+        return None if self._line is None else self._line.at(self.time_us)
+
+    @property
+    def host_sigma_s(self) -> float | None:
+        """Standard deviation of :attr:`host_time_s` in s; None in a recording."""
+        return None if self._line is None else self._line.sigma_s
 
     @property
     def units(self) -> UnitSamples | None:
@@ -262,7 +278,16 @@ class Zones(Sequence[Zone]):
         """Everything in plain Python values, ready for JSON."""
         values: dict[str, object] = {
             name: getattr(self, name)
-            for name in ("sequence", "time_us", "host_time_s", "overwritten", "total_zones", "pressed")
+            for name in (
+                "sequence",
+                "time_us",
+                "host_time_s",
+                "host_sigma_s",
+                "arrived_s",
+                "overwritten",
+                "total_zones",
+                "pressed",
+            )
         }
         values["faults"] = list(self.faults)
         values["flags"] = sorted(self.flags)
