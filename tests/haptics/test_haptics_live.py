@@ -22,7 +22,7 @@ HERE = "sim://?skin={skin}&units={units}&scene="
 
 
 def bumper(**more):
-    units = [one for one in flat(0.03, gain_n=0.02, zero=1000.0, range=(0.0, 4095.0), **more).units]
+    units = flat(0.03, gain_n=0.02, zero=1000.0, range=(0.0, 4095.0), **more).units
     return LoadCells(units, frame="bumper", surface=Plane(), sheet_m=CORNER)
 
 
@@ -105,7 +105,7 @@ def test_what_drags_and_turns_is_felt_by_units_alone():
     hexapod = LoadCells.load(contactfpga.examples() / "units.toml")
     cells = LoadCells(hexapod.units, surface=Cylinder(0.043), sheet_m=(0.0, -0.075))
     one = finger(20.0, 60.0, 12.0, drag_n=(3.0, -2.0), torsion_nm=0.02)
-    read = Felt(Scene((one,)), cells, SKIN.replace(radius_mm=38.0), noise=False).exact(0.0)
+    read = Felt(Scene((one,)), cells, SKIN.replace(surface="cylinder", radius_mm=38.0), noise=False).exact(0.0)
     center = cells.surface.center(cells.wrench(read))
     assert center.sheet_m == pytest.approx((0.020 * 43 / 38, -0.015))
     assert (center.normal_n, center.tangential_n) == pytest.approx((12.0, 13**0.5))

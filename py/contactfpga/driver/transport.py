@@ -123,16 +123,7 @@ class SimTransport:
     @classmethod
     def named(cls, name: str) -> SimTransport:
         """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``"""
-        asked = sim_address.parse(name)
-        skin = Skin.load(asked.skin) if asked.skin is not None else None
-        cover = load_cover(asked.skin) if asked.skin is not None else None
-        circuit = load_checked(asked.skin, skin) if asked.skin is not None and skin is not None else None
-        try:
-            return cls(name, _virtual_board(asked, skin, cover, circuit))
-        except ModuleNotFoundError as error:
-            raise MissingExtra(f"sim:// ({error})", "sim") from None
-        except ValueError as error:  # a scene that is not known, or that does not fit the sheet
-            raise PortNotFound(f"{name}: {error}") from None
+        return cls(name, virtual_board(name))
 
     def read(self, timeout_s: float) -> bytes:
         # Not less than a clock: time that rounds to none would not pass, and the deadline never come.
@@ -178,6 +169,22 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     if name.startswith("replay:"):
         return ReplayTransport(name)
     return SerialTransport(name, baud)
+
+
+def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
+    ``skin``: where it names no file."""
+    asked = sim_address.parse(name)
+    cover, circuit = None, None
+    if asked.skin is not None:
+        skin = Skin.load(asked.skin)
+        cover, circuit = load_cover(asked.skin), load_checked(asked.skin, skin)
+    try:
+        return _virtual_board(asked, skin, cover, circuit)
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"sim:// ({error})", "sim") from None
+    except ValueError as error:  # a scene that is not known, or that does not fit the sheet
+        raise PortNotFound(f"{name}: {error}") from None
 
 
 def _virtual_board(

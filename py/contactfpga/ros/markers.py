@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+from contactfpga import surfaces
 from contactfpga.ros.convert import Message, forces_of, quaternion, vector
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.tracks import Track
-from contactfpga.zones.zone import on_surface
 
 if TYPE_CHECKING:
     from contactfpga.haptics import Contacts
@@ -36,8 +36,8 @@ def outline(sheet: Sheet) -> list[Message]:
     places = [corners[0]]
     for (ax, ay), (bx, by) in pairwise(corners):
         places += [(ax + (bx - ax) * part / _EDGE, ay + (by - ay) * part / _EDGE) for part in range(1, _EDGE + 1)]
-    points = [on_surface(x, y, sheet.radius_mm)[0] for x, y in places]
-    return [vector([one / 1000 for one in point]) for point in points]
+    lies = surfaces.of(sheet)
+    return [vector([one / 1000 for one in lies.place(x, y)[0]]) for x, y in places]
 
 
 def markers(rim: Sequence[Message], found: Sequence[Track], head: Message, forces: Contacts | None = None) -> Message:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
@@ -121,22 +122,7 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     scale = np.where(nowhere, 1, scale)
     for name, sums, pitch in (("x_mm", x, sheet.pitch_x_mm), ("y_mm", y, sheet.pitch_y_mm)):
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
-    _place(out, sheet.radius_mm)
+    out["point_mm"], out["normal"] = surfaces.of(sheet).place(out["x_mm"], out["y_mm"])
     if sheet.ghosts:
         out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]
-
-
-def _place(out: np.ndarray, radius_mm: float | None) -> None:
-    """Points and normals, as :func:`contactfpga.zones.zone.on_surface` has them."""
-    nowhere = np.isnan(out["x_mm"])
-    if radius_mm is None:
-        out["point_mm"][:, 0], out["point_mm"][:, 1] = out["x_mm"], out["y_mm"]
-        out["normal"][:, 2] = 1.0
-    else:
-        angles = (np.where(nowhere, 0.0, out["x_mm"]) / radius_mm).tolist()
-        for axis, function in enumerate((math.cos, math.sin)):  # numpy's may differ in the last bit
-            out["normal"][:, axis] = [function(angle) for angle in angles]
-            out["point_mm"][:, axis] = radius_mm * out["normal"][:, axis]
-        out["point_mm"][:, 2] = out["y_mm"]
-    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan

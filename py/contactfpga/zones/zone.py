@@ -10,13 +10,13 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
+from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import ghosts, labels, motion
 from contactfpga.zones.units import UnitHistory, UnitSamples
-
-Vector = tuple[float, float, float]
 
 DTYPE = np.dtype(
     [
@@ -222,8 +222,12 @@ class Zones(Sequence[Zone]):
         if place is None:
             return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
         x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
-        point_mm, normal = on_surface(x_mm, y_mm, self.sheet.radius_mm)
+        point_mm, normal = self._surface.place(x_mm, y_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
+
+    @functools.cached_property
+    def _surface(self) -> surfaces.Surface:
+        return surfaces.of(self.sheet)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -288,16 +292,3 @@ def _order(zone: Zone) -> tuple[bool, float, float, int]:
 def _line(zone: Zone) -> str:
     where = "nowhere" if zone.x_mm is None else f"at x {zone.x_mm:.2f} mm, y {zone.y_mm:.2f} mm"
     return f"  {zone.area_cells} cells, {zone.area_mm2:g} mm2 {where}"
-
-
-def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
-    """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
-
-    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis toward the y axis, and y
-    along it; ``x_mm`` is the arc length.
-    """
-    if radius_mm is None:
-        return (x_mm, y_mm, 0.0), (0.0, 0.0, 1.0)
-    angle = x_mm / radius_mm
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return (radius_mm * cosine, radius_mm * sine, y_mm), (cosine, sine, 0.0)

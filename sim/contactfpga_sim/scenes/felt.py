@@ -26,9 +26,9 @@ class Felt:
         if cells.surface is None:
             raise ValueError("the units have no surface; give units.toml a table [surface] with the bumper's outside")
         self._scene, self._cells, self._surface = scene, cells, cells.surface
-        round_link = isinstance(cells.surface, Cylinder) and skin.sheet.radius_mm is not None
+        outside = cells.surface.radius_m if isinstance(cells.surface, Cylinder) else None
         # A sheet around a cylinder lies under the foam, on whose outside things push.
-        self._wider = 1e3 * cells.surface.radius_m / skin.sheet.radius_mm if round_link else 1.0
+        self._wider = 1e3 * outside / skin.radius_mm if outside and skin.radius_mm else 1.0
         self._full = (1 << converters.find(skin.converter).bits) - 1
         self._steps = np.linalg.pinv(cells.matrix)
         self._rng = np.random.default_rng(seed)
