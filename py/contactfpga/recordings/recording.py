@@ -12,6 +12,7 @@ from pathlib import Path
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
 from contactfpga.inputs.values import is_finite
+from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
@@ -50,8 +51,12 @@ class Recording:
     @functools.cached_property
     def skins(self) -> dict[str, Skin | None]:
         """The Skin of each link; None where only its hello is known."""
-        texts = {facts.get("link"): facts.get("skin", "") for facts in self._file.metadata()}
+        texts = {facts.get("link"): facts.get("skin", "") for facts in self.texts(METADATA)}
         return {link: _skin(texts.get(link, "")) for link in self._file.links}
+
+    def texts(self, name: str) -> list[dict[str, str]]:
+        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds."""
+        return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:
         """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` on and before ``end_s``, in order; with
