@@ -109,13 +109,13 @@ class LinkRecorder:
             clock_s = self._clock_s()
             if self._said is not None and not isinstance(item, Silence):
                 self._said.told(item, clock_s)
-            self._drain(clock_s)
+            self._drain()
 
     def finish(self) -> None:
         """Close the board and write what is left."""
         self.board.close()
         with contextlib.suppress(RecordingFailed):  # was told before
-            self._drain(math.inf)
+            self._drain(rest=True)
 
     def _take(self, zones: Zones) -> None:
         self._last_us = zones.time_us
@@ -123,10 +123,11 @@ class LinkRecorder:
         self.frames += 1
         if self._said is not None:
             self._said.frame(zones, clock_s)
-        self._drain(clock_s)
+        self._drain()
 
     def _pause(self) -> None:
-        self._drain(self._clock_s())
+        self._clock_s()
+        self._drain()
         self._link.turn()
 
     def _clock_s(self) -> float:
@@ -136,7 +137,7 @@ class LinkRecorder:
         self.seconds = max(self.seconds, now_s - self._begun_s)
         return now_s
 
-    def _drain(self, now_s: float) -> None:
-        if self._buffer.due(now_s):
+    def _drain(self, rest: bool = False) -> None:
+        if self._buffer.due(math.inf if rest else self.board.clock()):
             data, clock_s = self._buffer.drain()
             self._link.take_bytes(data, clock_s if self.board.live else self._last_us / 1e6)
