@@ -129,12 +129,13 @@ def recovered_frames(file, folder):
     return len(list(Recording(into).frames()))
 
 
-def test_ctrl_c_closes_the_file(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_ends_a_program_closes_the_file(tmp_path, number):
     with FakeBoard(SKIN) as board:
         file = tmp_path / "x.mcap"
         process = record(file, board.path)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, errors = process.communicate(timeout=LONG)
     assert process.returncode == 0
     assert errors == ""

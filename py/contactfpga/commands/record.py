@@ -5,8 +5,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import functools
+import signal
 import sys
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session)
     try:
-        with session:
+        with _ended_by_term(), session:
             _add(session, args, body)
             with contextlib.suppress(KeyboardInterrupt):  # the usual end
                 session.start(args.seconds)
@@ -69,6 +72,19 @@ def run(args: argparse.Namespace) -> int:
     finally:
         progress.end()
     return 0
+
+
+@contextlib.contextmanager
+def _ended_by_term() -> Iterator[None]:
+    """A service is stopped with TERM, which closes the file as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are the main thread's
+        return
+    before = signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _body(args: argparse.Namespace) -> Body | None:
