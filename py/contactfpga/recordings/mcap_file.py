@@ -70,9 +70,10 @@ class McapFile:
         self._make_room(data)
         number = self._channels.get(channel.topic)
         if number is None:
-            kind, language, text = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
-            facts = channel.message_encoding, channel.metadata
-            number = self._register(channel.topic, *facts, kind, language, lambda: text)
+            name, encoding, text = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
+            number = self._register(
+                channel.topic, channel.message_encoding, channel.metadata, name, encoding, lambda: text
+            )
         self._add(number, time_ns, data)
 
     def _make_room(self, data: bytes) -> None:
