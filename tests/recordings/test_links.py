@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from fake_board import FakeBoard, wait_until
+from model_board import ModelBoard
 from recorded_stream import StreamPort
 from rosbags.highlevel import AnyReader
 
@@ -12,6 +13,7 @@ from contactfpga.body import Body
 from contactfpga.body.contact import placed
 from contactfpga.recordings import Recording, Session
 from contactfpga.recordings.recorder import Split
+from contactfpga.wire.hellos import Cutter
 
 SKIN = Skin()
 LONG = 60.0
@@ -61,6 +63,38 @@ def test_split_files_begin_with_a_hello_of_each_link(tmp_path):
         pieces = [Recording(file) for file in session.files]
         kept = [b"".join(data for _, data in one.raw_bytes(name)) for one in pieces if name in one.links]
         assert b"".join(kept) == port.sent
+
+
+@pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
+    hello = ModelBoard(SKIN).hello()
+    data = before + hello + b"frame\0\0"
+    cutter, kept = Cutter(), b""
+    for at in range(0, len(data), size):
+        first, after = cutter.take(data[at : at + size])
+        kept += first
+        if after:
+            break
+    assert after
+    assert kept + after == data[: len(kept + after)]
+    assert kept.strip(b"\0") == before.strip(b"\0")
+    assert size < 1000 or after.startswith(b"\0")
+    assert after.lstrip(b"\0").startswith(hello.strip(b"\0"))
+
+
+def test_a_link_without_a_hello_is_left_out(tmp_path):
+    from contactfpga.recordings import messages
+    from contactfpga.recordings.mcap_file import McapFile
+
+    file = McapFile(tmp_path / "x.mcap")
+    for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
+        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+    file.close()
+    recording = Recording(tmp_path / "x.mcap")
+    assert list(recording.links) == ["arm"]
+    assert [link for _, link, _ in recording.frames()] == ["arm"]
+    assert [data for _, data in recording.raw_bytes("leg")] == [b"\0\0noise\0"]
 
 
 def test_two_links_of_one_name(tmp_path):

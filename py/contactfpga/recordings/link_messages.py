@@ -55,7 +55,7 @@ class LinkMessages:
         head = convert.header(self._link.time_ns(sampled_s), self._frame)
         tracks = self._tracker.update(zones)
         forces = None if self._felt is None else self._felt(zones, tracks)
-        made = convert.zones(zones, head, getattr(zones, "host_sigma_s", None))
+        made = convert.zones(zones, head, zones.host_sigma_s)
         if self._mount is not None:
             made["zones"] = [convert.zone(self._mount.zone(zone)) for zone in zones]
             tracks = self._mount.tracks(tracks)
