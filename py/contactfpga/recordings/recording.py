@@ -12,6 +12,7 @@ from pathlib import Path
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
 from contactfpga.inputs.values import is_finite
+from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
@@ -44,14 +45,22 @@ class Recording:
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
-        """The first hello of each link, whose ``sheet`` has lines and lengths."""
-        return {link: self._hello(link) for link in self._file.links}
+        """The first hello of each link, whose ``sheet`` has lines and lengths. A link that said none is left out: its
+        frames cannot be read. Raises :class:`ContactFPGAError` where there is no other."""
+        found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
+        if not found:
+            raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
+        return found
 
     @functools.cached_property
     def skins(self) -> dict[str, Skin | None]:
         """The Skin of each link; None where only its hello is known."""
-        texts = {facts.get("link"): facts.get("skin", "") for facts in self._file.metadata()}
-        return {link: _skin(texts.get(link, "")) for link in self._file.links}
+        texts = {facts.get("link"): facts.get("skin", "") for facts in self.texts(METADATA)}
+        return {link: _skin(texts.get(link, "")) for link in self.links}
+
+    def texts(self, name: str) -> list[dict[str, str]]:
+        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds."""
+        return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:
         """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` on and before ``end_s``, in order; with
@@ -59,7 +68,7 @@ class Recording:
         for name, value in (("start_s", start_s), ("end_s", 0.0 if end_s is None else end_s)):
             if not is_finite(value) or value < 0:
                 raise ValueError(f"{name} is {value!r}; it must be a number of seconds, 0 or more")
-        links = self._file.links if link is None else [link]
+        links = list(self.links) if link is None else [link]
         every = [self._frames(one, float(start_s), math.inf if end_s is None else end_s) for one in links]
         return heapq.merge(*every, key=lambda timed: timed[0])
 
@@ -86,13 +95,13 @@ class Recording:
                 if last_s >= start_s:
                     yield last_s, link, zones
 
-    def _hello(self, link: str) -> Hello:
+    def _hello(self, link: str) -> Hello | None:
         conversation = Conversation(str(self.path), live=False)
         for _, data in self._file.pieces(link):
             conversation.receive(data, 0.0)
             if conversation.hello is not None:
                 return conversation.hello
-        raise RecordingError(f"{self.path}: link {link!r} holds no hello; its frames cannot be read")
+        return None
 
 
 def _skin(text: str) -> Skin | None:
