@@ -37,7 +37,8 @@ class Ads131m08(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         self._pace(m)
-        ready_n, before = Signal(init=1), Signal(init=1)
+        ready_n = Signal(init=1)
+        before = Signal(init=1)
         m.submodules.sync_ready = FFSynchronizer(self.pins.spi_ready_n, ready_n, init=1)
         m.d.sync += before.eq(ready_n)
         busy = Signal()
@@ -73,10 +74,13 @@ class Ads131m08(wiring.Component):
         """The pin's level in the clock in which ``falls`` is high has passed the synchronizer two clocks later."""
         bit = Signal()
         m.submodules.sync = FFSynchronizer(self.pins.spi_miso, bit)
-        place, word = Signal(range(BITS)), Signal(range(WORDS))
+        place = Signal(range(BITS))
+        word = Signal(range(WORDS))
         last_bit = place == BITS - 1
         of_unit = counts & last_bit & (word >= 1) & (word <= self.skin.units)
-        takes, of_last, shifted = Signal(2), Signal(2), Signal(BITS)
+        takes = Signal(2)
+        of_last = Signal(2)
+        shifted = Signal(BITS)
         m.d.sync += [
             takes.eq(Cat(falls, takes)),
             of_last.eq(Cat(falls & of_unit, of_last)),
