@@ -42,6 +42,11 @@ class Forces:
             drift = self._drift.update(zones.time_us / 1e6, zones.units.readings, len(zones))
             self.drifted = drift.drifted
 
+    def of_frame(self, zones: Zones, tracks: Tracks | None) -> Contacts | None:
+        """The same, and what it found."""
+        self.take(zones, tracks)
+        return self.contacts
+
     def to_dict(self) -> dict[str, object]:
         """In plain Python values, ready for JSON."""
         found = self.contacts

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
 
 from contactfpga.choices import converters
 from contactfpga.circuit import Circuit
@@ -10,9 +13,10 @@ from contactfpga.cover import Cover
 from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import CONTACTS, Source, contacts_of
+from contactfpga_sim.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.scenes.scene import scene as make_scene
 from contactfpga_sim.sheet.line import Line
 
@@ -34,6 +38,15 @@ def _unit_source(skin: Skin, scene: Source, units: UnitSource | LoadCells | None
     if contacts is None:
         raise ValueError(f"scene {scene!r} has no forces, which units need; take one of {', '.join(CONTACTS)}")
     return Felt(contacts, units, skin)
+
+
+class Finger(Protocol):
+    """A round contact, placed on the sheet laid flat."""
+
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    force_n: float
 
 
 def _at_rest(skin: Skin) -> UnitSource:
@@ -71,6 +84,10 @@ class VirtualBoard:
         self._look_s = look_s
         self._units = _unit_source(self.skin, scene, units)
         self._scene = make_scene(self.skin, scene, cover)
+        self._cover = cover
+        self._touch: CellsAt | None = None
+        self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
+        """(rows, columns) bool: the switches that are closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
         if circuit is not None:
             self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
@@ -93,9 +110,19 @@ class VirtualBoard:
             self.advance(cycles)
             left -= cycles
 
+    def touch(self, fingers: Iterable[Finger]) -> None:
+        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+        placed = [
+            contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
+            for one in fingers
+        ]
+        self._touch = Scene(tuple(placed)).on(self.skin, self._cover) if placed else None
+
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the scene as it is now."""
-        self._board.press(self._scene(self.clock()))
+        touch, pressed = self._touch, self._scene(self.clock())
+        self.pressed = pressed if touch is None else pressed | touch(self.clock())
+        self._board.press(self.pressed)
         if self.skin.units:
             self._board.load(self._units(self.clock()))
         self._board.run(cycles)

@@ -52,13 +52,13 @@ def felt_table() -> str:
 
 def pairs_table() -> str:
     """Forces of two contacts."""
-    rows = [["apart", "two zones in", "error of a push", "95 % interval"]]
-    for apart in APART_MM:
-        each = [felt.two(apart, seed) for seed in range(CONTACTS)]
-        off = np.array([one for pair in each for one in pair.off_n])
-        middle, low, high = interval(off)
-        share = sum(one.zones == 2 for one in each) / len(each)
-        rows.append([f"{apart:g} mm", f"{100 * share:.0f} %", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
+    rows = [["contacts", "apart", "error of a push", "95 % interval"]]
+    for kind in felt.KINDS:
+        for apart in APART_MM:
+            each = [felt.two(apart, seed, kind) for seed in range(CONTACTS)]
+            off = np.array([one for pair in each for one in pair.off_n])
+            middle, low, high = interval(off)
+            rows.append([kind, f"{apart:g} mm", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
     return writer.table_of(rows)
 
 

@@ -31,6 +31,7 @@ from contactfpga_sim.proofs import (
     streams,
     uart,
     units,
+    upset,
 )
 from contactfpga_sim.proofs.case import Case
 
@@ -60,6 +61,7 @@ CASES: tuple[Case, ...] = (
     *dual.CASES,
     *units.CASES,
     *paced_units.CASES,
+    *upset.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

@@ -119,8 +119,8 @@ def _force(load: Load) -> list[Trial]:
         _, force, found = pressed(load, made, rng)
         assert found.covariance_n2 is not None
         off = np.array(found[0].force_n) - force
-        holds = float(off @ np.linalg.solve(found.covariance_n2, off)) < CHI2_3
-        trials.append(Trial(holds, _told(found, True), float(np.linalg.norm(off))))
+        within = bool(off @ np.linalg.solve(found.covariance_n2, off) < CHI2_3)
+        trials.append(Trial(within, _told(found, True), float(np.linalg.norm(off))))
     return trials
 
 

@@ -203,17 +203,23 @@ class Forces:
 
 
 FINGER_MM = 6.0
+KINDS = ("point", f"finger of {2 * FINGER_MM:g} mm")
 
 
-def two(apart_mm: float, seed: int, push_n: float = 12.0) -> Forces:
-    """Two round fingers this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found."""
-    setting, rng = SETTINGS[0], np.random.default_rng([seed, 9])
-    turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2
-    x, y = (MIDDLE + rng.random(2)) * setting.pitch_mm
-    places = [(x + side * half * math.cos(turn), y + side * half * math.sin(turn)) for side in (-1, 1)]
-    fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
+def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) -> Forces:
+    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, each of which alone closes a
+    switch, and their pushes as found."""
+    setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
-    board = VirtualBoard(skin, Scene(fingers), units=Felt(Scene(fingers), cells, skin, seed))
+    places = _pair(setting, apart_mm, push_n, np.random.default_rng([seed, 9]))
+    fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
+    units = Felt(Scene(fingers), cells, skin, seed)
+    if kind == KINDS[0]:
+        each = np.array([1 / Touching(setting, 1e-3 * np.array(place), seed).closing_n for place in places])
+        closed = push_n * each.sum(axis=0) >= 1
+        board = VirtualBoard(skin, lambda seconds: closed, units=units)
+    else:
+        board = VirtualBoard(skin, Scene(fingers), units=units)
     with contactfpga.open(board, skin) as opened:
         frames = WithReadings(opened)
         zones = [frames.next() for _ in range(4)][-1]
@@ -223,3 +229,15 @@ def two(apart_mm: float, seed: int, push_n: float = 12.0) -> Forces:
     true_m = 1e-3 * np.array(places) + np.array(cells.sheet_m)
     pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in true_m]
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
+
+
+def _pair(setting: Setting, apart_mm: float, push_n: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Places in mm."""
+    pitch, reach_mm = setting.pitch_mm, 1e3 * reach_of(POINT).reach_m(push_n)
+    while True:
+        turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2
+        x, y = (MIDDLE + rng.random(2)) * pitch
+        places = [(x + side * half * math.cos(turn), y + side * half * math.sin(turn)) for side in (-1, 1)]
+        off = [math.hypot(x - pitch * round(x / pitch), y - pitch * round(y / pitch)) for x, y in places]
+        if max(off) < reach_mm:
+            return places
