@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contactfpga import haptics
+from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
 from contactfpga.surfaces.shapes import Floats, Vector
-from contactfpga.zones.zone import Zone
+from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
     from contactfpga.body.plan import Plan
@@ -42,6 +44,9 @@ class Contact:
     """On the link; None where no units are read, or their readings at that time have not come yet."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
+    fold: float | None = None
+    """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
+    None: nothing was learned for this link, or at this angle, or the angle is not known."""
 
     def moved(self, pose: Pose, frame: str) -> Contact:
         """The same in a frame in which its own one lies at ``pose``."""
@@ -68,9 +73,9 @@ def placed(plan: Plan, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
     return _vector(plan.pose.apply(1e-3 * np.array(point_mm))), _vector(plan.pose.turn(np.array(normal)))
 
 
-def on_link(plan: Plan, state: LinkState) -> list[Contact]:
-    """The contacts in the link's frame. A zone without cells, which only a frame flagged ``mismatch`` can hold, lies
-    nowhere and is none."""
+def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[Contact]:
+    """The contacts in the link's frame; with the joints' angles, those that are folds are marked. A zone without cells,
+    which only a frame flagged ``mismatch`` can hold, lies nowhere and is none."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
@@ -82,7 +87,8 @@ def on_link(plan: Plan, state: LinkState) -> list[Contact]:
         point, normal = placed(plan, zone.x_mm, zone.y_mm)
         spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
         when = (zones.time_us, state.frame_s)
-        found.append(Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags))
+        fold = _fold(plan, zones, zone, angles)
+        found.append(Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags, fold=fold))
     if plan.units is None or zones.units is None or not found:
         return found
     touches = [haptics.Touch(one.point_m, one.normal, plan.friction, sigma_m) for one in found]
@@ -90,6 +96,13 @@ def on_link(plan: Plan, state: LinkState) -> list[Contact]:
     return [
         dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n) for one, force in zip(found, forces)
     ]
+
+
+def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:
+    if plan.folds is None or angles is None or plan.folds.joint not in angles:
+        return None
+    cells = cells_of(zones, zone)
+    return None if cells is None else plan.folds.share(angles[plan.folds.joint], cells)
 
 
 def _vector(values: Floats) -> Vector:

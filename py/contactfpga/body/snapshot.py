@@ -85,7 +85,9 @@ class Snapshot:
             raise NoLinkData(missing)
         found: list[Contact] = []
         for name in asked:
-            mine = contact.on_link(self._body.links[name], self.links[name])
+            known = self._angles.get(name)
+            angles = None if isinstance(known, ContactFPGAError) else known
+            mine = contact.on_link(self._body.links[name], self.links[name], angles)
             if frame == BASE and mine:
                 pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
                 mine = [one.moved(pose, BASE) for one in mine]
