@@ -7,8 +7,9 @@ import contextlib
 import threading
 from pathlib import Path
 
-from contactfpga.driver import ports
+from contactfpga.driver import ports, recording
 from contactfpga.driver.board import Board
+from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
 from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, PortNotFound
@@ -26,7 +27,7 @@ def open(
     skin: Skin | str | Path | None = None,
     *,
     baud: int | None = None,
-    record: str | Path | None = None,
+    record: str | Path | Tap | None = None,
     timeout: float = 1.0,
 ) -> Board:
     """Open a board and wait for its hello.
@@ -35,7 +36,8 @@ def open(
     time, else as fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which
     is closed with the board), or None for the one supported board that is plugged in. ``skin``: the Skin (or its
     file) the board must be built from; None takes what the board says. ``baud``: bits per second; by default that of
-    ``skin``, or 3,000,000. ``record``: a file that gets every byte received; ``replay://`` reads it.
+    ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for ``replay://``, or a
+    :class:`~contactfpga.driver.recording.Tap`.
     ``timeout`` in seconds, for the hello.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
@@ -46,12 +48,15 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    if isinstance(record, str | Path):
+        recording.check(record)
     if port is None:
         port = _find(baud)
     transport = connect(port, baud)
     try:
         if record is not None:
-            transport = RecordingTransport(transport, record)
+            tap = FileTap(record, transport.name) if isinstance(record, (str, Path)) else record
+            transport = RecordingTransport(transport, tap)
         board = Board(transport, skin)
     except BaseException:
         transport.close()
