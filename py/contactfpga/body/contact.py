@@ -32,11 +32,13 @@ class Contact:
     """Device time of its frame."""
     host_time_s: float
     """The same on the body's clock."""
-    point_m: Vector
-    normal: Vector
-    """Outward unit normal."""
-    covariance_m2: Floats
-    """(3, 3) of the point: chance within a cell, along the surface."""
+    point_m: Vector | None
+    """None for a zone that has no place: one that goes all the way round a closed sheet, or that has no cells, which
+    only a frame flagged ``mismatch`` can hold."""
+    normal: Vector | None
+    """Outward unit normal; None as ``point_m``."""
+    covariance_m2: Floats | None
+    """(3, 3) of the point: chance within a cell, along the surface; None as ``point_m``."""
     zone: Zone
     flags: frozenset[str]
     """Of its frame."""
@@ -53,16 +55,17 @@ class Contact:
         return dataclasses.replace(
             self,
             frame=frame,
-            point_m=_vector(pose.apply(np.array(self.point_m))),
-            normal=_vector(pose.turn(np.array(self.normal))),
-            covariance_m2=pose.rotation @ self.covariance_m2 @ pose.rotation.T,
+            point_m=None if self.point_m is None else _vector(pose.apply(np.array(self.point_m))),
+            normal=None if self.normal is None else _vector(pose.turn(np.array(self.normal))),
+            covariance_m2=None if self.covariance_m2 is None else pose.rotation @ self.covariance_m2 @ pose.rotation.T,
             force_n=None if self.force_n is None else _vector(pose.turn(np.array(self.force_n))),
         )
 
     def to_dict(self) -> dict[str, object]:
         """All of it in plain Python values, ready for JSON."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        values |= {"covariance_m2": self.covariance_m2.tolist(), "flags": sorted(self.flags)}
+        spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
+        values |= {"covariance_m2": spread, "flags": sorted(self.flags)}
         return values | {"zone": dataclasses.asdict(self.zone)}
 
 
@@ -74,24 +77,30 @@ def placed(plan: Plan, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
 
 
 def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[Contact]:
-    """The contacts in the link's frame; with the joints' angles, those that are folds are marked. A zone without cells,
-    which only a frame flagged ``mismatch`` can hold, lies nowhere and is none."""
+    """The contacts in the link's frame, one per zone; with the joints' angles, they say how much of them is a fold."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
     sigma_m = 1e-3 * math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
     found = []
     for zone in zones:
-        if zone.x_mm is None or zone.y_mm is None:
-            continue
-        point, normal = placed(plan, zone.x_mm, zone.y_mm)
-        spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
-        when = (zones.time_us, state.frame_s)
-        fold = _fold(plan, zones, zone, angles)
+        point = normal = spread = None
+        if zone.x_mm is not None and zone.y_mm is not None:
+            point, normal = placed(plan, zone.x_mm, zone.y_mm)
+            spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
+        when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
         found.append(Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags, fold=fold))
+    return _felt(plan, zones, found, sigma_m)
+
+
+def _felt(plan: Plan, zones: Zones, found: list[Contact], sigma_m: float) -> list[Contact]:
+    """The same with forces, where the units' readings have come, and each contact has a place."""
     if plan.units is None or zones.units is None or not found:
         return found
-    touches = [haptics.Touch(one.point_m, one.normal, plan.friction, sigma_m) for one in found]
+    places = [(one.point_m, one.normal) for one in found if one.point_m is not None and one.normal is not None]
+    if len(places) < len(found):
+        return found
+    touches = [haptics.Touch(point, normal, plan.friction, sigma_m) for point, normal in places]
     forces = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
     return [
         dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n) for one, force in zip(found, forces)

@@ -127,6 +127,11 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Surface:
     table = Mesh.load(folder / values)
     if table.lines != (skin.rows, skin.columns):
         raise BodyError(f"surface {shown(values)} is of {table.lines} cells; the Skin has {(skin.rows, skin.columns)}")
+    if table.closed != skin.closed:
+        ends = ("lie apart", "meet")
+        raise BodyError(
+            f"surface {shown(values)}: its ends {ends[table.closed]}, those of the Skin {ends[skin.closed]}"
+        )
     return table
 
 

@@ -15,6 +15,8 @@ from contactfpga_sim.scenes.scene import Contact, Scene
 
 SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0
+OFF_RAD = 0.01
+"""Standard deviation of the angle that is told from the one at which the cover folds."""
 FLICKER = 0.3
 """Chance of a cell at the fold's rim to be open."""
 FINGER_MM = 9.0
@@ -24,6 +26,8 @@ def fold(angle_rad: float, rng: np.random.Generator | None = None) -> np.ndarray
     """(rows, columns) bool: from 0.6 rad on a crease across rows 0 to 3 that grows with the angle. Without ``rng`` all
     that it can press."""
     cells = np.zeros((SKIN.rows, SKIN.columns), bool)
+    if rng is not None:
+        angle_rad += OFF_RAD * rng.standard_normal()
     deep = (angle_rad - BEGINS_RAD) / (RANGE_RAD - BEGINS_RAD)
     if deep <= 0:
         return cells
