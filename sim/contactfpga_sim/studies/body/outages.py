@@ -121,7 +121,7 @@ OUTAGES = (
     Outage("unplugged, then plugged in again", Socket.unplug, Socket.plug, "lost"),
     Outage("sends nothing: no power, a cut wire", _set(mute=True), _set(mute=False), "silent"),
     Outage("sends noise: another baud rate", _set(noisy=True), _set(noisy=False), "silent"),
-    Outage("frames come 0.2 s late", _set(held_s=0.2), _set(held_s=0.0), "late"),
+    Outage("frames are held up for 0.2 s", _set(held_s=0.2), _set(held_s=0.0), "late"),
     Outage("another Skin is flashed, the port stays", lambda one: one.flash(OTHER), Socket.flash, "mismatch"),
     Outage("another board is plugged in", lambda one: one.plug(OTHER), Socket.plug, "mismatch"),
 )

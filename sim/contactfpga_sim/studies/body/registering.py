@@ -43,7 +43,7 @@ class Registered:
     """That was told, RMS."""
 
 
-def study(skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 100, seed: int = 1) -> Registered:
+def study(skin: Skin, points: int, folder: Path, *, normals: bool, count: int = 200, seed: int = 1) -> Registered:
     """Random poses and mountings, random points, a finger that is off by a millimeter or so."""
     (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
     plan = read({"name": "link", "skin": "skin.toml"}, folder)
