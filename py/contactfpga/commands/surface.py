@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
     parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
     parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
-    by = "unrolling: around the frame's z axis, not stretched; projection: down along z (default: unrolling)."
+    by = "Around the frame's z axis and not stretched (unrolling, the default), or down along z (projection)."
     parser.add_argument("--by", choices=("unrolling", "projection"), default="unrolling", help=by)
     origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
     parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
