@@ -15,6 +15,8 @@ import contactfpga
 from contactfpga import cli
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints, NoLinkData, OpenBody
 from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
 
 URDF = """<robot name="two"><link name="torso"/><link name="arm"/>
 <joint name="elbow" type="revolute"><parent link="torso"/><child link="arm"/>
@@ -142,6 +144,22 @@ def test_zone_without_a_place_is_a_contact_all_the_same(robot):
     json.dumps(chest.to_dict())
     with pytest.raises(BodyError, match="a contact on link 'chest' has no place"):
         snapshot.jacobian(chest)
+
+
+def test_ring_on_a_closed_sheet_is_a_contact_without_a_place(robot):
+    skin = contactfpga.Skin(rows=6, columns=8, surface="cylinder", radius_mm=40.0, closed=True, report="cells")
+    (robot.parent / "flat.toml").write_text(skin.to_toml())
+    cells = np.zeros((6, 8), bool)
+    cells[4] = cells[0, [0, 7]] = True  # a ring, and a spot that lies on the seam
+    frame = Frame(0, 0, frozenset(), 0, 0, 0, 10, np.zeros((0, 4), np.int64), cells)
+    states = {"arm": None, "chest": LinkState(Zones(frame, skin.sheet, 0), 0.0, "ok", "", 10.0)}
+    body = Body.load(robot)
+    seam, ring = Snapshot(body, 10.0, {"chest": states["chest"]}).contacts("link")
+    assert ring.point_m is None
+    assert ring.zone.area_cells == 8
+    # Mirrored, columns 7 and 0 lie where 0 and 7 did: their middle is half a column before the x axis.
+    angle = -math.tau / 16
+    assert seam.point_m == pytest.approx((0.04 * math.cos(angle), 0.04 * math.sin(angle), 0.0))
 
 
 def test_angles_are_those_of_the_frames_time(robot):
