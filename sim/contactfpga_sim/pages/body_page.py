@@ -26,7 +26,6 @@ from contactfpga.driver import sim_address
 from contactfpga_sim.pages import writer
 from contactfpga_sim.scenes.scene import scene
 from contactfpga_sim.studies.body import folding, outages, registering
-from contactfpga_sim.studies.tracking.frames import zones_of
 
 POINTS = (3, 4, 6, 10)
 SWEEPS = (1, 2, 5, 10)
@@ -113,7 +112,7 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
     axes.plot(cells[:, across], cells[:, 2], ".", ms=1.2, color=style.SKY)
     axes.plot([], [], "s", ms=5, color=style.SKY, label="cells of the sheets")
     asked = sim_address.parse(plan.port or "sim://").scene
-    zones, _ = zones_of(scene(skin, asked)(0.0), 0, skin)
+    zones = folding.frame_of(scene(skin, asked)(0.0), skin.replace(report="cells"))
     for one in on_link(plan, LinkState(zones, 0.0, "ok", "", 0.0)):
         contact = one.moved(pose, "base")
         assert contact.point_m is not None

@@ -8,7 +8,7 @@ import numpy as np
 
 from contactfpga.body.folds import STEP_RAD, Folds, cells_of, learn
 from contactfpga.skin import Skin
-from contactfpga.wire.protocol import Frame
+from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.scene import Contact, Scene
@@ -47,15 +47,16 @@ def touch(x_mm: float, y_mm: float) -> np.ndarray:
     return np.asarray(Scene((disc,)).pressed(0.0, SKIN), bool)
 
 
-def _frame(cells: np.ndarray) -> Zones:
-    frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), np.zeros((0, 3), np.int64), cells, None)
-    return Zones(frame, SKIN.sheet, 0)
+def frame_of(cells: np.ndarray, skin: Skin = SKIN) -> Zones:
+    """A frame of pressed cells, of a board with ``report = "cells"``."""
+    frame = Frame(0, 0, frozenset(), 0, 0, 0, int(cells.sum()), no_records(skin.sheet), cells, None)
+    return Zones(frame, skin.sheet, 0)
 
 
 def learned(sweeps: int, rng: np.random.Generator, frames: int = 400) -> Folds:
     """Over the joint's range, there and back so many times."""
     angles = np.tile(np.linspace(0, RANGE_RAD, frames), sweeps)
-    return learn("joint", ((angle, _frame(fold(angle, rng))) for angle in angles.tolist()))
+    return learn("joint", ((angle, frame_of(fold(angle, rng))) for angle in angles.tolist()))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +90,7 @@ def rates(sweeps: int, count: int = 400, seed: int = 1) -> Rates:
             continue
         seen["straight"] += _marks(known, float(rng.uniform(0, BEGINS_RAD - 2 * STEP_RAD)), finger)
         creased = fold(angle, rng)
-        both = _frame(creased | finger)
+        both = frame_of(creased | finger)
         mine = [cells for cells in _zones(both) if (cells & finger).any()]
         beyond = bool((finger & ~fold(angle)).any())
         for cells in mine:
@@ -103,4 +104,4 @@ def _zones(zones: Zones) -> list[np.ndarray]:
 
 
 def _marks(known: Folds, angle: float, cells: np.ndarray) -> list[bool]:
-    return [known.share(angle, each) == 1 for each in _zones(_frame(cells))]
+    return [known.share(angle, each) == 1 for each in _zones(frame_of(cells))]
