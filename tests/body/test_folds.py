@@ -13,9 +13,9 @@ import contactfpga
 from contactfpga import cli
 from contactfpga.body import BodyError, Snapshot
 from contactfpga.body.body import Body
-from contactfpga.body.folds import Folds, learn
+from contactfpga.body.folds import Folds, cells_of, learn
 from contactfpga.body.snapshot import LinkState
-from contactfpga.wire.protocol import Frame
+from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.studies.body import folding
 
@@ -27,7 +27,7 @@ def frame(*cells, skin=SKIN):
     bitmap = np.zeros((skin.rows, skin.columns), bool)
     for cell in cells:
         bitmap[cell] = True
-    return Zones(Frame(0, 0, frozenset(), 0, 0, 0, len(cells), np.zeros((0, 3), np.int64), bitmap), skin.sheet, 0)
+    return Zones(Frame(0, 0, frozenset(), 0, 0, 0, len(cells), no_records(skin.sheet), bitmap), skin.sheet, 0)
 
 
 CREASE = [(0, 1), (0, 2), (0, 3)]
@@ -54,6 +54,15 @@ def test_contacts_say_how_much_of_them_the_cover_presses(robot):
         assert [one.zone.area_cells for one in found] == [4, 2], "marked, and there"
     (only,) = snapshot(robot, frame(*CREASE), lambda _: {"elbow": 0.15}).contacts("link")
     assert only.fold == 1.0
+
+
+def test_fold_over_the_seam_of_a_closed_sheet():
+    skin = SKIN.replace(closed=True, surface="cylinder", radius_mm=30.0)
+    crease, finger = [(0, 5), (0, 0)], [(3, 2)]
+    known = learn("elbow", [(0.0, frame(*crease, skin=skin))], 0.1)
+    shown = frame(*crease, *finger, skin=skin)
+    found = [known.share(0.0, cells_of(shown, zone)) for zone in shown]
+    assert found == [1.0, 0.0]
 
 
 def test_without_the_angle_nothing_is_marked(robot):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from contactfpga.body.answer import BodyError
 from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import is_finite, shown, whole
-from contactfpga.zones import labels
+from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
 
 STEP_RAD = 0.05
@@ -103,11 +103,12 @@ def cells_of(zones: Zones, zone: Zone) -> Cells | None:
     """(rows, columns) bool of one zone; None where the board sends no cells."""
     if zones.cells is None:
         return None
-    labelled = labels.label(zones.cells, zones.sheet.connectivity)
+    reach = zones.sheet.connectivity
+    numbers = around.label(zones.cells, reach)[0] if zones.sheet.closed else labels.label(zones.cells, reach)
     found = np.zeros(zones.cells.shape, bool)
-    for number, (area, sum_x, sum_y) in enumerate(labels.moments(labelled).tolist(), 1):
+    for number, (area, sum_x, sum_y) in enumerate(zones.records.tolist(), 1):
         if (area, sum_x, sum_y) == (zone.area_cells, zone.sum_x, zone.sum_y):
-            found |= labelled == number
+            found |= numbers == number
     return found
 
 
