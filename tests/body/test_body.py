@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import threading
 import time
 
@@ -14,8 +15,10 @@ from model_board import DirectPort
 import contactfpga
 from contactfpga import cli
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints, NoLinkData, OpenBody
+from contactfpga.body.pose import Pose
 from contactfpga.body.snapshot import LinkState, Snapshot
 from contactfpga.wire.protocol import Frame
+from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
 URDF = """<robot name="two"><link name="torso"/><link name="arm"/>
@@ -130,6 +133,25 @@ def test_contacts_lie_where_the_geometry_says(robot):
     assert snapshot.jacobian(own) == pytest.approx(jacobian)
     assert snapshot.joint_names == ("elbow",)
     json.dumps(arm.to_dict())
+
+
+def test_force_is_that_which_the_units_measure(robot):
+    robot.write_text(ROBOT.replace("mirrored = true", 'units = "units.toml"'))
+    shutil.copy(contactfpga.examples() / "units.toml", robot.parent / "units.toml")
+    body = Body.load(robot)
+    cells = body.links["chest"].units
+    state = state_of(FLAT, 3, 5, 10.0)
+    push = np.array([0.5, -0.25, -4.0])
+    exerted = np.concatenate([push, np.cross([0.03, 0.05, 0.0], push)])
+    readings = cells.zeros + np.linalg.pinv(cells.matrix) @ exerted
+    state.zones._units = UnitSamples(0, tuple(readings.tolist()), (0.0,) * 6, (False,) * 6)
+    snapshot = Snapshot(body, 10.0, {"chest": state, "arm": state_of(ROUND, 0, 0, 10.0)}, lambda _: {"elbow": 0.0})
+    chest, arm = snapshot.contacts(links=["chest", "arm"])
+    assert chest.force_n == pytest.approx(tuple(push))
+    assert chest.normal_n == pytest.approx(4.0)
+    assert (arm.force_n, arm.normal_n) == (None, None)
+    turned = chest.moved(Pose.of((0, 0, 1), (math.pi / 2, 0, 0)), "elsewhere")
+    assert turned.force_n == pytest.approx((0.5, 4.0, -0.25))
 
 
 def test_zone_without_a_place_is_a_contact_all_the_same(robot):
