@@ -229,6 +229,16 @@ def test_open_body_goes_on_without_a_link_and_takes_it_back(patient):
         body.latest()
 
 
+def test_ids_stay_with_contacts_that_move(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        first = body.read().contacts("link", links=["chest"])
+        plugged.ports["b"].moments = [(4, 11, 6)]
+        moved = body.read().contacts("link", links=["chest"])
+        assert [one.track for one in first] == [one.track for one in moved] == [1]
+        assert moved[0].point_m != first[0].point_m
+
+
 def test_read_waits_for_frames_scanned_after_the_call(patient):
     plugged = Plugged()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:

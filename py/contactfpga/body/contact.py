@@ -46,6 +46,8 @@ class Contact:
     """On the link; None where no units are read, or their readings at that time have not come yet."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
+    track: int | None = None
+    """Id that stays with the contact, of this link; None for a zone without a place, or in frames nobody followed."""
     fold: float | None = None
     """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
     None: nothing was learned for this link, or at this angle, or the angle is not known."""
@@ -82,6 +84,8 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
     assert zones is not None
     assert state.frame_s is not None
     sigma_m = 1e-3 * math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
+    tracks = () if state.tracks is None else state.tracks.active
+    ids = {id(track.zone): track.id for track in tracks if not track.held}
     found = []
     for zone in zones:
         point = normal = spread = None
@@ -89,7 +93,8 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
             point, normal = placed(plan, zone.x_mm, zone.y_mm)
             spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
         when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
-        found.append(Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags, fold=fold))
+        made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
+        found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
     return _felt(plan, zones, found, sigma_m)
 
 

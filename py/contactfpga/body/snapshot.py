@@ -16,6 +16,7 @@ from contactfpga.body.kinematics import Kinematics
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.surfaces.shapes import Floats
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class LinkState:
     """Why it is not ok."""
     frame_s: float | None = None
     """When the frame was scanned, on the body's clock."""
+    tracks: Tracks | None = None
+    """Its contacts over the frames that were taken, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"
