@@ -21,7 +21,8 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page clock-page record-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+# Every target that `make` lists; some share a folder's name.
+.PHONY: default compiler FORCE $(shell awk -F: '/^[a-z-]+:.*\#\# / { print $$1 }' Makefile)
 
 default: help check
 
@@ -122,6 +123,9 @@ tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recor
 
 record-page: $(VENV)/.stamp-test | compiler ## measure what recordings take and what kill -9 loses, and write docs/recordings.md
 	$(PY) -m contactfpga_sim.pages.record_page docs/recordings.md
+
+body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a body, register sheets, learn folds, and write docs/body.md and its picture
+	$(PY) -m contactfpga_sim.pages.body_page docs/body.md docs/images
 
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
 	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md

@@ -16,6 +16,7 @@ from contactfpga.body.kinematics import Kinematics
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.surfaces.shapes import Floats
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class LinkState:
     """Why it is not ok."""
     frame_s: float | None = None
     """When the frame was scanned, on the body's clock."""
+    tracks: Tracks | None = None
+    """Its contacts over the frames that were taken, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"
@@ -85,7 +88,9 @@ class Snapshot:
             raise NoLinkData(missing)
         found: list[Contact] = []
         for name in asked:
-            mine = contact.on_link(self._body.links[name], self.links[name])
+            known = self._angles.get(name)
+            angles = None if isinstance(known, ContactFPGAError) else known
+            mine = contact.on_link(self._body.links[name], self.links[name], angles)
             if frame == BASE and mine:
                 pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
                 mine = [one.moved(pose, BASE) for one in mine]
@@ -96,6 +101,8 @@ class Snapshot:
         """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
         frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
+        if one.point_m is None:
+            raise BodyError(f"a contact on link {shown(one.link)} has no place, so nothing says how it moves")
         point = np.array(one.point_m)
         if one.frame != BASE:
             point = self._kinematics.pose(frame, angles).apply(point)
