@@ -21,8 +21,8 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-# Every target that `make` lists; some share a folder's name.
-.PHONY: default compiler FORCE $(shell awk -F: '/^[a-z-]+:.*\#\# / { print $$1 }' Makefile)
+# No target is a file; some share a folder's name.
+.PHONY: FORCE $(shell awk -F: '/^[a-z-]+:/ { print $$1 }' Makefile)
 
 default: help check
 
