@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page view-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -120,6 +120,9 @@ haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of 
 tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
 	$(PY) -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
 
+view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
+	$(PY) -m contactfpga_sim.pages.view_page docs/view.md docs/images
+
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
 
@@ -179,7 +182,7 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 endef
 
 $(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
-	$(call install,sim,downloads about 85 MB unless pip has it cached)
+	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,boards,downloads about 145 MB unless installed or cached)

@@ -19,7 +19,7 @@ CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circ
 def shown():
     from contactfpga_sim.pages.browser import running
 
-    with opening.opened("sim://?scene=nothing", http_port=0) as shown, running(shown):
+    with opening.opened(opening.Named("sim://?scene=nothing"), http_port=0) as shown, running(shown):
         yield shown
 
 
