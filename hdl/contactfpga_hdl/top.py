@@ -16,7 +16,7 @@ from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver, Transmitter
-from contactfpga_hdl.payloads import moments_layout
+from contactfpga_hdl.payloads import zone_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
 from contactfpga_hdl.report.divide import Divider
@@ -70,7 +70,7 @@ class Top(wiring.Component):
                 "byte_data": Out(8),
             }
             if skin.report == "barycenter":
-                ports["record_data"] = Out(moments_layout(derived).size)
+                ports["record_data"] = Out(zone_layout(derived).size)
                 ports |= {"item_transfer": Out(1), "item_data": Out(8 * derived.item_bytes), "item_end": Out(1)}
         super().__init__(ports)
 

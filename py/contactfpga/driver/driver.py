@@ -7,7 +7,7 @@ import contextlib
 import threading
 from pathlib import Path
 
-from contactfpga.driver import ports
+from contactfpga.driver import ports, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
@@ -48,6 +48,8 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    if isinstance(record, str | Path):
+        recording.check(record)
     if port is None:
         port = _find(baud)
     transport = connect(port, baud)

@@ -122,6 +122,15 @@ def open_recorded(name: str) -> Recorded:
     return file
 
 
+def check(path: str | Path) -> None:
+    """Refuse a file that cannot be made, before a board is opened or built for it."""
+    place = Path(path)
+    if place.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: it is a folder; name a file")
+    if not place.parent.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: there is no folder {place.parent}")
+
+
 def create(path: str | Path, port: str) -> BinaryIO:
     """The file that gets every byte from ``port``, empty; never the one that is being replayed."""
     try:

@@ -122,7 +122,7 @@ class SimTransport:
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
-        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
+        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``"""
         return cls(name, virtual_board(name))
 
     def read(self, timeout_s: float) -> bytes:
@@ -172,7 +172,8 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER`` asks for; ``skin``: where it names no file."""
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
+    ``skin``: where it names no file."""
     asked = sim_address.parse(name)
     cover, circuit = None, None
     if asked.skin is not None:
@@ -192,7 +193,12 @@ def _virtual_board(
     """The one place at which the host loads the simulation, which need not be installed."""
     from contactfpga_sim.board import virtual
 
-    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit)
+    units = None
+    if asked.units is not None:
+        from contactfpga.haptics import LoadCells  # which most boards have no use for
+
+        units = LoadCells.load(asked.units)
+    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
 
 
 def _reason(error: Exception) -> str:

@@ -9,6 +9,7 @@ from contactfpga.haptics.calibrate import Calibration, calibrate
 from contactfpga.haptics.contact import Contact, Contacts, Touch
 from contactfpga.haptics.drift import Drift, DriftWatch
 from contactfpga.haptics.evidence import Closing
+from contactfpga.haptics.live import WithReadings, felt
 from contactfpga.haptics.locate import Locator, Place, closed
 from contactfpga.haptics.reach import Reach
 from contactfpga.haptics.solve import contacts
@@ -37,8 +38,10 @@ __all__ = [
     "Reach",
     "Touch",
     "Unit",
+    "WithReadings",
     "Wrench",
     "calibrate",
     "closed",
     "contacts",
+    "felt",
 ]

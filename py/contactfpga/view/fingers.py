@@ -36,6 +36,9 @@ class Touchable(Protocol):
     def pressed(self) -> np.ndarray:
         """(rows, columns) bool: the switches that are closed."""
 
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+
 
 class Hand:
     """What the mouse does, as fingers. A click puts one down where none is and lifts the one that is there; a drag
