@@ -9,6 +9,7 @@ from collections.abc import Callable
 MAX_LAG_S = 0.1
 """A board that is later than this does not catch up any more: its time has slipped."""
 
+LEAST = 0.01
 WINDOW_S = 2.0
 """Over which the share of real time is told."""
 
@@ -40,4 +41,4 @@ class Pace:
     def share(self) -> float:
         """Of real time that the board reached over the last seconds; 1: it keeps up."""
         (first, began), (last, ended) = self._seen[0], self._seen[-1]
-        return min(1.0, (ended - began) / (last - first)) if last - first > 0.2 else 1.0
+        return min(1.0, max(LEAST, (ended - began) / (last - first))) if last - first > 0.2 else 1.0

@@ -23,6 +23,9 @@ from contactfpga.zones.zone import Zones
 TURN_S = 0.02
 """A moment is shown for so long."""
 
+CATCH_UP = 1.5
+"""How much faster than real time a board may run that is late."""
+
 KEEPS_UP = 0.97
 """A board that reaches this share of real time is said to keep up."""
 
@@ -84,7 +87,8 @@ class BoardSource:
             due = self._pace.due(self._board.clock())
             if due < TURN_S:
                 time.sleep(TURN_S - due)
-            seconds = max(due, TURN_S)
+            # Where simulation is slow a moment holds less board time, so that it is shown as soon.
+            seconds = min(max(due, TURN_S), CATCH_UP * TURN_S * self._pace.share)
         with contextlib.suppress(ReadTimeout):
             batch = self.frames(seconds)
             self.meter.take(batch, self._board.stats, self._frames.dropped)

@@ -11,14 +11,16 @@ import dataclasses
 import functools
 import statistics
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from contactfpga.console import interrupt, outputs
+from contactfpga.driver import driver
 from contactfpga.driver.link import Link
-from contactfpga.view import opening
+from contactfpga.view import opening, plot, replayed
 from contactfpga.view.opening import Shown
 from contactfpga.zones.batch import Batch
 from contactfpga_sim.pages import browser, writer
@@ -167,6 +169,18 @@ def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
     browser.screenshot(visitor, path, before=lambda: visitor.drag(*((pitch_mm * x, pitch_mm * y) for x, y in WAY)))
 
 
+def plotted(path: Path) -> None:
+    """A finger that circles, recorded and drawn."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "moving.rec"
+        with driver.open("sim://?scene=moving", record=file) as board:
+            while board.clock() < PLOTTED_S:
+                board.next()
+        plot.draw(replayed.load(str(file)), path)
+
+
+PLOTTED_S = 2.0
+
 WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
 """Of the finger that moves, in pitches."""
 
@@ -179,10 +193,11 @@ def main() -> int:
     args = parser.parse_args()
     try:
         page = writer.page(args.page)
-        image = outputs.file(args.images / "view.png", "images")
+        image, drawn = (outputs.file(args.images / name, "images") for name in ("view.png", "plot.svg"))
     except outputs.OutputError as error:
         print(f"make view-page: {error}", file=sys.stderr)
         return 1
+    plotted(drawn)
     with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
         found = clicks(shown, visitor)
         picture(shown, visitor, image)
