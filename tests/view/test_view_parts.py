@@ -13,7 +13,7 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
 from contactfpga.view.meter import CHART_S, Meter
-from contactfpga.view.pace import MAX_LAG_S, Pace
+from contactfpga.view.pace import MAX_LAG_S, MOMENT_S, Pace
 from contactfpga.view.tiles import Tiles
 from contactfpga.zones.batch import Batch
 
@@ -228,3 +228,12 @@ def test_a_trail_shows_the_last_second_of_each_contact():
     assert moving[:, 0, 0].min() == pytest.approx(0.010)
     assert moving[:, 1, 0].max() == pytest.approx(0.030)
     assert math.dist(lines[-1][0], lines[-1][1]) == pytest.approx(0)
+
+
+def test_a_slow_machine_simulates_less_at_a_time():
+    """And no less than before, however long it takes to draw: else it would come to a stop."""
+    pace = Pace(0.0, lambda: 0.0)
+    assert pace.most_s == pytest.approx(MOMENT_S)
+    for _ in range(50):
+        pace.ran(pace.most_s, pace.most_s / 0.1)  # a tenth of real time
+    assert pace.most_s == pytest.approx(0.1 * MOMENT_S, rel=0.01)

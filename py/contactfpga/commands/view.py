@@ -19,6 +19,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser, WHAT)
     parser.add_argument("--link", metavar="NAME", help="Of a recording of several boards (default: the first).")
+    units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
+    parser.add_argument("--units", metavar="FILE", help=units)
     host = "Address to listen on (default: 127.0.0.1, which this computer alone can reach)."
     parser.add_argument("--host", default="127.0.0.1", help=host)
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
@@ -31,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.view import opening
 
-    named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link)
+    named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units)
     with contextlib.suppress(KeyboardInterrupt), opening.opened(named, args.host, args.http_port) as shown:
         terminal.say(f"Open {shown.url}")
         terminal.say("Whoever has this address can read and press. Ctrl-C ends it.", hang=2)

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contactfpga.driver import driver, transport
+from contactfpga.driver import driver, sim_address, transport
+from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
@@ -58,6 +59,8 @@ class Named:
     """Seconds for the hello."""
     link: str | None = None
     """Of a recording of several boards."""
+    units: str | Path | None = None
+    """File of the pressure units; by default what ``sim://`` names."""
 
 
 @contextlib.contextmanager
@@ -80,12 +83,20 @@ def _source(named: Named) -> tuple[Source, Hand | None]:
         return Player(load(named.port, named.link, named.timeout)), None
     if named.port is not None and not named.port.startswith("sim:"):
         board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)
-        return BoardSource(board, named.port), None
+        return BoardSource(board, named.port, cells=_cells(named)), None
     virtual = _virtual(named)
     board = driver.open(virtual, None if named.port is None else named.skin, timeout=named.timeout)
     sheet = board.sheet
     hand = Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
-    return BoardSource(board, named.port or "a virtual sheet", virtual), hand
+    return BoardSource(board, named.port or "a virtual sheet", virtual, _cells(named)), hand
+
+
+def _cells(named: Named) -> LoadCells | None:
+    """Raises :class:`~contactfpga.haptics.HapticsError`."""
+    path = named.units
+    if path is None and named.port is not None and named.port.startswith("sim:"):
+        path = sim_address.parse(named.port).units
+    return None if path is None else LoadCells.load(path)
 
 
 def _virtual(named: Named) -> Any:

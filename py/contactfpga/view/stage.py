@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga.haptics import LoadCells
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
@@ -38,7 +39,9 @@ FACES = np.array(
 class Stage:
     """Draws moments of one sheet."""
 
-    def __init__(self, server: viser.ViserServer, tiles: Tiles, node: str = NODE):
+    def __init__(self, server: viser.ViserServer, tiles: Tiles, load_cells: LoadCells | None = None, node: str = NODE):
+        self._load_cells = load_cells
+        self._arrows: Any = None
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
@@ -90,6 +93,8 @@ class Stage:
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
         self._draw_labels(moment.tracks)
+        if self._load_cells is not None:
+            self._draw_arrows(moment)
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -105,6 +110,24 @@ class Stage:
             return
         handle.points = lines.astype(np.float32)
         handle.visible = True
+
+    def _draw_arrows(self, moment: Moment) -> None:
+        assert self._load_cells is not None
+        arrows = np.zeros((0, 2, 3))
+        if moment.felt is not None:
+            arrows = picture.pushes(*moment.felt, self._load_cells, self.tiles.surface)
+        if len(arrows):
+            radius = 0.08 * self._pitch_mm * MM
+            self._arrows = self._server.scene.add_arrows(
+                f"{self._node}/forces",
+                arrows,
+                picture.PUSH,
+                shaft_radius=radius,
+                head_radius=2.2 * radius,
+                head_length=5 * radius,
+            )
+        elif self._arrows is not None:
+            self._arrows.visible = False
 
     def _draw_points(self, points: np.ndarray) -> None:
         if not len(points):
