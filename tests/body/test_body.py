@@ -123,6 +123,20 @@ def test_contacts_lie_where_the_geometry_says(robot):
     json.dumps(arm.to_dict())
 
 
+def test_zone_without_a_place_is_a_contact_all_the_same(robot):
+    board = DirectPort(FLAT)
+    board.moments = [(0, 0, 0)]
+    board.frame = lambda real=board.frame: real(flags=["mismatch"])
+    with contactfpga.open(board, FLAT) as opened:
+        states = {"arm": state_of(ROUND, 3, 5, 10.0), "chest": LinkState(opened.read(), 0.0, "ok", "", 10.0)}
+    snapshot = Snapshot(Body.load(robot), 10.0, states, lambda _: {"elbow": 0.3})
+    (chest,) = snapshot.contacts(links=["chest"])
+    assert (chest.point_m, chest.normal, chest.covariance_m2, chest.flags) == (None, None, None, {"mismatch"})
+    json.dumps(chest.to_dict())
+    with pytest.raises(BodyError, match="a contact on link 'chest' has no place"):
+        snapshot.jacobian(chest)
+
+
 def test_angles_are_those_of_the_frames_time(robot):
     history = JointHistory(gap_s=1.0)
     history.add(10.0, {"elbow": 0.0})

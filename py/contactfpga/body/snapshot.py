@@ -87,7 +87,9 @@ class Snapshot:
             raise NoLinkData(missing)
         found: list[Contact] = []
         for name in asked:
-            mine = contact.on_link(self._body.links[name], self.links[name])
+            known = self._angles.get(name)
+            angles = None if isinstance(known, ContactFPGAError) else known
+            mine = contact.on_link(self._body.links[name], self.links[name], angles)
             if frame == BASE and mine:
                 pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
                 mine = [one.moved(pose, BASE) for one in mine]
@@ -98,6 +100,8 @@ class Snapshot:
         """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
         frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
+        if one.point_m is None:
+            raise BodyError(f"a contact on link {shown(one.link)} has no place, so nothing says how it moves")
         point = np.array(one.point_m)
         if one.frame != BASE:
             point = self._kinematics.pose(frame, angles).apply(point)
