@@ -12,7 +12,7 @@ from contactfpga.console import flags, numbers, terminal
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
 
-WHAT = "Port, sim://, or a recording (default: a virtual sheet to press)."
+WHAT = "Port, sim://, a recording, or a robot.toml (default: a virtual sheet to press)."
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         terminal.say("Whoever has this address can read and press. Ctrl-C ends it.", hang=2)
         if not args.no_browser and _has_display():
             opening.browse(shown.url)
-        shown.view.run(args.seconds)
+        opening.run(shown, args.seconds)
     return 0
 
 

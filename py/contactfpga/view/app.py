@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from typing import TYPE_CHECKING
 
@@ -42,9 +41,3 @@ class View:
         if (now := time.monotonic()) - self._told_s > PANEL_S:
             self._told_s = now
             self.panel.write(moment)
-
-    def run(self, seconds: float | None = None) -> None:
-        """Turn after turn, for so long; None: until it is interrupted."""
-        until = math.inf if seconds is None else time.monotonic() + seconds
-        while time.monotonic() < until:
-            self.turn()

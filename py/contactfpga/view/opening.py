@@ -5,18 +5,21 @@ from __future__ import annotations
 import atexit
 import contextlib
 import dataclasses
+import math
 import tempfile
 import threading
+import time
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from contactfpga.driver import driver, sim_address, transport
 from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
+from contactfpga.view.bodies import BodySource, BodyView
 from contactfpga.view.fingers import Hand
 from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
@@ -39,8 +42,8 @@ class Shown:
 
     web: viser.ViserServer
     guard: Guard
-    view: View
-    source: Source
+    view: View | BodyView
+    source: Source | BodySource
     hand: Hand | None
     """The mouse's, on a virtual board."""
     url: str
@@ -67,15 +70,29 @@ class Named:
 def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int | None = None) -> Iterator[Shown]:
     """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
     does."""
-    source, hand = _source(named or Named())
+    named = named or Named()
+    source: Source | BodySource
+    source, hand = (BodySource(named.port, named.timeout), None) if _is_body(named.port) else _source(named)
     try:
         web, guard = server.serve(host, http_port)
         try:
-            yield Shown(web, guard, View(web, source, hand), source, hand, guard.url(web.get_port()))
+            view = BodyView(web, source) if isinstance(source, BodySource) else View(web, source, hand)
+            yield Shown(web, guard, view, source, hand, guard.url(web.get_port()))
         finally:
             server.stop(web)
     finally:
         source.close()
+
+
+def run(shown: Shown, seconds: float | None = None) -> None:
+    """Draw moment after moment, for so long; None: until it is interrupted."""
+    until = math.inf if seconds is None else time.monotonic() + seconds
+    while time.monotonic() < until:
+        shown.view.turn()
+
+
+def _is_body(port: str | None) -> TypeGuard[str]:
+    return port is not None and port.endswith(".toml")
 
 
 def _source(named: Named) -> tuple[Source, Hand | None]:
