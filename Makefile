@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page view-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page view-page clock-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -122,6 +122,9 @@ tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recor
 
 view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
 	$(PY) -m contactfpga_sim.pages.view_page docs/view.md docs/images
+
+clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
+	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -26,7 +27,14 @@ class Session:
     not be there yet. Raises :class:`ContactFPGAError`.
     """
 
-    def __init__(self, path: str | Path, split: Split | None = None, bytes_only: bool = False):
+    def __init__(
+        self,
+        path: str | Path,
+        split: Split | None = None,
+        bytes_only: bool = False,
+        *,
+        buffer: Callable[[], Buffer] = Buffer,
+    ):
         check_new(path)
         self.links: list[LinkRecorder] = []
         self._path = Path(path)
@@ -34,6 +42,7 @@ class Session:
         self._opened: list[tuple[str, Board, Buffer]] = []
         self._recorder: Recorder | None = None
         self._bytes_only = bytes_only
+        self._buffer = buffer
         self._stop = threading.Event()
         self._ended = threading.Event()
         self._begun: threading.Event | None = None
@@ -50,7 +59,7 @@ class Session:
         timeout: float = 1.0,
     ) -> None:
         """Open a board, as :func:`contactfpga.open` does. ``name``: of its link; by default that of its Skin."""
-        buffer = Buffer()
+        buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
         self._opened.append((link_name(board.hello) if name is None else name, board, buffer))
 
