@@ -1,6 +1,7 @@
 """The parts of the view that know no browser: places, fingers, pace, counters, what is drawn."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -237,3 +238,16 @@ def test_a_slow_machine_simulates_less_at_a_time():
     for _ in range(50):
         pace.ran(pace.most_s, pace.most_s / 0.1)  # a tenth of real time
     assert pace.most_s == pytest.approx(0.1 * MOMENT_S, rel=0.01)
+
+
+def test_latency_is_from_the_sample_to_the_last_byte():
+    """Of a board with a clock of its own it takes the host's estimate of the sample's moment."""
+    names = ["time_us", "host_time_s", "arrived_s"]
+    frames = np.zeros(5, [(name, float) for name in names])
+    frames["time_us"], frames["arrived_s"] = 1e6 * np.arange(5), np.arange(5) + 250e-6
+    frames["host_time_s"] = np.arange(5) + 100e-6
+    for virtual, late_s in ((True, 250e-6), (False, 150e-6)):
+        meter = Meter()
+        assert meter.late_s is None
+        meter.take_latency(SimpleNamespace(frames=frames), virtual)
+        assert meter.late_s == pytest.approx(late_s)

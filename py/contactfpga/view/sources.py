@@ -109,8 +109,7 @@ class BoardSource:
         with contextlib.suppress(ReadTimeout):
             batch = self.frames(seconds)
             self.meter.take(batch, self._board.stats, self._frames.dropped)
-            if self._virtual is not None:  # whose clock is that of its arrivals
-                self.meter.take_latency(batch)
+            self.meter.take_latency(batch, self._virtual is not None)
             came = True
         if self._pace is not None:
             self._pace.ran(self._board.clock() - began_s, time.monotonic() - began)

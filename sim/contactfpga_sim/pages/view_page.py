@@ -110,7 +110,7 @@ class Stopwatch:
         batch: Batch = frames(*args)
         closed = batch.frames[batch.frames["pressed"] > 0]
         if len(closed) and "clock" in self.times:
-            self.times.setdefault("arrived", float(closed["host_time_s"][0]))
+            self.times.setdefault("arrived", float(closed["arrived_s"][0]))
         return batch
 
     def _turn(self, turn: Any) -> Any:
