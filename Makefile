@@ -127,6 +127,9 @@ record-page: $(VENV)/.stamp-test | compiler ## measure what recordings take and 
 body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a body, register sheets, learn folds, and write docs/body.md and its picture
 	$(PY) -m contactfpga_sim.pages.body_page docs/body.md docs/images
 
+view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
+	$(PY) -m contactfpga_sim.pages.view_page docs/view.md docs/images
+
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
 	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
 
@@ -189,7 +192,7 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 endef
 
 $(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
-	$(call install,sim,downloads about 85 MB unless pip has it cached)
+	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,boards,downloads about 145 MB unless installed or cached)

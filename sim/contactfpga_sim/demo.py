@@ -203,7 +203,7 @@ def main() -> int:
     drawing.to_file(scenes_run, Skin(), picture)
     terminal.say(f"Scenes and their zones: {picture}")
     if not wrong:
-        terminal.say("Next:\n.venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")
+        terminal.say("Next, a virtual sheet in your browser, which the mouse presses:\n.venv/bin/contactfpga view")
     return 1 if wrong else 0
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga import notebook
 from contactfpga.body import contact
 from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
 from contactfpga.body.contact import Contact
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 STATUSES = ("ok", "late", "silent", "lost", "mismatch")
 BASE, LINK = "base", "link"
+LINK_PX = 200
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,6 +128,12 @@ class Snapshot:
         if isinstance(found, ContactFPGAError):
             raise NoJoints(f"link {shown(name)}: {found}")
         return found
+
+    def _repr_html_(self) -> str:
+        """Every link's sheet in a notebook, with its state."""
+        rows = [[name, str(state)] for name, state in self.links.items()]
+        drawn = [(name, state.zones.svg(LINK_PX)) for name, state in self.links.items() if state.zones is not None]
+        return notebook.table(["link", "state"], rows, f"At {self.host_time_s:.3f} s") + notebook.beside(drawn)
 
     def __repr__(self) -> str:
         states = ", ".join(f"{name} {state.status}" for name, state in self.links.items())

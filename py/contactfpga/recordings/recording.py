@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from contactfpga import notebook
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
 from contactfpga.inputs.values import is_finite
@@ -20,6 +21,9 @@ from contactfpga.zones.zone import Zones
 
 Timed = tuple[float, str, Zones]
 """Seconds since the recording's beginning, the link, and its frame."""
+
+LAST_S = 0.2
+"""So long before the end of a recording each board has sent a frame: a keep-alive at least."""
 
 
 class Recording:
@@ -71,6 +75,17 @@ class Recording:
         links = list(self.links) if link is None else [link]
         every = [self._frames(one, float(start_s), math.inf if end_s is None else end_s) for one in links]
         return heapq.merge(*every, key=lambda timed: timed[0])
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self.duration_s:.1f} s of {', '.join(self.links)}>"
+
+    def _repr_html_(self) -> str:
+        """Its links in a notebook, with the last frame of each."""
+        sheets = {link: hello.sheet for link, hello in self.links.items()}
+        rows = [[link, f"{sheet.rows}x{sheet.columns}", sheet.report] for link, sheet in sheets.items()]
+        table = notebook.table(["link", "cells", "report"], rows, f"{self.path.name}: {self.duration_s:.1f} s")
+        last = {link: zones for _, link, zones in self.frames(max(0.0, self.duration_s - LAST_S))}
+        return table + notebook.beside((link, zones.svg()) for link, zones in last.items())
 
     def raw_bytes(self, link: str | None = None) -> Iterator[tuple[float, bytes]]:
         """(seconds since the beginning, bytes that had come by then) of a link: all that came over its port."""

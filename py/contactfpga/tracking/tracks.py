@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Literal
 
+from contactfpga import notebook
 from contactfpga.zones.zone import Zone
 
 Kind = Literal["down", "move", "merge", "split", "up"]
@@ -93,6 +94,16 @@ class Tracks:
     restarted: bool = False
     """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
 
+    def _repr_html_(self) -> str:
+        """The contacts as a table in a notebook."""
+        rows = [
+            [f"#{track.id}", *(_mm(each) for each in (track.zone.x_mm, track.zone.y_mm)), f"{track.zone.area_cells}"]
+            + [f"{track.vx_mm_s:.0f}, {track.vy_mm_s:.0f}", f"{(self.time_us - track.since_us) / 1e6:.3f}"]
+            for track in self.active
+        ]
+        head = ["contact", "x, mm", "y, mm", "cells", "speed, mm/s", "for, s"]
+        return notebook.table(head, rows, f"At {self.time_us / 1e6:.6f} s")
+
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""
         return {
@@ -101,3 +112,7 @@ class Tracks:
             "unsure": len(self.unsure),
             "restarted": self.restarted,
         }
+
+
+def _mm(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
