@@ -30,6 +30,8 @@ def plain(value):
         return list(value)
     if isinstance(value, (str, int, float, bool)):
         return value
+    if hasattr(value, "tolist"):  # numpy's
+        return value.tolist()
     return [plain(one) for one in value]
 
 
