@@ -55,8 +55,8 @@ class Sent(list):
         return [message for name, message in self if name == topic]
 
 
-def fed(frames, settings=None, skin=SKIN, felt=None):
-    board, sent = Board(frames, skin), Sent()
+def fed(frames, settings=None, skin=SKIN, felt=None, board=Board):
+    board, sent = board(frames, skin), Sent()
     feed = Feed(board, sent, settings, felt, lambda: NOW_NS + round(board.now_s * 1e9))
     feed.run(board)
     return sent, feed
@@ -100,6 +100,24 @@ def test_a_touch_shorter_than_the_period_is_published():
     frames = [frame(100 * number, [(3, 4)] if 55 <= number < 57 else []) for number in range(100)]
     sent, _ = fed(frames, Settings(zones_hz=100))
     assert [len(one.zones) for one in sent.of("zones")] == [0, 1, 0]
+
+
+class Busy(Board):
+    """Frames waited for 400 ms before they are taken."""
+
+    def next(self, timeout=1.0):
+        zones = super().next(timeout)
+        self.now_s += 0.4
+        return zones
+
+
+def test_a_feed_that_is_behind_leaves_frames_out_until_it_is_not():
+    quick = [frame(1000 * number, [(3, 4)] if number == 500 else []) for number in range(1000)]
+    sent, feed = fed(quick, Settings(zones_hz=1000), board=Busy)
+    assert 10 <= len(sent.of("zones")) <= 13
+    assert feed.left_out + len(sent.of("zones")) == 1000
+    assert [len(one.zones) for one in sent.of("zones")].count(1) == 1
+    assert "frames waited for 0.4 s: the computer is too busy" in sent.of("/diagnostics")[-1].status[0].message
 
 
 def test_markers_come_at_their_rate_and_vanish_without_news():

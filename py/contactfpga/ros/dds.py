@@ -44,7 +44,7 @@ class Publisher:
             return Domain(domain, config), DomainParticipant(domain)
 
         self._domain, self._participant = join() if network else kept_inside(join)
-        self._writers: dict[str, Any] = {}
+        self._writers = {name: self._writer(topic) for name, topic in TOPICS.items()}
 
     def topic(self, name: str) -> str:
         """The whole name of a topic."""
@@ -52,24 +52,22 @@ class Publisher:
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish a message by the name of its topic, a key of :data:`TOPICS`."""
-        writer, kind = self._speaker(topic)
+        writer, kind = self._writers[topic]
         sample = object.__new__(kind)
         sample.serialize = lambda **_: data  # it is written already
         writer.write(sample)
 
     def subscribers(self, topic: str) -> int:
         """How many take a topic now."""
-        return len(self._speaker(topic)[0].get_matched_subscriptions())
+        return len(self._writers[topic][0].get_matched_subscriptions())
 
-    def _speaker(self, topic: str) -> tuple[Any, Any]:
+    def _writer(self, topic: Topic) -> tuple[Any, Any]:
         from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic as DdsTopic
 
-        if topic not in self._writers:
-            kind = idl_type(TOPICS[topic].type)
-            made = DdsTopic(self._participant, f"rt{self.topic(topic)}", kind)
-            self._writers[topic] = DataWriter(self._participant, made, qos=qos_of(TOPICS[topic])), kind
-        return self._writers[topic]
+        kind = idl_type(topic.type)
+        made = DdsTopic(self._participant, f"rt{self.topic(topic.name)}", kind)
+        return DataWriter(self._participant, made, qos=qos_of(topic)), kind
 
     def close(self) -> None:
         """Leave the domain."""

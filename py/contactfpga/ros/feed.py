@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 QUEUE = 4096
 """Frames that wait while others are published."""
+BEHIND_S, BEHIND_HZ = 0.05, 10.0
+"""A frame that waited for longer is published this often at most, so that those after it wait less."""
 POLL_S = 0.1
 """How long to wait for a frame before looking at what else is due."""
 
@@ -94,7 +96,7 @@ class Feed:
         self._events += tracks.events
         self._restarted |= tracks.restarted
         self._diagnostics.frame(zones)
-        if not self._is_due("zones", self.settings.zones_hz) and len(zones) == self._published:
+        if not self._is_due("zones", self._zones_hz(zones)) and len(zones) == self._published:
             self.left_out += 1
             return
         self._published = len(zones)
@@ -106,6 +108,12 @@ class Feed:
         if self._forces is not None:
             self._put("wrench", convert.wrench(self._forces.wrench, head))
         self._events, self._restarted = [], False
+
+    def _zones_hz(self, zones: Zones) -> float:
+        """How often to publish. Frames wait where the machine is busy, or was while the board was opened."""
+        if zones.host_time_s is None or self._board.clock() - zones.host_time_s < BEHIND_S:
+            return self.settings.zones_hz
+        return min(self.settings.zones_hz, BEHIND_HZ)
 
     def tick(self) -> None:
         """Publish what is due by the clock alone."""
