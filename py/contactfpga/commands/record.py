@@ -42,10 +42,10 @@ def run(args: argparse.Namespace) -> int:
     try:
         with session:
             session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout)
-            session.start(args.seconds)
             with contextlib.suppress(KeyboardInterrupt):  # the usual end
+                session.start(args.seconds)
                 while session.running:
-                    session.turn(0.02)
+                    session.wait(0.05)
                     progress.show()
     finally:
         progress.end()

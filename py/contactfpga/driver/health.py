@@ -92,6 +92,7 @@ def hello(board: Board) -> Iterator[Finding]:
     """What the board says of itself."""
     sheet = board.sheet
     surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
+    surface = f"closed {surface}" if sheet.closed else surface
     name = f"{board.name!r}, " if board.name else ""
     facts = (
         f"{name}{sheet.rows}x{sheet.columns}, pitch {sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm, {surface}, "
@@ -122,7 +123,7 @@ NEXT_STEPS = {
 
 def lines(board: Board, zones: Zones) -> Iterator[Finding]:
     """What the board says of its lines, and how old that is."""
-    if zones.host_time_s is not None:
+    if zones.arrived_s is not None:
         yield Finding("ok", f"the last frame came {1000 * board.silence.seconds:.0f} ms ago")
     if zones.faults == (STUCK,):
         count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"

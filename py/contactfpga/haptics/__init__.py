@@ -6,6 +6,7 @@ below 0.
 
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.calibrate import Calibration, calibrate
+from contactfpga.haptics.closings import ClosingWatch
 from contactfpga.haptics.contact import Contact, Contacts, Touch
 from contactfpga.haptics.drift import Drift, DriftWatch
 from contactfpga.haptics.evidence import Closing
@@ -23,6 +24,7 @@ __all__ = [
     "Calibration",
     "Center",
     "Closing",
+    "ClosingWatch",
     "Contact",
     "Contacts",
     "Cylinder",

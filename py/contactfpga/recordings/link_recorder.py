@@ -13,6 +13,9 @@ from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinM
 from contactfpga.recordings import messages
 from contactfpga.recordings.recorder import LinkFile
 from contactfpga.recordings.whole_file import RecordingFailed
+from contactfpga.ros import convert
+from contactfpga.ros.cdr import encode
+from contactfpga.ros.markers import markers, outline
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.faults import Faults
 from contactfpga.zones.units import UnitSamples
@@ -28,7 +31,7 @@ DRAWN_S = 1 / 30
 """How often what 3-D programs show is written."""
 WORLD = "world"
 """The frame that a board lies in which is on no robot."""
-NOWHERE = (0.0,) * 3, (0.0, 0.0, 0.0, 1.0)
+NOWHERE = (0.0,) * 3, (0.0,) * 3
 
 
 class Buffer:
@@ -82,6 +85,7 @@ class LinkRecorder:
         self._drawn_s = -1.0
         self._last_us = 0
         self._begun_s: float | None = None
+        self._rim = outline(board.sheet)
 
     def run(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Record, in a thread of its own."""
@@ -119,6 +123,8 @@ class LinkRecorder:
             self._write(item, clock_s)
         if self._buffer.due(clock_s):
             self._drain()
+        if item is None:
+            self._link.turn()
 
     def _clock_s(self, item: object) -> float:
         """Now; of a recording, which has no clock, the time of its last frame."""
@@ -138,22 +144,27 @@ class LinkRecorder:
         link = self._link
         time_ns = link.time_ns(clock_s)
         if isinstance(item, Zones):
-            link.write("zones", messages.ZONES, messages.of_zones(item, time_ns, link.name), clock_s)
-            self._follow(item, time_ns, clock_s)
+            self._write_frame(item, clock_s)
         elif isinstance(item, Faults):
             link.write("faults", messages.FAULTS, messages.of_faults(item.names, time_ns, link.name), clock_s)
         elif isinstance(item, UnitSamples):
             link.write("units", messages.UNITS, messages.of_units(item, time_ns, link.name), clock_s)
 
-    def _follow(self, zones: Zones, time_ns: int, clock_s: float) -> None:
-        """Contacts whenever something happens to them, and now and then, together with what 3-D programs show."""
+    def _write_frame(self, zones: Zones, clock_s: float) -> None:
+        """A frame; contacts whenever something happens to them, and now and then, with what 3-D programs show."""
         link = self._link
+        sampled_s = clock_s if zones.host_time_s is None else zones.host_time_s
+        head = convert.header(link.time_ns(sampled_s), link.name)
+        sigma_s = getattr(zones, "host_sigma_s", None)
+        link.write("zones", messages.ZONES, encode(messages.ZONES, convert.zones(zones, head, sigma_s)), clock_s)
         tracks = self._tracker.update(zones)
         drawn = clock_s - self._drawn_s >= DRAWN_S or clock_s < self._drawn_s
         if drawn or tracks.events:
-            link.write("tracks", messages.TRACKS, messages.of_tracks(tracks, time_ns, link.name), clock_s)
+            told = convert.tracks(tracks, tracks.events, tracks.restarted, head)
+            link.write("tracks", messages.TRACKS, encode(messages.TRACKS, told), clock_s)
         if drawn:
             self._drawn_s = clock_s
-            link.write("markers", messages.MARKERS, messages.of_markers(zones, time_ns, link.name), clock_s)
-            here = messages.of_transforms([(WORLD, link.name, *NOWHERE)], time_ns)
-            link.write("/tf", messages.TRANSFORMS, here, clock_s)
+            shown = markers(self._rim, tracks.active, head)
+            link.write("markers", messages.MARKERS, encode(messages.MARKERS, shown), clock_s)
+            world = convert.transform(convert.header(link.time_ns(clock_s), WORLD), link.name, *NOWHERE)
+            link.write("/tf", messages.TRANSFORMS, encode(messages.TRANSFORMS, world), clock_s)

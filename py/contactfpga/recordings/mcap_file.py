@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contactfpga.errors import MissingExtra
 from contactfpga.recordings.whole_file import RecordingFailed, WholeFile
 from contactfpga.ros.types import schema
+
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
 
 CHUNK_BYTES = 1 << 16
 FLUSH_S = 0.1
@@ -27,8 +31,7 @@ class McapFile:
         except ModuleNotFoundError as error:
             raise MissingExtra(f"a recording ({error})", "record") from None
         self.path = path
-        self.bytes = 0
-        """Of the messages, before they are compressed."""
+        self.messages = 0
         self._failed = False
         self._file = WholeFile(path)
         # Chunks end where we say so.
@@ -42,8 +45,8 @@ class McapFile:
 
     @property
     def size(self) -> int:
-        """Bytes in the file."""
-        return self._file.tell()
+        """Bytes in the file, and those that wait, before they are compressed."""
+        return self._file.tell() + self._waiting
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add texts that stand outside of the messages."""
@@ -52,17 +55,35 @@ class McapFile:
 
     def write(self, topic: str, kind: str, link: str, time_ns: int, data: bytes, now_s: float) -> None:
         """Add a message of a type such as ``contactfpga_msgs/Zones``; ``now_s`` is of ``time.monotonic``."""
-        size = len(data) + _MESSAGE_BYTES
-        if self._waiting and self._waiting + size > CHUNK_BYTES:
-            self.flush()
+        self._make_room(data)
         channel = self._channels.get(topic)
         if channel is None:
-            channel = self._channels[topic] = self._register(topic, kind, link)
-        self._writer.add_message(channel, time_ns, data, time_ns)
+            package, _, short = kind.partition("/")
+            name, metadata = f"{package}/msg/{short}", {"link": link} if link else {}
+            channel = self._register(topic, "cdr", metadata, name, "ros2msg", lambda: schema(kind).encode())
+        self._add(channel, time_ns, data)
         self._since_s = min(self._since_s, now_s)
-        self._waiting += size
-        self.bytes += len(data)
         self.flush_old(now_s)
+
+    def copy(self, channel: Channel, of: Schema | None, time_ns: int, data: bytes) -> None:
+        """Add a message of another file."""
+        self._make_room(data)
+        number = self._channels.get(channel.topic)
+        if number is None:
+            name, encoding, text = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
+            number = self._register(
+                channel.topic, channel.message_encoding, channel.metadata, name, encoding, lambda: text
+            )
+        self._add(number, time_ns, data)
+
+    def _make_room(self, data: bytes) -> None:
+        if self._waiting and self._waiting + len(data) + _MESSAGE_BYTES > CHUNK_BYTES:
+            self.flush()
+
+    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
+        self._writer.add_message(channel, time_ns, data, time_ns)
+        self._waiting += len(data) + _MESSAGE_BYTES
+        self.messages += 1
 
     def flush_old(self, now_s: float) -> None:
         """Write what waits if it waits for long enough."""
@@ -79,6 +100,7 @@ class McapFile:
         try:
             if not self._failed:
                 self._failed = True  # whatever comes of it, there is no second time
+                self._waiting = 0
                 self._writer.finish()
                 self._file.flush()
         finally:
@@ -93,11 +115,11 @@ class McapFile:
             self._failed = True
             raise
 
-    def _register(self, topic: str, kind: str, link: str) -> int:
+    def _register(
+        self, topic: str, encoding: str, metadata: dict[str, str], kind: str, language: str, text: Callable[[], bytes]
+    ) -> int:
         if kind not in self._schemas:
-            package, _, short = kind.partition("/")
-            text = schema(kind).encode()
-            self._schemas[kind] = self._writer.register_schema(f"{package}/msg/{short}", "ros2msg", text)
-        metadata = {"link": link} if link else {}
-        number: int = self._writer.register_channel(topic, "cdr", self._schemas[kind], metadata)
+            self._schemas[kind] = self._writer.register_schema(kind, language, text()) if kind else 0
+        number: int = self._writer.register_channel(topic, encoding, self._schemas[kind], metadata)
+        self._channels[topic] = number
         return number

@@ -33,7 +33,7 @@ class Split:
     def due(self, file: McapFile, seconds: float) -> bool:
         """Whether this file, which was begun so long ago, is full."""
         full = self.bytes is not None and file.size >= self.bytes
-        return full or (self.seconds is not None and seconds >= self.seconds)
+        return file.messages > 0 and (full or (self.seconds is not None and seconds >= self.seconds))
 
 
 class Recorder:
@@ -53,8 +53,9 @@ class Recorder:
     @property
     def size(self) -> int:
         """Bytes in all files."""
-        files = [self.file] if self._old is None else [self._old, self.file]
-        return sum(self._sizes.values()) + sum(file.size for file in files if file.path not in self._sizes)
+        with self.lock:
+            files = [file for file in (self._old, self.file) if file is not None and file.path in self.files]
+            return sum(self._sizes.values()) + sum(file.size for file in files if file.path not in self._sizes)
 
     def add(self, name: str, board: Board) -> LinkFile:
         """A link, by its name, whose board is open."""
@@ -103,6 +104,10 @@ class Recorder:
     def _close(self, file: McapFile) -> None:
         file.close()
         self._sizes[file.path] = file.size
+        if not file.messages and len(self.files) > 1:  # begun at the very end
+            file.path.unlink()
+            self.files.remove(file.path)
+            del self._sizes[file.path]
 
     def _begin(self) -> McapFile:
         self._begun_s = time.monotonic()
@@ -133,14 +138,12 @@ class LinkFile:
     def take_bytes(self, data: bytes, clock_s: float) -> None:
         """Bytes that came until then."""
         with self._recorder.lock:
-            if self._cutter is None:
-                self._bytes(data, clock_s)
-                return
-            before, after = self._cutter.take(data)
+            before, after = (data, b"") if self._cutter is None else self._cutter.take(data)
             self._bytes(before, clock_s)
             if after:
                 self.switch()
                 self._bytes(after, clock_s)
+            self._recorder.turn()
 
     def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
         """A message; ``what`` ends its topic, or is all of it if it begins with a slash."""
@@ -148,6 +151,10 @@ class LinkFile:
         link = "" if what.startswith("/") else self.name
         with self._recorder.lock:
             self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
+
+    def turn(self) -> None:
+        """Nothing comes at the moment: write what waits."""
+        self._recorder.turn()
 
     def wait_for_hello(self) -> None:
         """Go on in the recorder's newest file with the next hello."""

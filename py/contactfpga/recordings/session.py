@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -26,7 +27,14 @@ class Session:
     not be there yet. Raises :class:`ContactFPGAError`.
     """
 
-    def __init__(self, path: str | Path, split: Split | None = None, bytes_only: bool = False):
+    def __init__(
+        self,
+        path: str | Path,
+        split: Split | None = None,
+        bytes_only: bool = False,
+        *,
+        buffer: Callable[[], Buffer] = Buffer,
+    ):
         check_new(path)
         self.links: list[LinkRecorder] = []
         self._path = Path(path)
@@ -34,7 +42,11 @@ class Session:
         self._opened: list[tuple[str, Board, Buffer]] = []
         self._recorder: Recorder | None = None
         self._bytes_only = bytes_only
+        self._buffer = buffer
         self._stop = threading.Event()
+        self._ended = threading.Event()
+        self._begun: threading.Event | None = None
+        self._failure: BaseException | None = None
         self._threads: list[threading.Thread] = []
 
     def add(
@@ -47,37 +59,55 @@ class Session:
         timeout: float = 1.0,
     ) -> None:
         """Open a board, as :func:`contactfpga.open` does. ``name``: of its link; by default that of its Skin."""
-        buffer = Buffer()
+        buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
         self._opened.append((link_name(board.hello) if name is None else name, board, buffer))
 
     def start(self, seconds: float | None = None) -> None:
         """Make the file, and record for so long, or until :meth:`stop`."""
-        self._recorder = Recorder(self._path, self._split)
-        for name, board, buffer in self._opened:
-            link = LinkRecorder(board, buffer, self._recorder.add(name, board), self._bytes_only)
-            thread = threading.Thread(
-                target=link.run, args=(self._stop, seconds), name=f"recorder of {name}", daemon=True
-            )
-            self.links.append(link)
-            self._threads.append(thread)
-        for thread in self._threads:
-            thread.start()
+        # In a thread of its own, as all that writes: where Ctrl-C interrupts the main thread nothing is left half made.
+        # Events are waited for, as a `join` that is interrupted forgets that its thread still runs.
+        self._begun = threading.Event()
+        threading.Thread(target=self._begin, args=(seconds, self._begun), name="recorder").start()
+        self._begun.wait()
+        if self._failure is not None:
+            raise self._failure
+
+    def _begin(self, seconds: float | None, begun: threading.Event) -> None:
+        try:
+            self._recorder = Recorder(self._path, self._split)
+            for name, board, buffer in self._opened:
+                self.links.append(LinkRecorder(board, buffer, self._recorder.add(name, board), self._bytes_only))
+        except BaseException as error:
+            self._failure = error
+        else:
+            for link in self.links:
+                thread = threading.Thread(target=self._run, args=(link, seconds), name="recorder", daemon=True)
+                thread.start()
+                self._threads.append(thread)
+        finally:
+            begun.set()
+
+    def _run(self, link: LinkRecorder, seconds: float | None) -> None:
+        try:
+            link.run(self._stop, seconds)
+        finally:
+            self._ended.set()
 
     @property
     def running(self) -> bool:
         """Whether all boards are still being recorded."""
-        return all(thread.is_alive() for thread in self._threads)
+        return not self._ended.is_set()
 
-    def turn(self, seconds: float) -> None:
-        """Wait, at most until something ends; call it again and again while it is :attr:`running`."""
-        if self._recorder is not None:
-            self._recorder.turn()
-            self._threads[0].join(seconds)
+    def wait(self, seconds: float) -> None:
+        """At most until something ends."""
+        self._ended.wait(seconds)
 
     def stop(self) -> None:
         """End all, and close the file; may be called twice. Raises why a link ended that was to go on."""
         self._stop.set()
+        if self._begun is not None:
+            self._begun.wait()
         for thread in self._threads:
             thread.join()
         try:

@@ -15,7 +15,7 @@ from contactfpga.view.app import View
 from contactfpga.view.fingers import Hand
 from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
-from contactfpga.view.replayed import ByteRecording
+from contactfpga.view.replayed import is_recording, load
 from contactfpga.view.sources import BoardSource, Source
 
 if TYPE_CHECKING:
@@ -50,10 +50,11 @@ def opened(
     http_port: int | None = None,
     baud: int | None = None,
     timeout: float = 1.0,
+    link: str | None = None,
 ) -> Iterator[Shown]:
     """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
     does."""
-    source, hand = _source(port, skin, baud, timeout)
+    source, hand = _source(port, skin, baud, timeout, link)
     try:
         web, guard = server.serve(host, http_port)
         try:
@@ -64,10 +65,11 @@ def opened(
         source.close()
 
 
-def _source(port: str | None, skin: str | Path | None, baud: int | None, timeout: float) -> tuple[Source, Hand | None]:
-    if port is not None and port.startswith("replay:"):
-        recording = ByteRecording(port, timeout)
-        return Player(port, recording.sheet, recording), None
+def _source(
+    port: str | None, skin: str | Path | None, baud: int | None, timeout: float, link: str | None
+) -> tuple[Source, Hand | None]:
+    if port is not None and is_recording(port):
+        return Player(load(port, link, timeout)), None
     if port is not None and not port.startswith("sim:"):
         return BoardSource(driver.open(port, skin, baud=baud, timeout=timeout), port), None
     if port is None:

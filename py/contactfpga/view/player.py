@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 
 from contactfpga.driver.stats import Stats
-from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.view.meter import Meter
@@ -26,16 +25,14 @@ BEFORE_S = 0.25
 class Player:
     """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are for any thread."""
 
-    def __init__(
-        self, title: str, sheet: Sheet, recording: Recorded, link: str = "", clock: Callable[[], float] = time.monotonic
-    ):
-        self.title, self.sheet, self.meter = title, sheet, Meter()
+    def __init__(self, recording: Recorded, clock: Callable[[], float] = time.monotonic):
+        self.title, self.sheet, self.meter = recording.title, recording.sheet, Meter()
         self.duration_s = recording.duration_s
         self.position_s = 0.0
         """The moment that is shown."""
         self.playing = True
         self.speed = 1.0
-        self._recording, self._link, self._clock = recording, link, clock
+        self._recording, self._clock = recording, clock
         self._lock = threading.Lock()
         self._frames: Iterator[tuple[float, Zones]] = iter(())
         self._next: tuple[float, Zones] | None = None
@@ -93,7 +90,7 @@ class Player:
         self.position_s = seconds
         self.meter, self._tracker = Meter(), Tracker()
         found = self._recording.frames(max(0.0, seconds - BEFORE_S))
-        self._frames = ((when, zones) for when, link, zones in found if link == self._link)
+        self._frames = ((when, zones) for when, zones in found if zones.sheet == self.sheet)
         self._next = next(self._frames, None)
 
     def _take(self, until_s: float, deadline: float) -> tuple[list[Zones], Tracks | None]:

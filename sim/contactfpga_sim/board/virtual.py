@@ -62,7 +62,8 @@ class VirtualBoard:
     contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
     slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
     of the simulated time in s that returns what each pressure unit reads, by default half of full scale; or the
-    LoadCells that the scene's contacts press on, if it has contacts.
+    LoadCells that the scene's contacts press on, if it has contacts; look_s: simulated time between two looks at the
+    scene.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
@@ -77,8 +78,10 @@ class VirtualBoard:
         slow_rows: Mapping[int, float] | None = None,
         slow_columns: Mapping[int, float] | None = None,
         units: UnitSource | LoadCells | None = None,
+        look_s: float = CHUNK_S,
     ):
         self.skin = skin or Skin()
+        self._look_s = look_s
         self._units = _unit_source(self.skin, scene, units)
         self._scene = make_scene(self.skin, scene, cover)
         self._cover = cover
@@ -103,7 +106,7 @@ class VirtualBoard:
         while True:
             if (data := self._board.receive()) or left <= 0:
                 return data
-            cycles = min(left, max(1, round(CHUNK_S * self.skin.clock_hz)))
+            cycles = min(left, max(1, round(self._look_s * self.skin.clock_hz)))
             self.advance(cycles)
             left -= cycles
 

@@ -68,7 +68,8 @@ class Stopwatch:
     def __init__(self, shown: Shown):
         assert shown.hand is not None
         self.times: dict[str, float] = {}
-        self._shown, self._virtual = shown, shown.hand.board
+        self._shown = shown
+        self._virtual: Any = shown.hand.board
         self._driver_s = 0.0
 
     @contextlib.contextmanager

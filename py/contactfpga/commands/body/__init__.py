@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.body import show
+from contactfpga.commands.body import register, show
 
 HELP = "Show contacts of all links of a robot in one frame."
 EXTRA = None
 
-TOPICS = {"show": show}
+TOPICS = {"show": show, "register": register}
 USUAL_TOPIC = "show"
 """What `contactfpga body ROBOT.toml` is short for."""
 
