@@ -14,6 +14,7 @@ from contactfpga.haptics import LoadCells, Plane, Unit, contacts
 from contactfpga.ros.feed import Feed
 from contactfpga.ros.moments import Moments
 from contactfpga.ros.settings import TOPICS, Settings
+from contactfpga.zones.host_line import HostLine
 
 NOW_NS = 1_795_000_000_000_000_000
 
@@ -40,7 +41,7 @@ class Board:
             self.now_s += timeout
             raise ReadTimeout("silent")
         self.now_s = zones.time_us / 1e6
-        zones.host_time_s = self.now_s
+        zones._line = HostLine(self.now_s, 0, 0.0, 1.0, 2e-6)
         self.stats.frames += 1
         return zones
 
@@ -75,7 +76,7 @@ def test_the_stamp_is_the_moment_of_the_sample():
     sent, _ = fed([frame(250_000, [])])
     (zones,) = sent.of("zones")
     assert zones.header.stamp.sec * 10**9 + zones.header.stamp.nanosec == NOW_NS + 250_000_000
-    assert zones.device_time_us == 250_000
+    assert (zones.device_time_us, zones.stamp_sigma) == (250_000, 2e-6)
 
 
 def test_clocks_are_compared_where_nothing_came_between():

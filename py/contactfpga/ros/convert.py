@@ -55,7 +55,7 @@ def skin(hello: Hello, head: Message) -> Message:
         "pitch_x": sheet.pitch_x_mm / 1000,
         "pitch_y": sheet.pitch_y_mm / 1000,
         "radius": (sheet.radius_mm or 0.0) / 1000,
-        "closed": getattr(sheet, "closed", False),
+        "closed": sheet.closed,
         "ghosts": sheet.ghosts,
         "connectivity": sheet.connectivity,
         "report": REPORTS[sheet.report],
@@ -79,7 +79,7 @@ def zone(found: Zone) -> Message:
         "area_cells": found.area_cells,
         "sum_x": found.sum_x or 0,
         "sum_y": found.sum_y or 0,
-        "flags": ZONE_FLAGS["ghost"] * found.ghost | ZONE_FLAGS.get(getattr(found, "winding", ""), 0),
+        "flags": ZONE_FLAGS["ghost"] * found.ghost | ZONE_FLAGS.get(found.winding, 0),
     }
 
 

@@ -37,8 +37,8 @@ class Diagnostics:
     def frame(self, zones: Zones) -> None:
         """A frame came."""
         self._heard_s = self._board.clock()
-        if zones.host_time_s is not None:
-            self._waited_s = max(self._waited_s, self._heard_s - zones.host_time_s)
+        if zones.arrived_s is not None:
+            self._waited_s = max(self._waited_s, self._heard_s - zones.arrived_s)
         self._flags |= zones.flags
         self._faults = zones.faults
 

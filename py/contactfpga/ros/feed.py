@@ -102,7 +102,7 @@ class Feed:
         self._published = len(zones)
         self._forces = None if self._felt is None else self._felt(zones, tracks)
         head = convert.header(self._moments.of(zones), self._frame)
-        self._put("zones", convert.zones(zones, head, getattr(zones, "host_sigma_s", None)))
+        self._put("zones", convert.zones(zones, head, zones.host_sigma_s))
         self._put("tracks", convert.tracks(tracks, self._events, self._restarted, head))
         self._put("contacts", convert.contacts(tracks.active, head, self._forces))
         if self._forces is not None:
@@ -111,7 +111,7 @@ class Feed:
 
     def _zones_hz(self, zones: Zones) -> float:
         """How often to publish. Frames wait where the machine is busy, or was while the board was opened."""
-        if zones.host_time_s is None or self._board.clock() - zones.host_time_s < BEHIND_S:
+        if zones.arrived_s is None or self._board.clock() - zones.arrived_s < BEHIND_S:
             return self.settings.zones_hz
         return min(self.settings.zones_hz, BEHIND_HZ)
 
