@@ -167,13 +167,14 @@ def test_the_sheets_frame_is_published_where_its_parent_is_named():
 
 def test_forces_are_published_at_their_contacts():
     around = [(0.0, 0.1, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="skin")
+    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="bumper")
 
     def felt(zones, tracks):
         return contacts(cells.wrench([1.0, 2.0, 3.0]), zones, Plane(), tracks=tracks)
 
     sent, _ = fed([frame(0, [(3, 2)])], felt=felt)
     (wrench,), (found,) = sent.of("wrench"), sent.of("contacts")
+    assert (wrench.header.frame_id, found.header.frame_id) == ("bumper", "skin")
     assert wrench.wrench.force.z == pytest.approx(-6.0)
     assert found.contacts[0].wrench.force.z == pytest.approx(-6.0, rel=1e-3)
 

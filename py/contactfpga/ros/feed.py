@@ -106,7 +106,8 @@ class Feed:
         self._put("tracks", convert.tracks(tracks, self._events, self._restarted, head))
         self._put("contacts", convert.contacts(tracks.active, head, self._forces))
         if self._forces is not None:
-            self._put("wrench", convert.wrench(self._forces.wrench, head))
+            total = self._forces.wrench
+            self._put("wrench", convert.wrench(total, head | {"frame_id": total.frame or self._frame}))
         self._events, self._restarted = [], False
 
     def _zones_hz(self, zones: Zones) -> float:
