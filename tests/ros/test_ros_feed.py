@@ -98,7 +98,7 @@ def test_faster_frames_are_left_out_and_counted_and_no_event_is_lost():
 
 
 def test_a_touch_shorter_than_the_period_is_published():
-    frames = [frame(100 * number, [(3, 4)] if 55 <= number < 57 else []) for number in range(100)]
+    frames = [frame(100 * number, [(3, 4)] if 55 <= number < 57 else []) for number in range(85)]
     sent, _ = fed(frames, Settings(zones_hz=100))
     assert [len(one.zones) for one in sent.of("zones")] == [0, 1, 0]
 
@@ -119,6 +119,25 @@ def test_a_feed_that_is_behind_leaves_frames_out_until_it_is_not():
     assert feed.left_out + len(sent.of("zones")) == 1000
     assert [len(one.zones) for one in sent.of("zones")].count(1) == 1
     assert "frames waited for 0.4 s: the computer is too busy" in sent.of("/diagnostics")[-1].status[0].message
+
+
+class Interrupted(Board):
+    """The computer rests for 100 ms at frame 500, and takes what waited meanwhile at once."""
+
+    def next(self, timeout=1.0):
+        zones = super().next(timeout)
+        if 500_000 <= zones.time_us < 600_000:
+            self.now_s = 0.6
+        return zones
+
+
+def test_a_feed_that_caught_up_publishes_at_its_rate_again():
+    sent, feed = fed([frame(1000 * number, []) for number in range(1000)], Settings(zones_hz=1000), board=Interrupted)
+    times_us = [one.device_time_us for one in sent.of("zones")]
+    old = [one for one in times_us if 500_000 <= one < 580_000]
+    assert old == [500_000]
+    assert [one for one in times_us if one > 600_000] == [1000 * number for number in range(601, 1000)]
+    assert feed.left_out == 1000 - len(times_us)
 
 
 def test_markers_come_at_their_rate_and_vanish_without_news():
