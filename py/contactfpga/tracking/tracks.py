@@ -27,7 +27,8 @@ class Track:
     """Its speed along x in mm/s, smoothed over some milliseconds."""
     vy_mm_s: float
     held: bool = False
-    """This frame does not show it. It bounces, or the frame leaves zones out (``overflow``, ``mismatch``)."""
+    """This frame does not show it. It bounces, the frame leaves zones out (``overflow``, ``mismatch``), or a zone that
+    winds around the sheet may hide it."""
     merged: tuple[int, ...] = ()
     """Ids of smaller contacts in the same zone; each gets its own zone again when they part."""
 
@@ -89,8 +90,9 @@ class Tracks:
     events: tuple[Event, ...]
     """What happened since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
-    """Zones that no contact has, because other pressed switches may have made them (:attr:`Zone.ghost`). They begin
-    no contact; one that is there goes on in such a zone."""
+    """Zones that no contact has: other pressed switches may have made them (:attr:`Zone.ghost`), or they lead around a
+    sheet whose ends meet and have no place along it (:attr:`Zone.winding`). They begin no contact. One that is there
+    goes on in a ghost, and is held while a zone winds."""
     restarted: bool = False
     """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
 
