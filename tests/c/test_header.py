@@ -373,9 +373,7 @@ int main(void) {
 
 
 def test_barycenters_in_mm(tmp_path):
-    subprocess.run(
-        [*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "mm", write_mm(tmp_path)], check=True, timeout=60
-    )
+    mm = compiled_mm(tmp_path)
     for skin in (Skin(pitch_x_mm=9.5), Skin(report="barycenter", pitch_y_mm=3.25)):
         board = ModelBoard(skin)
         board.moments = [(3, 40, 7), (4, 10, 6)]
@@ -391,9 +389,7 @@ def test_a_zone_over_the_seam_has_a_place_and_a_ring_has_none(tmp_path):
     data = board.hello() + board.frame()
     (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
     assert {zone.winding for zone in arrival.zones} == {"", "ring", "wound"}
-    subprocess.run(
-        [*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "mm", write_mm(tmp_path)], check=True, timeout=60
-    )
+    mm = compiled_mm(tmp_path)
     wanted = [f"{'nan' if zone.x_mm is None else repr(zone.x_mm)} {zone.y_mm!r}" for zone in arrival.zones]
     found = [" ".join(repr(abs(float(word))) for word in line.split()) for line in by_c(mm, data)]
     assert sorted(found) == sorted(wanted)
