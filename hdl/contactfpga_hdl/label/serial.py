@@ -115,7 +115,7 @@ class SerialLabeller(wiring.Component):
             self._read_bracket(m, walk, acts, read_linked)
             with m.If(around.at_seam):
                 m.d.comb += [earlier.eq(1), later.eq(0)]
-            around.find(m, acts.joins, earlier, later, group.whole, acts.apart, read_linked.data)
+            around.find(m, acts, earlier, later, group.whole, read_linked.data)
         # The upper half of the memory stays zero: what is read there adds nothing.
         stored = _stored_layout(self.derived, len(walk.place))
         m.submodules.groups = groups = memory.Memory(shape=stored, depth=2 << len(walk.place), init=[])

@@ -4,6 +4,8 @@ The seam is one more zone of the row before: it begins before the first column, 
 after the last column, in two clocks as every run of the row before. On which turns cells lie is known as in ``run``.
 """
 
+from typing import Protocol
+
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import data, memory
 
@@ -22,6 +24,14 @@ def over_the_seam(derived: Derived, row: Value, before: Value) -> Value:
     if derived.skin.connectivity == 8:
         return (row | before)[-1] & (row | before)[0]
     return row[-1] & row[0] | before[-1] & before[0]
+
+
+class Acts(Protocol):
+    """What the labeller does in a clock."""
+
+    enable: Signal
+    joins: Signal
+    apart: Signal
 
 
 class SerialTurns:
@@ -46,13 +56,12 @@ class SerialTurns:
         with m.If(advance):
             m.d.sync += self.at_seam.eq(last_column & self.meets & ~self.at_seam)
 
-    def find(
-        self, m: Module, joins: Value, earlier: Value, later: Value, whole: Value, apart: Value, linked: Value
-    ) -> None:
-        """The turn of the cluster in a clock in which ``joins``; ``apart``, ``linked``: see :class:`Turns`."""
+    def find(self, m: Module, acts: Acts, earlier: Value, later: Value, whole: Value, linked: Value) -> None:
+        """The turn of the cluster where a run of the row before, or the seam, joins its group."""
+        joins = acts.joins
         m.d.comb += self.turns.seam.eq(joins & self.at_seam)
-        self.turns.find(m, self.turn, joins & earlier, joins & earlier & whole, apart, linked)
-        self.turns.keep(m, joins & ~self.at_seam, earlier, later)
+        self.turns.find(m, self.turn, joins & earlier, joins & earlier & whole, acts.apart, linked)
+        self.turns.keep(m, acts.enable & joins & ~self.at_seam, earlier, later)
 
     def keep(self, m: Module, starts: Value, has_run: Value, found: data.View, over: Value) -> None:
         """In a clock in which a run ``starts``, or what was ``found`` joins, and in which the group may be ``over``."""

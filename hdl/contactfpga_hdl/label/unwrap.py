@@ -50,12 +50,12 @@ class Unwrap(Elaboratable):
     """
 
     def __init__(self, derived: Derived):
-        self.kept, self.found = (Signal(kept_layout(derived), name=name) for name in ("kept", "found"))
+        self.kept, self.found = (Signal(kept_layout(derived), name=f"turned_{name}") for name in ("kept", "found"))
         self.down, self.joins, self.zone, self.turn, self.ring = (
-            Signal(name=name) for name in ("down", "joins", "zone", "turn", "ring")
+            Signal(name=f"turned_{name}") for name in ("down", "joins", "zone", "turn", "ring")
         )
-        self.cells = Signal(derived.area_bits)
-        self.group = Signal(data.StructLayout(turned_layout(derived)))
+        self.cells = Signal(derived.area_bits, name="turned_cells")
+        self.group = Signal(data.StructLayout(turned_layout(derived)), name="turned_group")
 
     def elaborate(self, platform):
         m = Module()
