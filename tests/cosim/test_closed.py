@@ -13,6 +13,7 @@ from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, u
 from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
+from contactfpga_sim.board import replay
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.covering import stimulus
@@ -38,7 +39,7 @@ SKINS = {
 @pytest.mark.parametrize("name", sample(SKINS, quick=["run", "serial, 4", "reversal"]))
 def test_boards_are_the_golden_models_in_every_clock(name):
     skin = SKINS[name]
-    cycles = max(3_000, min(25 * facts(skin).scan_clocks, 6_000))
+    cycles = 3_000
     timeline = stimulus(skin, cycles, seed=len(name))
     expected = predict(skin, timeline, cycles)
     assert all(expected.events(boundary) for boundary in boundaries(skin))
@@ -107,6 +108,12 @@ def check_arrays(skin, found):
     assert around.WINDINGS[1] in batch.zones["winding"]
 
 
+def test_replay_takes_the_circumference_of_its_pitch():
+    skin = replay.skin_for(4, 6, 8, zones=3, pitch_mm=5.0, closed=True)
+    assert (skin.closed, skin.pitch_x_mm, skin.pitch_y_mm) == (True, pytest.approx(5.0), 5.0)
+
+
+@pytest.mark.campaign  # compiles a board
 def test_replay_wraps_recorded_frames_around_a_cylinder(tmp_path, capsys):
     frames = np.zeros((3, 4, 4), bool)
     frames[0, 1, [3, 0]] = frames[1, 2] = frames[2, 3, 1] = True
