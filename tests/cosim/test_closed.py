@@ -8,6 +8,7 @@ from sample import sample
 
 from contactfpga import Batch, Skin, cli
 from contactfpga.skin.derived import Derived
+from contactfpga.tracking import Tracker
 from contactfpga.wire.many import decode
 from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, unseal
 from contactfpga.zones import around
@@ -78,6 +79,9 @@ def test_what_programs_read_is_a_flood_of_the_cylinder(name):
     assert seen <= wanted
     assert {"", "ring"} <= {zone[3] for zone in seen}
     assert all((x is None) == bool(winding) for _, x, _, winding in seen)
+    of_frames = (Zones(frame, skin.sheet) for frame in found.values())
+    rings = next(zones for zones in of_frames if any(zone.winding for zone in zones))
+    assert Tracker(gate_mm=5.0).update(rings).unsure == tuple(zone for zone in rings if zone.winding)
     if skin.report == "moments":
         check_arrays(skin, found)
 

@@ -86,7 +86,7 @@ class Tracker:
     def _step(self, zones: Zones) -> list[Zone]:
         """Returns the zones that no contact has."""
         pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
-        unsure = [zone for zone in free if zone.ghost]
+        unsure = [zone for zone in free if zone.ghost] + [zone for zone in zones if zone.winding]
         free = [zone for zone in free if not zone.ghost]
         merges: dict[Spot, list[Spot]] = {}
         parts: dict[Spot, list[Zone]] = {}

@@ -89,7 +89,8 @@ class Tracks:
     """What happened since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
     """Zones that no contact has, because other pressed switches may have made them (:attr:`Zone.ghost`). They begin
-    no contact; one that is there goes on in such a zone."""
+    no contact; one that is there goes on in such a zone. Zones that have no x (:attr:`Zone.winding`) are among them,
+    too; no contact goes on in these."""
     restarted: bool = False
     """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
 

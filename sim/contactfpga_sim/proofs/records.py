@@ -186,8 +186,8 @@ CASES = (
     _case(4, 4, 9, campaign=True),
     _case(8, 8, 7, rows=2, bounded=True, campaign=True),
     _case(8, 4, 7, rows=2, bounded=True, campaign=True),
-    _case(3, 8, 8, closed=True, campaign=True, bugs=_CLOSED_BUGS),
-    _case(3, 4, 10, closed=True, campaign=True),
+    _case(3, 8, 9, closed=True, bounded=True, campaign=True, bugs=_CLOSED_BUGS),
+    _case(3, 4, 9, closed=True, bounded=True, campaign=True),
     *(
         Case("rows find the zones", f"3x3, {connectivity}-connected, closed",
              partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,
