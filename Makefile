@@ -140,6 +140,9 @@ ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 
 ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
 	$(PY) scripts/measure_ros.py docs/ros.md
 
+closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
+	$(PY) -m contactfpga_sim.pages.closed_page docs/labelling.md
+
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
 
