@@ -6,6 +6,7 @@ import random
 import shutil
 import struct
 import subprocess
+from pathlib import Path
 
 import c_vectors
 import pytest
