@@ -129,6 +129,7 @@ class Board:
         """Counters since the port was opened."""
         stats = self._link.conversation.stats
         stats.dropped = self._frames.dropped
+        stats.net = self._link.transport.counters
         return stats
 
     def clock(self) -> float:

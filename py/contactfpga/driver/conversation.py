@@ -103,6 +103,11 @@ class Conversation:
         """Do not send the command again."""
         self._requests.end_command()
 
+    def doubt(self, now: float) -> None:
+        """What is received from now on may be of much later than what came before, or may have waited for long."""
+        self._timeline.doubt(now)
+        self._doubted = now
+
     def data_to_send(self) -> bytes:
         """What has to be sent to the board now; look after each :meth:`ask` and each :meth:`receive`."""
         return self._requests.data_to_send()
@@ -201,8 +206,7 @@ class Conversation:
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
-            self._timeline.doubt(now)
-            self._doubted = now
+            self.doubt(now)
         self._noticed = now
 
     def _packet(self, packet: bytes, now: float) -> Event | None:

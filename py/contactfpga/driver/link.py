@@ -176,6 +176,7 @@ class Link:
     def _turn(self, seconds: float) -> int:
         """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
         self._turning = threading.get_ident()
+        breaks = self.transport.breaks
         self.changed.release()
         try:
             data = self.transport.read(seconds)
@@ -186,6 +187,8 @@ class Link:
             if self._closing:
                 self.transport.close()
         self.check_open()
+        if self.transport.breaks != breaks:
+            self.conversation.doubt(self.transport.clock())
         self._take(data)
         return len(data)
 

@@ -13,6 +13,9 @@ from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
+from contactfpga.net.address import SCHEME
+from contactfpga.net.message import Counters
+from contactfpga.net.port import ZenohPort
 from contactfpga.skin import Skin
 
 CHUNK = 65_536
@@ -29,6 +32,15 @@ class Transport(Protocol):
     threaded: bool
     """Whether bytes come by themselves, so that a thread of its own has to read them; else time passes, or the
     recording goes on, only while it is read."""
+
+    @property
+    def breaks(self) -> int:
+        """How often the bytes that :meth:`read` returned last were so much later than those before them that times
+        cannot be carried over."""
+
+    @property
+    def counters(self) -> Counters | None:
+        """Of a network between."""
 
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
@@ -50,6 +62,7 @@ class SerialTransport:
     """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
 
     live = threaded = True
+    breaks, counters = 0, None
 
     def __init__(self, name: str, baud: int):
         from serialx import (
@@ -117,6 +130,7 @@ class SimTransport:
     """A virtual board, simulated while it is read."""
 
     live, threaded = True, False
+    breaks, counters = 0, None
 
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
@@ -155,6 +169,7 @@ class ReplayTransport:
     ``replay://FILE?pace=1`` in the time in which it was recorded."""
 
     live = threaded = False
+    breaks, counters = 0, None
 
     def __init__(self, name: str):
         self.name = name
@@ -240,7 +255,12 @@ class RecordingTransport:
         self.live, self.threaded = transport.live, transport.threaded
         self.write = transport.write
         self.clock = transport.clock
+        self.counters = transport.counters
         self._file = recording.create(path, transport.name)
+
+    @property
+    def breaks(self) -> int:
+        return self._transport.breaks
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
@@ -260,6 +280,8 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
         return SimTransport.named(name)
     if name.startswith("replay:"):
         return ReplayTransport(name)
+    if name.startswith(SCHEME):
+        return ZenohPort(name)
     return SerialTransport(name, baud)
 
 
