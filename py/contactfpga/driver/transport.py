@@ -33,15 +33,6 @@ class Transport(Protocol):
     """Whether bytes come by themselves, so that a thread of its own has to read them; else time passes, or the
     recording goes on, only while it is read."""
 
-    @property
-    def breaks(self) -> int:
-        """How often the bytes that :meth:`read` returned last were so much later than those before them that times
-        cannot be carried over."""
-
-    @property
-    def counters(self) -> Counters | None:
-        """Of a network between."""
-
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte; b"" when nothing came.
 
@@ -62,7 +53,6 @@ class SerialTransport:
     """A serial port, for this process alone, with low latency and with DTR and RTS left as they are."""
 
     live = threaded = True
-    breaks, counters = 0, None
 
     def __init__(self, name: str, baud: int):
         from serialx import (
@@ -130,7 +120,6 @@ class SimTransport:
     """A virtual board, simulated while it is read."""
 
     live, threaded = True, False
-    breaks, counters = 0, None
 
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
@@ -169,7 +158,6 @@ class ReplayTransport:
     ``replay://FILE?pace=1`` in the time in which it was recorded."""
 
     live = threaded = False
-    breaks, counters = 0, None
 
     def __init__(self, name: str):
         self.name = name
@@ -255,12 +243,7 @@ class RecordingTransport:
         self.live, self.threaded = transport.live, transport.threaded
         self.write = transport.write
         self.clock = transport.clock
-        self.counters = transport.counters
         self._file = recording.create(path, transport.name)
-
-    @property
-    def breaks(self) -> int:
-        return self._transport.breaks
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
@@ -270,6 +253,12 @@ class RecordingTransport:
     def close(self) -> None:
         self._file.close()
         self._transport.close()
+
+
+def counters_of(transport: Transport) -> Counters | None:
+    """What a network between counts; None: there is none."""
+    inner = transport._transport if isinstance(transport, RecordingTransport) else transport
+    return inner.counters if isinstance(inner, ZenohPort) else None
 
 
 def connect(name: str | SimulatedPort, baud: int) -> Transport:

@@ -32,7 +32,7 @@ def parse(name: str) -> Address:
     head, _, query = name.removeprefix(SCHEME).partition("?")
     found: dict[str, str] = {}
     for part in query.split("&") if query else ():
-        option, equals, value = part.partition("=")
+        option, _, value = part.partition("=")
         if option not in ("connect", "config", "wait") or not value or option in found:
             raise PortNotFound(f"{name}: {part!r} is no option, or given twice; {_FORM}")
         found[option] = unquote(value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import struct
 
-_HEAD = struct.Struct("<4sQQQQI")
+_HEAD = struct.Struct("<4sQQQqI")
 _MAGIC = b"cfp1"
 HEAD_BYTES = _HEAD.size
 
@@ -45,7 +45,8 @@ class Message:
         """None for what no publisher sends."""
         if not HEAD_BYTES <= len(payload) <= HEAD_BYTES + MOST_BYTES or not payload.startswith(_MAGIC):
             return None
-        return cls(*_HEAD.unpack_from(payload)[1:], payload[HEAD_BYTES:])
+        _, publisher, sequence, offset, read_us, denied = _HEAD.unpack_from(payload)
+        return cls(publisher, sequence, offset, read_us, denied, payload[HEAD_BYTES:])
 
 
 @dataclasses.dataclass
@@ -63,7 +64,9 @@ class Counters:
     publishers: int = 0
     """Publishers that were heard: 1, and one more for each restart."""
     breaks: int = 0
-    """Holes after which times were not known before the next hello."""
+    """Holes after which times are not known before the next hello."""
+    passed_breaks: int = 0
+    """Those of them that were read up to now."""
     left_out: int = 0
     """Bytes that this program did not take in time."""
     denied: int = 0

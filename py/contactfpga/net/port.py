@@ -28,8 +28,6 @@ class ZenohPort:
 
     def __init__(self, name: str):
         self.name = name
-        self.breaks = 0
-        """How often what came after was so much later than what came before that times cannot be carried over."""
         self.counters = Counters()
         self._address = address = parse(name)
         self._changed = threading.Condition()
@@ -66,7 +64,7 @@ class ZenohPort:
             data = b""
             while self._pieces and not (data and self._pieces[0][1]):
                 piece, after_break = self._pieces.popleft()
-                self.breaks += after_break
+                self.counters.passed_breaks += after_break
                 self._waiting -= len(piece)
                 data += piece
             if not data and self._gone_s is not None and time.monotonic() - self._gone_s > self._address.wait_s:
