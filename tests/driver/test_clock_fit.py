@@ -38,14 +38,14 @@ def test_no_sample_is_said_to_come_after_its_arrival():
 def test_the_drift_of_the_clocks_is_found(ppm):
     fit = ClockFit()
     followed(moments(QUIET, ppm, 1, 40.0), fit)
-    assert (fit.line(0.0).rate - 1) * 1e6 == pytest.approx(ppm, abs=4)
+    assert (fit.line(9e9).rate - 1) * 1e6 == pytest.approx(ppm, abs=4)
 
 
 def test_a_clock_that_no_crystal_has_is_not_believed():
     fit = ClockFit()
     for step in range(2000):
         fit.arrived(step * 10_000, step * 0.0101, 0.0)  # off by one percent
-    assert abs(fit.line(0.0).rate - 1) <= 200e-6
+    assert abs(fit.line(9e9).rate - 1) <= 200e-6
 
 
 def shifted(frames, after_s, host_s):
@@ -85,7 +85,7 @@ def test_a_pile_that_waited_before_the_port_was_read_is_forgotten():
     for step in range(300, 400):
         fit.arrived(step * 10_000, 97.0 + step * 0.01 + 0.0002, 0.0)
     fit.answered(399 * 10_000, 97.0 + 3.99 - 0.0001)
-    line = fit.line(101.0)
+    line = fit.line(9e9)
     assert line.at(3_990_000) == pytest.approx(100.99, abs=0.0003)
     assert line.sigma_s < 0.0003
 
@@ -95,7 +95,7 @@ def test_what_the_wire_takes_is_no_delay():
     for step in range(100):
         fits[0].arrived(step * 10_000, step * 0.01 + 0.004, 0.004)
         fits[1].arrived(step * 10_000, step * 0.01, 0.0)
-    assert fits[0].line(1.0).at(500_000) == pytest.approx(fits[1].line(1.0).at(500_000), abs=1e-9)
+    assert fits[0].line(9e9).at(500_000) == pytest.approx(fits[1].line(9e9).at(500_000), abs=1e-9)
 
 
 # ---- in the driver

@@ -192,7 +192,13 @@ def test_addresses_that_cannot_be_are_refused_before_anything_is_opened(name, sa
 
 def test_which_endpoints_are_this_machine_alone():
     here = ["tcp/127.0.0.1:7447", "tls/localhost:1", "tcp/[::1]:7447", "unixsock-stream//tmp/x", "udp/127.3.2.1:1?x=y"]
-    there = ["tcp/0.0.0.0:7447", "tcp/[::]:7447", "tcp/192.168.0.1:7447", "tls/robot.local:7447", "tcp/127.0.0.1.nip.io:1"]
+    there = [
+        "tcp/0.0.0.0:7447",
+        "tcp/[::]:7447",
+        "tcp/192.168.0.1:7447",
+        "tls/robot.local:7447",
+        "tcp/127.0.0.1.nip.io:1",
+    ]
     assert all(map(is_loopback, here))
     assert not any(map(is_loopback, there))
 

@@ -77,6 +77,8 @@ class Conversation:
         self._requests = Requests(rng)
         self._timeline = Timeline(self.stats, live)
         self._clock = ClockFit() if live else None
+        self._line: HostLine | None = None  # for the frames that come now
+        self._latest: tuple[int, int] | None = None  # time and size of the last of them
         self._byte_s = 0.0
         self._reader = protocol.HelloReader()
         self._widths: Widths | None = None
@@ -134,9 +136,12 @@ class Conversation:
         self.stats.bytes += len(data)
         self._notice(now)
         *packets, self._rest = (self._rest + data).split(b"\0")
+        self._line = self._clock.line(now) if packets and self._clock is not None else None
         return [packet for packet in packets if packet]
 
     def _end(self, now: float) -> None:
+        if self._latest is not None:
+            self._arrive(now)
         if len(self._rest) > LONGEST_PACKET:
             self._refuse("noise")
             self._rest = b""
@@ -194,13 +199,25 @@ class Conversation:
         self._requests.take_frame(heard, now)
         if self._clock is None:
             return None
-        self._clock.arrived(time_us, now, (packet_bytes + 1) * self._byte_s)
-        if self._requests.answered > answered:
-            self._clock.answered(time_us, self._requests.answered_sent_s)
-        return self._clock.line(now)
+        self._latest = time_us, packet_bytes + 1
+        is_answer = self._requests.answered > answered
+        if self._line is None or is_answer:  # else the last one of those that came at once says the most
+            self._arrive(now)
+            if is_answer:
+                self._clock.answered(time_us, self._requests.answered_sent_s)
+            self._line = self._clock.line(now)
+        return self._line
+
+    def _arrive(self, now: float) -> None:
+        assert self._clock is not None
+        assert self._latest is not None
+        time_us, size = self._latest
+        self._clock.arrived(time_us, now, size * self._byte_s)
+        self._latest = None
 
     def _forget_times(self) -> None:
         """The board was restarted, or is another one."""
+        self._line = self._latest = None
         if self._clock is not None:
             self._clock.forget()
 
