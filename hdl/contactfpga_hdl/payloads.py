@@ -19,13 +19,23 @@ def row_bits(derived: Derived) -> int:
 
 
 def moments_layout(derived: Derived) -> data.StructLayout:
-    """Exact moments of a set of cells; with ``report = "moments"`` as bits, lowest first, a zone record on the wire."""
+    """Exact moments of a set of cells."""
     return data.StructLayout({"area": derived.area_bits, "sum_x": derived.sum_x_bits, "sum_y": derived.sum_y_bits})
+
+
+def zone_layout(derived: Derived) -> data.StructLayout:
+    """A zone; with ``report = "moments"`` as bits, lowest first, a zone record on the wire.
+
+    ``turned``, where the sheet's ends meet, counts the cells past the seam: fewer than all, or as many in a ``ring``,
+    or all ones in a zone that is ``wound``.
+    """
+    moments = moments_layout(derived).members
+    return data.StructLayout(moments | ({"turned": derived.area_bits} if derived.skin.closed else {}))
 
 
 def record_layout(derived: Derived) -> data.StructLayout:
     """A zone, or with ``end`` the mark after a frame's last one."""
-    return data.StructLayout({"zone": moments_layout(derived), "end": 1})
+    return data.StructLayout({"zone": zone_layout(derived), "end": 1})
 
 
 def barycenter_layout(derived: Derived) -> data.StructLayout:

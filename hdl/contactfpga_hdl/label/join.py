@@ -7,7 +7,8 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
+from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout, waiting
+from contactfpga_hdl.label.turns import Turns, turns_layout
 from contactfpga_hdl.util.stack import Stack
 
 
@@ -19,6 +20,8 @@ class _Brackets:
         self.before = Signal(runs)
         self.new_after = Signal(runs)  # with this step
         self.new_before = Signal(runs)
+        self.turned = Signal(runs)  # a turn further back than that earlier one
+        self.new_turned = Signal(runs)
         self.number = Signal(range(runs))  # of the step's new run
 
 
@@ -45,51 +48,68 @@ class Join(wiring.Component):
         self._runs = max(1, math.ceil(derived.skin.columns / 2))  # the most a row can hold
         self._group_layout = data.StructLayout(
             {
-                "open": range(nesting(derived) + 1),  # zones of the row before with runs to come
+                # zones of the row before with runs to come, and in the first cluster the seam
+                "open": range(nesting(derived) + derived.skin.closed + 1),
                 "has_run": 1,  # in the new row, and then the numbers of the first and the last one
                 "first": range(self._runs),
                 "last": range(self._runs),
                 "place": range(derived.open_zones),  # of the first one in the table
+                **(turns_layout() if derived.skin.closed else {}),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.stack = stack = Stack(self._group_layout, nesting(self.derived))
+        m.submodules.stack = stack = Stack(self._group_layout, waiting(self.derived))
         works = self.enable & self.valid & ~self.step.end
         kept = Signal(self._group_layout)  # the group of the cluster being walked
         current = Signal(self._group_layout)
         with m.If(~self.step.opens):
             m.d.comb += current.eq(kept)
         known = _Brackets(self._runs)
-        earlier, later = self._brackets(m, works, known)
+        earlier, later, turned = self._brackets(m, works, known)
         pop = self.step.has_before & earlier & (current.open == 0)
+        turns = None
+        if self.derived.skin.closed:
+            turns = Turns(self.derived)
+            with m.If(self.step.opens):
+                m.d.comb += current.open.eq(self.step.seam)
+            m.d.comb += turns.seam.eq(~self.step.has_before & ~self.step.has_run)
+            pop = pop | turns.seam & (stack.level != 0)
+            turns.find(m, self.step, current, pop, earlier, turned)
+            turns.keep(m, works, self.step, earlier, later)
         passed = self.step.has_before & ~later  # the last run of its zone
         begun = self.step.has_before & ~earlier  # the first one
-        joined = self._take_in(m, current, pop, stack.top)
+        joined = self._take_in(m, current, pop, stack.top, turns)
         group = self._add_run(m, joined, known.number)
+        ended = passed & earlier if turns is None else passed & earlier | turns.seam
         m.d.comb += [
-            group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - (passed & earlier)),
+            group.open.eq(joined.open + (self.step.has_before & ~earlier & later) - ended),
             stack.enable.eq(works),
             stack.pop.eq(pop),
             stack.push.eq(self.step.closes & (group.open != 0)),
             stack.entry.eq(group),
         ]
-        self._mark(m, known, current, pop, stack.top, joined)
+        self._mark(m, known, current, pop, stack.top, joined, turns)
         decided = self._decide(m, group, pop, begun)
+        if turns is not None:
+            shares = {"down": turns.down, "turn": turns.turn, "ring": turns.ring, "first_turn": group.first_turn}
+            m.d.comb += [decided[name].eq(share) for name, share in shares.items()]
         with m.If(works):
             m.d.sync += kept.eq(group)
         with m.If(self.enable):
             m.d.sync += [self.join_valid.eq(self.valid), self.join.eq(decided)]
         return m
 
-    def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value]:
-        """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before?
+    def _brackets(self, m: Module, works: Value, known: _Brackets) -> tuple[Value, Value, Value]:
+        """Does a run of the same zone come earlier, or later, in the row of the step's run of the row before? And does
+        it lie a turn further back than the earlier one?
 
         Bit i belongs to the row's i-th run; those of the row before move down as its runs are passed.
         """
         old_after = Signal(self._runs)  # runs after one of the same zone
         old_before = Signal(self._runs)  # runs before one of the same zone
+        old_turned = Signal(self._runs)
         with m.If(works):
             m.d.sync += [
                 known.after.eq(known.new_after),
@@ -106,9 +126,16 @@ class Join(wiring.Component):
                     known.before.eq(0),
                     known.number.eq(0),
                 ]
-        return old_after[0], old_before[0]
+        if self.derived.skin.closed:
+            with m.If(works):
+                m.d.sync += known.turned.eq(known.new_turned)
+                with m.If(self.step.has_before):
+                    m.d.sync += old_turned.eq(old_turned >> 1)
+                with m.If(self.step.row_done):
+                    m.d.sync += [old_turned.eq(known.new_turned), known.turned.eq(0)]
+        return old_after[0], old_before[0], old_turned[0]
 
-    def _take_in(self, m: Module, current: data.View, pop: Value, waiting: data.View) -> data.View:
+    def _take_in(self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: Turns | None) -> data.View:
         """The current group, with the group that waited on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
@@ -120,6 +147,14 @@ class Join(wiring.Component):
                 joined.last.eq(Mux(current.has_run, current.last, waiting.last)),
                 joined.place.eq(Mux(waiting.has_run, waiting.place, current.place)),
             ]
+        if turns is not None:
+            m.d.comb += joined.turn.eq(turns.turn)
+            with m.If(pop):
+                first, last = current.first_turn | turns.down, current.last_turn | turns.down
+                m.d.comb += [
+                    joined.first_turn.eq(Mux(waiting.has_run, waiting.first_turn, first)),
+                    joined.last_turn.eq(Mux(current.has_run, last, waiting.last_turn)),
+                ]
         return joined
 
     def _add_run(self, m: Module, joined: data.View, number: Value) -> data.View:
@@ -132,10 +167,20 @@ class Join(wiring.Component):
                 group.last.eq(number),
                 group.place.eq(Mux(joined.has_run, joined.place, place_of(self.derived, self.step.start))),
             ]
+            if self.derived.skin.closed:
+                first = Mux(joined.has_run, joined.first_turn, joined.turn)
+                m.d.comb += [group.first_turn.eq(first), group.last_turn.eq(joined.turn)]
         return group
 
     def _mark(
-        self, m: Module, known: _Brackets, current: data.View, pop: Value, waiting: data.View, joined: data.View
+        self,
+        m: Module,
+        known: _Brackets,
+        current: data.View,
+        pop: Value,
+        waiting: data.View,
+        joined: data.View,
+        turns: Turns | None,
     ) -> None:
         """Set the brackets of runs of the new row that are now known to be of one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one
@@ -148,6 +193,11 @@ class Join(wiring.Component):
             known.new_before.eq(known.before | bit(over, waiting.last) | bit(onto, joined.last)),
             known.new_after.eq(known.after | bit(over, current.first) | bit(onto, known.number)),
         ]
+        if turns is not None:
+            over_back = over & (current.first_turn | turns.down) & ~waiting.last_turn
+            onto_back = onto & joined.turn & ~joined.last_turn
+            back = bit(over_back, current.first) | bit(onto_back, known.number)
+            m.d.comb += known.new_turned.eq(known.turned | back)
 
     def _decide(self, m: Module, group: data.View, pop: Value, begun: Value) -> data.View:
         step = self.step

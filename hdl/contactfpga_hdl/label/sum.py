@@ -5,8 +5,9 @@ from amaranth.lib import memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout
-from contactfpga_hdl.payloads import moments_layout, record_layout
+from contactfpga_hdl.label.steps import join_layout, place_of, step_layout, waiting
+from contactfpga_hdl.label.unwrap import Unwrap, kept_layout, zone_of
+from contactfpga_hdl.payloads import record_layout
 from contactfpga_hdl.util.stack import Stack
 
 
@@ -33,10 +34,10 @@ class Sum(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        moments = moments_layout(self.derived)
+        moments = kept_layout(self.derived)
         join = self.join
         works = self.enable & self.valid & ~join.end
-        m.submodules.stack = stack = Stack(moments, nesting(self.derived))
+        m.submodules.stack = stack = Stack(moments, waiting(self.derived))
         m.submodules.table = table = memory.Memory(shape=moments, depth=self.derived.open_zones, init=[])
         write = table.write_port()
         read = table.read_port()
@@ -46,6 +47,18 @@ class Sum(wiring.Component):
             # Only the first run of its zone loads, and only the later ones can find it on the stack.
             before = Mux(join.pop, stack.top[name], Mux(join.load, read.data[name], 0))
             m.d.comb += group[name].eq((kept[name] + join.run[name]) + before)
+        stored = group
+        if self.derived.skin.closed:
+            m.submodules.unwrap = unwrap = Unwrap(self.derived)
+            m.d.comb += [
+                unwrap.join.eq(join),
+                unwrap.kept.eq(kept),
+                unwrap.waiting.eq(stack.top),
+                unwrap.loaded.eq(read.data),
+            ]
+            m.d.comb += [group[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
+            stored = Signal(moments)
+            m.d.comb += [stored.eq(group), stored.back.eq(group.back & ~join.first_turn)]
         with m.If(works):
             m.d.sync += kept.eq(group)
             with m.If(join.closes):
@@ -59,9 +72,9 @@ class Sum(wiring.Component):
             read.addr.eq(place_of(self.derived, self.lookup)),
             write.en.eq(works & join.store),
             write.addr.eq(join.place),
-            write.data.eq(group),
+            write.data.eq(stored),
             self.records.valid.eq(self.valid & join.leaves),
-            self.records.payload.zone.eq(group),
+            self.records.payload.zone.eq(zone_of(self.derived, group)),
             self.records.payload.end.eq(join.end),
         ]
         return m

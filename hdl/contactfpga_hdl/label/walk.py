@@ -36,6 +36,8 @@ class _Left:
         self.inside = Signal(columns)  # all columns up to the end of the first cluster; none: no work
         self.ends = Signal(columns)  # where the clusters after that one end
         self.last = Signal()  # the new row is the frame's last one
+        self.seam = Signal()  # the last cluster goes on in the first one
+        self.first = Signal()  # the cluster is the first one
         self.y = Signal(step_layout(derived)["y"].shape)
 
 
@@ -90,6 +92,10 @@ class Walk(wiring.Component):
             step.y.eq(left.y),
             step.final.eq(left.last),
         ]
+        if self.derived.skin.closed:  # the last cluster has one more step, without any run
+            m.d.comb += step.seam.eq(left.seam & left.first)
+            with m.If(left.seam & ~left.ends.any() & (has_before | has_run)):
+                m.d.comb += closes.eq(0)
         with m.If(self.enable):
             m.d.sync += [self.step.eq(step), self.step_valid.eq(work | left.last)]
         with m.If(self.enable & work):
@@ -99,6 +105,8 @@ class Walk(wiring.Component):
             with m.If(has_run):
                 m.d.sync += [left.starts.eq(starts_left), left.stops.eq(stops_left)]
             with m.If(closes):
+                if self.derived.skin.closed:
+                    m.d.sync += left.first.eq(0)
                 self._next_cluster(m, left, left.ends)
 
     def _take_row(self, m: Module, left: _Left) -> None:
@@ -124,9 +132,17 @@ class Walk(wiring.Component):
                 left.y.eq(y),
                 before.eq(Mux(row.last, 0, row.cells)),
             ]
+            if self.derived.skin.closed:
+                m.d.sync += [left.seam.eq(self._over_the_seam(row.cells, before)), left.first.eq(1)]
             row_ends = Signal(len(joined))
             m.d.comb += row_ends.eq((row.cells | before) & ~joined)
             self._next_cluster(m, left, row_ends)
+
+    def _over_the_seam(self, row: Value, before: Value) -> Value:
+        """Whether a cell in the last column is joined with one in the first."""
+        if self.derived.skin.connectivity == 8:
+            return (row | before)[-1] & (row | before)[0]
+        return row[-1] & row[0] | before[-1] & before[0]
 
     def _next_cluster(self, m: Module, left: _Left, ends: Value) -> None:
         """Of the clusters that end there, the first one is next."""

@@ -13,6 +13,7 @@ from contactfpga_hdl.payloads import (
     record_layout,
     row_layout,
     summary_layout,
+    zone_layout,
 )
 from contactfpga_hdl.report.tally import Change, Tally
 
@@ -148,7 +149,7 @@ class _Counts(wiring.Component):
                 "free": Out(1),
                 "ends": In(1),
                 "zone_valid": In(1),
-                "zone": In(moments_layout(self.derived)),
+                "zone": In(zone_layout(self.derived)),
                 "cells": Out(self.derived.area_bits),
                 "mismatch": Out(1),
                 "changed": Out(1),
@@ -173,7 +174,7 @@ class _Counts(wiring.Component):
     def _explain(self, m: Module, tally: Tally) -> None:
         """Cells are added as they are counted, zones subtracted as they pass; for these the counting holds."""
         cells = Signal.like(self.cells)
-        unexplained = Signal(self.zone.shape())
+        unexplained = Signal(moments_layout(self.derived))
         m.d.comb += tally.hold.eq(self.zone_valid)
         with m.If(~self.zone_valid):
             m.d.sync += cells.eq(cells + tally.moments.area)

@@ -32,6 +32,8 @@ class Labeller(Choice):
     """The most clocks from a row to the next one it can take."""
     empty_row_clocks: Clocks = lambda derived: 1
     """The same for an empty row below an empty row."""
+    closed: bool = False
+    """It joins zones over the seam of a sheet whose ends meet."""
 
 
 LabellerName = Literal["run", "serial", "projection", "single"]
@@ -45,8 +47,9 @@ LABELLERS: dict[str, Labeller] = {
             gateware="contactfpga_hdl.label.run:RunLabeller",
             golden="contactfpga_sim.golden.label:RUN",
             exact=True,
-            end_clocks=lambda derived: derived.open_zones + 3,
-            row_clocks=lambda derived: derived.open_zones + 1,
+            end_clocks=lambda derived: derived.open_zones + derived.skin.closed + 3,
+            row_clocks=lambda derived: derived.open_zones + derived.skin.closed + 1,
+            closed=True,
         ),
         Labeller(
             name="serial",

@@ -25,6 +25,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     bits = numbers.whole(0, limits.MAX_BARYCENTER_BITS)
     divided = "Divide barycenters on the board, to 1/2^K cell."
     parser.add_argument("--barycenter-bits", type=bits, metavar="K", help=divided)
+    ends = "The last column is a neighbor of the first: the sheet is a cylinder (docs/skin.md#closed-sheets)."
+    parser.add_argument("--closed", action="store_true", help=ends)
     parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
 
 
@@ -32,7 +34,9 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga_sim.board import replay
 
-    frames, skin = replay.load(args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits)
+    frames, skin = replay.load(
+        args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits, args.closed
+    )
     started = time.monotonic()
     if args.json:
         for index, result in enumerate(replay.replay(frames, skin)):
@@ -43,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
         counts.append(result.frame.zones)
         late.append(result.last_record or 0)
     seconds = time.monotonic() - started
+    closed = ", ends meet" if skin.closed else ""
     for title, what in (
-        ("frames", f"{len(frames)} of {skin.rows}x{skin.columns}, {skin.connectivity}-connectivity"),
+        ("frames", f"{len(frames)} of {skin.rows}x{skin.columns}, {skin.connectivity}-connectivity{closed}"),
         ("zones", f"{sum(counts)}, at most {max(counts)} in a frame"),
         ("last record", f"at most {max(late)} clocks after a frame's last row"),
         ("speed", f"{len(frames) / seconds:,.0f} frames per second, once compiled"),

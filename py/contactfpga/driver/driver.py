@@ -7,8 +7,9 @@ import contextlib
 import threading
 from pathlib import Path
 
-from contactfpga.driver import finding
+from contactfpga.driver import finding, recording
 from contactfpga.driver.board import Board
+from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortLost
@@ -23,7 +24,7 @@ def open(
     skin: Skin | str | Path | None = None,
     *,
     baud: int | None = None,
-    record: str | Path | None = None,
+    record: str | Path | Tap | None = None,
     timeout: float = 1.0,
 ) -> Board:
     """Open a board and wait for its hello.
@@ -33,8 +34,8 @@ def open(
     fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which is closed with
     the board), or None for the one supported board that is plugged in; with ``skin``, for the one of that Skin.
     ``skin``: the Skin (or its file) the board must be built from; None takes what the board says. ``baud``: bits per
-    second; by default that of ``skin``, or 3,000,000. ``record``: a file that gets every byte received; ``replay://``
-    reads it.
+    second; by default that of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
+    ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
     ``timeout`` in seconds, for the hello.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
@@ -45,12 +46,15 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    if isinstance(record, str | Path):
+        recording.check(record)
     if port is None or (isinstance(port, str) and finding.searched(port)):
         port = finding.find(port, skin, baud)
     transport = connect(port, baud)
     try:
         if record is not None:
-            transport = RecordingTransport(transport, record)
+            tap = FileTap(record, transport.name) if isinstance(record, (str, Path)) else record
+            transport = RecordingTransport(transport, tap)
         board = Board(transport, skin)
     except BaseException:
         transport.close()

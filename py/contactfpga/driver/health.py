@@ -92,6 +92,7 @@ def hello(board: Board) -> Iterator[Finding]:
     """What the board says of itself."""
     sheet = board.sheet
     surface = "plane" if sheet.radius_mm is None else f"cylinder of radius {sheet.radius_mm:g} mm"
+    surface = f"closed {surface}" if sheet.closed else surface
     name = f"{board.name!r}, " if board.name else ""
     facts = (
         f"{name}{sheet.rows}x{sheet.columns}, pitch {sheet.pitch_x_mm:g} x {sheet.pitch_y_mm:g} mm, {surface}, "

@@ -165,5 +165,7 @@ def closed(before: Zones, after: Zones) -> tuple[int, int] | None:
     if before.frame.barycenters is not None or after.frame.barycenters is not None:
         raise HapticsError('the board sends barycenters; only `report = "moments"` or "cells" has the exact sums')
     more, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))
+    if after.sheet.closed:
+        x %= after.sheet.columns  # sums count on past the seam
     inside = 0 <= x < after.sheet.columns and 0 <= y < after.sheet.rows
     return (y, x) if more == 1 and inside else None

@@ -13,6 +13,7 @@ from contactfpga.choices.reports import REPORTS
 from contactfpga.errors import SkinError
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.skin import limits
+from contactfpga.skin.check_surface import check_surface
 from contactfpga.skin.check_units import check_units
 from contactfpga.skin.derived import Derived
 
@@ -37,7 +38,7 @@ _REGISTERED: dict[str, Callable[[object], Choice]] = {
     "debounce": debounces.find,
     "converter": converters.find,
 }
-_SWITCHES = ("guard", "fail_safe", "alive", "self_test", "dual")
+_SWITCHES = ("closed", "guard", "fail_safe", "alive", "self_test", "dual")
 _WHOLE = (
     *("rows", "columns", "row_chains", "column_chains", "shift_hz", "barycenter_bits", "units", "clock_hz", "baud"),
 )
@@ -113,10 +114,10 @@ def check_sheet(skin: Skin) -> dict[str, Any]:
     _check_precharge(skin)
     scans.find(skin.scan).check(skin)
     _check_ghosts(skin, mask)
-    _check_surface(skin)
+    surface = check_surface(skin)
     _check_guard(skin)
     orders = {name: _check_order(name, getattr(skin, name), lines) for name, lines in _ordered(skin)}
-    return {"mask": mask, **orders, **check_units(skin)}
+    return {"mask": mask, **surface, **orders, **check_units(skin)}
 
 
 def _ordered(skin: Skin) -> list[tuple[str, int]]:
@@ -144,24 +145,6 @@ def _check_guard(skin: Skin) -> None:
         )
     if skin.self_test and not skin.reads_rows:
         raise SkinError(f"scan is {skin.scan!r}; self_test = true drives and reads all lines and needs 'reversal'")
-
-
-def _check_surface(skin: Skin) -> None:
-    if skin.surface == "plane":
-        if skin.radius_mm is not None:
-            raise SkinError(f"radius_mm is {skin.radius_mm}; a plane has none, leave it out")
-        return
-    if skin.radius_mm is None:
-        raise SkinError("radius_mm is missing; surface = 'cylinder' needs it")
-    _within("radius_mm", skin.radius_mm, 0.1, 100_000.0, "mm")
-    around = 2 * math.pi * skin.radius_mm
-    if skin.columns * skin.pitch_x_mm >= around:
-        most = math.ceil(around / skin.pitch_x_mm) - 1
-        advice = f"use at most {most} columns" if most else "use a larger radius_mm or a smaller pitch_x_mm"
-        raise SkinError(
-            f"{skin.columns} columns of {skin.pitch_x_mm} mm take {skin.columns * skin.pitch_x_mm:g} mm of a "
-            f"circumference of {around:g} mm: the sheet's ends meet, which is not supported; {advice}"
-        )
 
 
 def _check_mask(skin: Skin) -> Mask:

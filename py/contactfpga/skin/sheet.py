@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from contactfpga.skin.limits import MAX_BARYCENTER_BITS, MAX_LINES
+from contactfpga.skin.limits import MAX_BARYCENTER_BITS, MAX_LINES, MIN_AROUND
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -23,12 +23,14 @@ class Sheet:
     pitch_y_mm: float
     radius_mm: float | None
     """None on a plane."""
+    closed: bool = False
+    """The last column is a neighbor of the first."""
     ghosts: bool
     """The sheet has no diodes: pressed switches can make others read pressed."""
 
     def max_zones(self) -> int:
         """The most zones a frame of this sheet can hold."""
-        return max_zones(self.rows, self.columns, self.connectivity)
+        return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def check(self) -> None:
         """Raises ValueError where frames of such a sheet could not be read."""
@@ -46,18 +48,22 @@ class Sheet:
         for name, (low, high) in ranges.items():
             if not low <= getattr(self, name) <= high:
                 raise ValueError(f"{name} is {getattr(self, name)}")
+        if self.closed and (self.columns < MIN_AROUND or self.radius_mm is None or self.report == "barycenter"):
+            raise ValueError(f"{self.columns} columns around, radius {self.radius_mm}, report {self.report!r}")
         if self.connectivity not in (4, 8):
             raise ValueError(f"connectivity is {self.connectivity}")
         if not 1 <= self.zone_capacity <= self.max_zones():
             raise ValueError(f"zone_capacity is {self.zone_capacity}; the sheet holds at most {self.max_zones()} zones")
 
 
-def max_zones(rows: int, columns: int, connectivity: int) -> int:
+def max_zones(rows: int, columns: int, connectivity: int, closed: bool = False) -> int:
     """The most zones a sheet can hold.
 
     With 8-connectivity every 2x2 block holds cells of one zone at most; with 4-connectivity the checkerboard is the
-    worst.
+    worst. Where the ends meet a row holds no more runs than half its columns.
     """
+    if closed:
+        return (math.ceil(rows / 2) if connectivity == 8 else rows) * (columns // 2)
     if connectivity == 8:
         return math.ceil(rows / 2) * math.ceil(columns / 2)
     return math.ceil(rows * columns / 2)

@@ -44,6 +44,9 @@ class Skin:
     """``plane``, or ``cylinder``: columns run around the link's z axis, rows along it."""
     radius_mm: float | None = None
     """Radius of the sheet on a cylinder in mm; None on a plane."""
+    closed: bool = False
+    """The columns run all the way round the cylinder, so that the last one is a neighbor of the first. ``pitch_x_mm``
+    follows from the radius and need not be given."""
     mask: tuple[tuple[int, int], ...] = ()
     """(row, column) of switches that are absent or broken: never pressed, never stuck."""
     guard: bool = False
@@ -161,10 +164,12 @@ class Skin:
         """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
         one that begins or ends to divide."""
         divides = self.report == "barycenter"
-        if {"rows", "columns", "connectivity"} & set(changes) or divides != (
+        if {"rows", "columns", "connectivity", "closed"} & set(changes) or divides != (
             changes.get("report", self.report) == "barycenter"
         ):
             changes.setdefault("zone_capacity", None)
+        if self.closed and {"columns", "radius_mm", "closed"} & set(changes):
+            changes.setdefault("pitch_x_mm", type(self).pitch_x_mm)
         return dataclasses.replace(self, **changes)
 
     def to_toml(self) -> str:
@@ -242,12 +247,13 @@ class Skin:
             pitch_x_mm=self.pitch_x_mm,
             pitch_y_mm=self.pitch_y_mm,
             radius_mm=self.radius_mm,
+            closed=self.closed,
             ghosts=self.ghosts,
         )
 
     def max_zones(self) -> int:
         """The most zones a frame of this sheet can hold; see :meth:`Sheet.max_zones`."""
-        return max_zones(self.rows, self.columns, self.connectivity)
+        return max_zones(self.rows, self.columns, self.connectivity, self.closed)
 
     def _keep(self, **values: Any) -> None:
         for name, value in values.items():

@@ -53,14 +53,16 @@ class Widths:
         return self.sheet.max_zones().bit_length()
 
     @functools.cached_property
-    def record_bits(self) -> tuple[int, int, int]:
-        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter.
+    def record_bits(self) -> tuple[int, ...]:
+        """Of a zone on the wire: area, and sum x and sum y, or x and y of the barycenter; on a sheet whose ends meet
+        after them the cells past the seam.
 
         An area that a barycenter goes with is never 0. So where the sheet's cells are a power of two all of them are
         sent as 0, which saves a bit, and with 4 fraction bits and 16x16 or 64x64 cells a byte.
         """
         if not self.report.divided:
-            return self.area_bits, self.sum_x_bits, self.sum_y_bits
+            turned = (self.area_bits,) if self.sheet.closed else ()
+            return self.area_bits, self.sum_x_bits, self.sum_y_bits, *turned
         x_bits, y_bits = (
             max(1, (lines - 1 << self.sheet.barycenter_bits).bit_length())
             for lines in (self.sheet.columns, self.sheet.rows)

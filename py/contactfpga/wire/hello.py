@@ -27,6 +27,8 @@ _CHECK = struct.Struct("<I")
 _REPORTS = tuple(report.name for report in sorted(REPORTS.values(), key=lambda report: report.code))
 _SENDS = ("always", "on_change")
 _FINGERPRINT_BYTES = 8
+_CLOSED = 0x80
+"""Beside the connectivity, where the ends of the sheet meet: a reader that does not know this refuses the hello."""
 
 SENT_DIGITS, EPOCH_DIGITS, HEARD_DIGITS, STUCK_DIGITS = 7, 4, 3, 1
 STATE_DIGITS = 16
@@ -93,7 +95,7 @@ def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuc
     sheet = _SHEET.pack(
         skin.rows,
         skin.columns,
-        skin.connectivity,
+        skin.connectivity | _CLOSED * skin.closed,
         _REPORTS.index(skin.report),
         skin.sheet.barycenter_bits,
         _SENDS.index(skin.send),
@@ -178,7 +180,8 @@ def _hello(fields: dict[int, bytes]) -> Hello:
     sheet = Sheet(
         rows=rows,
         columns=columns,
-        connectivity=connectivity,
+        connectivity=connectivity & ~_CLOSED,
+        closed=bool(connectivity & _CLOSED),
         report=_REPORTS[report],
         barycenter_bits=bits,
         zone_capacity=capacity,

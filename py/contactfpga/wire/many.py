@@ -45,7 +45,8 @@ class Table:
     starts: np.ndarray
     """(n + 1,) where each one's records begin."""
     records: np.ndarray
-    """(m, 3) int64, of all of them in order: area and sums, or area and barycenter."""
+    """(m, 3) int64, of all of them in order: area and sums, or area and barycenter; (m, 4) where the ends of the sheet
+    meet, as :attr:`contactfpga.wire.protocol.Frame.moments`."""
 
 
 def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> Table:
@@ -68,14 +69,16 @@ def decode(packets: Sequence[bytes], widths: Widths, before: bytes) -> Table:
         groups.append((which[fields["valid"]], records))
     starts = np.zeros(len(packets) + 1, np.int64)
     np.cumsum(found["items"], out=starts[1:])
-    all_records = np.zeros((int(starts[-1]), 3), np.int64)
+    all_records = np.zeros((int(starts[-1]), len(widths.record_bits)), np.int64)
     for which, records in groups:
-        all_records[(starts[which][:, None] + np.arange(records.shape[1])).ravel()] = records.reshape(-1, 3)
+        all_records[(starts[which][:, None] + np.arange(records.shape[1])).ravel()] = records.reshape(
+            -1, len(widths.record_bits)
+        )
     return Table(found, starts, all_records)
 
 
 def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Fields of packets of one length, and (n, items, 3) records of the valid ones."""
+    """Fields of packets of one length, and (n, items, 3) records of the valid ones, or (n, items, 4)."""
     stuffed = data[:, :-CHECK_BYTES]
     plain, fits = _unstuff(stuffed)
     valid = fits & _checked(data, before) & (plain[:, -1] >> FLAG_BITS == KINDS[widths.sheet.report])
@@ -89,7 +92,7 @@ def _group(data: np.ndarray, items: int, widths: Widths, before: bytes) -> tuple
     fields["flags"] = plain[:, -1] & _FLAG_MASK
     fields["items"] = items
     words = _words(plain[:, :body].reshape(len(data), items, widths.item_bytes))
-    records = np.zeros((len(data), items, 3), np.int64)
+    records = np.zeros((len(data), items, len(widths.record_bits)), np.int64)
     for column, value in enumerate(_split(words, widths.record_bits)):
         records[..., column] = value
     if widths.report.divided and widths.cells == 1 << widths.record_bits[0]:
@@ -184,6 +187,8 @@ def _possible(fields: np.ndarray, records: np.ndarray, widths: Widths) -> np.nda
     area, x, y = (records[..., column] for column in range(3))
     scale = 1 << widths.sheet.barycenter_bits if widths.report.divided else area
     inside = (x <= (widths.sheet.columns - 1) * scale) & (y <= (widths.sheet.rows - 1) * scale) & (area > 0)
+    if widths.sheet.closed:
+        inside &= (records[..., 3] <= area) | (records[..., 3] == (1 << widths.area_bits) - 1)
     carried, cells = area.sum(axis=1), fields["cells"]
     agrees = np.where(fields["flags"] & OVERFLOW > 0, carried < cells, carried == cells)
     possible: np.ndarray = agrees & inside.all(axis=1) & (cells <= widths.cells)

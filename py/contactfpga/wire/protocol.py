@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga.skin.sheet import Sheet
 from contactfpga.skin.widths import HEARD_BITS, SEQUENCE_BITS, TIME_BITS, Widths
 from contactfpga.wire.framing import (
     DELIMITER,
@@ -129,7 +130,8 @@ class Frame:
     cells: int
     """Pressed switches."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each zone the frame carries; (0, 3) with another report than ``moments``."""
+    """(n, 3) int64: area, sum x, sum y of each zone the frame carries; (0, 3) with another report than ``moments``.
+    (n, 4) where the ends of the sheet meet: and the cells past the seam (:mod:`contactfpga.zones.around`)."""
     bitmap: np.ndarray | None
     """(rows, columns) bool with ``report = "cells"``, else None."""
     barycenters: np.ndarray | None = None
@@ -170,7 +172,7 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
         heard=heard,
         zones=zones,
         cells=cells,
-        moments=_records(plain[:body], items, widths) if sheet.report == "moments" else NO_RECORDS,
+        moments=_records(plain[:body], items, widths) if sheet.report == "moments" else no_records(sheet),
         bitmap=_bitmap(plain[:body], widths) if sheet.report == "cells" else None,
         barycenters=_barycenters(plain[:body], items, widths) if sheet.report == "barycenter" else None,
     )
@@ -181,6 +183,15 @@ def decode_frame(plain: bytes, widths: Widths) -> Frame:
 
 NO_RECORDS = np.zeros((0, 3), np.int64)
 NO_RECORDS.flags.writeable = False
+_NO_CLOSED_RECORDS = np.zeros((0, 4), np.int64)
+_NO_CLOSED_RECORDS.flags.writeable = False
+
+
+def no_records(sheet: Sheet) -> np.ndarray:
+    """The records of a frame without zones."""
+    return _NO_CLOSED_RECORDS if sheet.closed else NO_RECORDS
+
+
 FLAG_SETS = [frozenset(name for bit, name in enumerate(FLAGS) if word >> bit & 1) for word in range(1 << len(FLAGS))]
 """The flags of a frame by the bits of its last byte."""
 
@@ -194,8 +205,10 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
     else:
         most_x, most_y = sheet.columns - 1, sheet.rows - 1
         if frame.barycenters is None:
-            area, x, y = frame.moments.T.tolist()
+            area, x, y, *turned = frame.moments.T.tolist()
             inside = all(x <= a * most_x and y <= a * most_y for a, x, y in zip(area, x, y))
+            whole = (1 << widths.area_bits) - 1
+            inside &= all(t <= a or t == whole for past in turned for a, t in zip(area, past))
         else:
             area, x, y = frame.barycenters.T.tolist()
             bits = sheet.barycenter_bits
@@ -209,17 +222,13 @@ def _check_sums(frame: Frame, widths: Widths) -> None:
 
 
 def _records(data: bytes, zones: int, widths: Widths) -> np.ndarray:
-    """(zones, 3) int64: the fields of zone records."""
+    """(zones, 3) int64, or (zones, 4): the fields of zone records."""
     if not zones:
-        return NO_RECORDS
+        return no_records(widths.sheet)
     size = widths.record_bytes
-    area_bits, x_bits, y_bits = widths.record_bits
-    area_mask, x_mask, shift = (1 << area_bits) - 1, (1 << x_bits) - 1, area_bits + x_bits
-    rows = []
-    for start in range(0, len(data), size):
-        word = int.from_bytes(data[start : start + size], "little")
-        rows.append((word & area_mask, word >> area_bits & x_mask, word >> shift))
-    if max(row[2] for row in rows) >> y_bits:
+    *bits, last_bits = widths.record_bits
+    rows = [_split(int.from_bytes(data[start : start + size], "little"), *bits) for start in range(0, len(data), size)]
+    if max(row[-1] for row in rows) >> last_bits:
         raise PacketError("content", "a zone record is filled up with something other than zeros")
     return np.array(rows, np.int64)
 

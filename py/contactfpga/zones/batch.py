@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
+from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import DIVIDED_DTYPE, DTYPE, Zones
 
@@ -111,7 +113,7 @@ def _describe(run: Run, out: np.ndarray) -> None:
 def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray) -> np.ndarray:
     sheet = items[0].sheet
     divided = sheet.report == "barycenter"
-    records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])
+    records, windings = _records(items)
     area, x, y = records.T
     out = np.zeros(len(records), DIVIDED_ZONE_DTYPE if divided else ZONE_DTYPE)
     which = np.repeat(np.arange(len(frames)), counts)
@@ -123,26 +125,26 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     if not divided:
         out["sum_x"], out["sum_y"] = x, y
     scale = np.full(len(area), 1 << sheet.barycenter_bits) if divided else area
+    if sheet.closed:
+        out["winding"] = np.array(around.WINDINGS)[windings]
     nowhere = area == 0
     scale = np.where(nowhere, 1, scale)
     for name, sums, pitch in (("x_mm", x, sheet.pitch_x_mm), ("y_mm", y, sheet.pitch_y_mm)):
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
-    _place(out, sheet.radius_mm)
+    out["x_mm"][out["winding"] != ""] = math.nan
+    nowhere = np.isnan(out["x_mm"])
+    out["point_mm"], out["normal"] = surfaces.of(sheet).place(out["x_mm"], out["y_mm"])
+    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan
     if sheet.ghosts:
         out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]
 
 
-def _place(out: np.ndarray, radius_mm: float | None) -> None:
-    """Points and normals, as :func:`contactfpga.zones.zone.on_surface` has them."""
-    nowhere = np.isnan(out["x_mm"])
-    if radius_mm is None:
-        out["point_mm"][:, 0], out["point_mm"][:, 1] = out["x_mm"], out["y_mm"]
-        out["normal"][:, 2] = 1.0
-    else:
-        angles = (np.where(nowhere, 0.0, out["x_mm"]) / radius_mm).tolist()
-        for axis, function in enumerate((math.cos, math.sin)):  # numpy's may differ in the last bit
-            out["normal"][:, axis] = [function(angle) for angle in angles]
-            out["point_mm"][:, axis] = radius_mm * out["normal"][:, axis]
-        out["point_mm"][:, 2] = out["y_mm"]
-    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan
+def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 3) :attr:`Zones.records`, and (m,) places in :data:`around.WINDINGS` where the ends of the sheet meet."""
+    sheet = items[0].sheet
+    if not sheet.closed:
+        records = np.concatenate([one.carried if isinstance(one, Run) else one.records for one in items])
+        return records, np.zeros(0, np.int64)
+    records = np.concatenate([one.carried if isinstance(one, Run) else one.closed_records for one in items])
+    return around.flat(records, sheet.columns), around.windings(records)

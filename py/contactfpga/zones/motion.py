@@ -28,7 +28,15 @@ def moved(records: np.ndarray, earlier: np.ndarray, sheet: Sheet) -> bool:
     if len(records) != len(earlier) or np.array_equal(records, earlier):
         return False
     old = _places(earlier, sheet)
-    return any(all((x - a) ** 2 + (y - b) ** 2 > LIMIT**2 for a, b in old) for x, y in _places(records, sheet))
+    columns = sheet.columns if sheet.closed else None
+    return any(
+        all(_across(x - a, columns) ** 2 + (y - b) ** 2 > LIMIT**2 for a, b in old) for x, y in _places(records, sheet)
+    )
+
+
+def _across(distance: float, columns: int | None) -> float:
+    """Where the ends of the sheet meet the shorter way."""
+    return distance if columns is None else (distance + columns / 2) % columns - columns / 2
 
 
 def _places(records: np.ndarray, sheet: Sheet) -> list[tuple[float, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
-from contactfpga.wire.protocol import FLAG_SETS, NO_RECORDS, Frame
+from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
 from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
@@ -27,7 +27,7 @@ class Run:
     starts: np.ndarray
     """(n + 1,) where each one's records begin; the first need not be 0."""
     records: np.ndarray
-    """(m, 3) int64, at least up to the last start."""
+    """(m, 3) int64, or (m, 4) where the ends of the sheet meet, at least up to the last start."""
     times_us: np.ndarray
     """(n,) int64, since power-up."""
     line: HostLine | None
@@ -95,7 +95,7 @@ def frame_of(fields: tuple[int, ...], records: np.ndarray, sheet: Sheet) -> Fram
         heard=heard,
         zones=zones,
         cells=cells,
-        moments=NO_RECORDS if divided or not len(records) else records,
+        moments=no_records(sheet) if divided or not len(records) else records,
         bitmap=None,
         barycenters=records if divided else None,
     )

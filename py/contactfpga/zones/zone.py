@@ -10,14 +10,14 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
+from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
-from contactfpga.zones import ghosts, labels, motion
+from contactfpga.zones import around, ghosts, labels, motion
 from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory, UnitSamples
-
-Vector = tuple[float, float, float]
 
 DTYPE = np.dtype(
     [
@@ -30,6 +30,7 @@ DTYPE = np.dtype(
         ("point_mm", np.float64, 3),
         ("normal", np.float64, 3),
         ("ghost", np.bool_),
+        ("winding", np.dtype("U5")),
     ]
 )
 """Fields of :attr:`Zones.array`, the same as those of :class:`Zone`."""
@@ -46,7 +47,9 @@ class Zone:
     area_cells: int
     """Pressed cells."""
     sum_x: int | None
-    """Sum of the cells' columns, exact; None with ``report = "barycenter"``, which does not send it."""
+    """Sum of the cells' columns, exact; None with ``report = "barycenter"``, which does not send it. Where the ends of
+    the sheet meet, columns are counted on past the seam, so that the zone's x is this sum / area; not in a zone that is
+    :attr:`winding`."""
     sum_y: int | None
     """Sum of the cells' rows, exact; None likewise."""
     area_mm2: float
@@ -54,7 +57,8 @@ class Zone:
     x_mm: float | None
     """Barycenter along the columns in mm, on the sheet laid flat; column 0 lies at 0. It is off by at most
     :attr:`Zones.rounding_mm`. None for a zone without cells, which lies nowhere: only a frame that is flagged
-    ``mismatch`` can hold one."""
+    ``mismatch`` can hold one. Where the ends of the sheet meet it lies from 0 to the circumference; None for a zone
+    that is :attr:`winding`, which has a y but no x, no point and no normal."""
     y_mm: float | None
     """Barycenter along the rows in mm; row 0 lies at 0. It is off by at most :attr:`Zones.rounding_mm`. None as
     ``x_mm``."""
@@ -64,6 +68,9 @@ class Zone:
     """Outward unit normal at that point. None as ``x_mm``."""
     ghost: bool = False
     """On a sheet without diodes: other pressed switches may have made all of it, with nothing pressed here."""
+    winding: str = ""
+    """On a sheet whose ends meet: ``ring``, a way through the zone's cells leads round the cylinder and back to where
+    it began, or ``wound``, it does not, but the cells lie on more than two turns. Else empty."""
 
 
 class Zones(Sequence[Zone]):
@@ -191,7 +198,11 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def _labels(self) -> np.ndarray | None:
         """(rows, columns) int with ``report = "cells"``, else None: the number of each cell's zone, from 1."""
-        return None if self.frame.bitmap is None else labels.label(self.frame.bitmap, self.sheet.connectivity)
+        if self.frame.bitmap is None:
+            return None
+        if self.sheet.closed:
+            return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
+        return labels.label(self.frame.bitmap, self.sheet.connectivity)
 
     @property
     def rounding_mm(self) -> tuple[float, float]:
@@ -221,6 +232,9 @@ class Zones(Sequence[Zone]):
         make = self._exact if self.frame.barycenters is None else self._divided
         both = zip(self.records.tolist(), self.suspects)
         zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
+        for index, winding in enumerate(self.windings):
+            if winding:
+                zones[index] = dataclasses.replace(zones[index], x_mm=None, point_mm=None, normal=None, winding=winding)
         zones.sort(key=_order)
         return tuple(zones)
 
@@ -238,8 +252,12 @@ class Zones(Sequence[Zone]):
         if place is None:
             return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
         x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
-        point_mm, normal = on_surface(x_mm, y_mm, self.sheet.radius_mm)
+        point_mm, normal = self._surface.place(x_mm, y_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
+
+    @functools.cached_property
+    def _surface(self) -> surfaces.Surface:
+        return surfaces.of(self.sheet)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -256,9 +274,22 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def records(self) -> np.ndarray:
         """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
-        if self._labels is not None:
+        if self._labels is not None and not self.sheet.closed:
             return labels.moments(self._labels)
         return records_of(self.frame, self.sheet)
+
+    @functools.cached_property
+    def windings(self) -> list[str]:
+        """:attr:`Zone.winding` of each of :attr:`records`; empty where the ends of the sheet do not meet."""
+        if not self.sheet.closed:
+            return []
+        return [around.WINDINGS[index] for index in around.windings(self.closed_records).tolist()]
+
+    @property
+    def closed_records(self) -> np.ndarray:
+        """(n, 4) int64, where the ends of the sheet meet: records with the cells past the seam
+        (:mod:`contactfpga.zones.around`)."""
+        return _closed_records(self.frame, self.sheet)
 
     def __iter__(self) -> Iterator[Zone]:
         return iter(self._zones)
@@ -290,39 +321,41 @@ class Zones(Sequence[Zone]):
         values["rounding_mm"] = list(self.rounding_mm)
         if self._history is not None:
             values["units"] = None if self.units is None else dataclasses.asdict(self.units)
-        values["zones"] = [dataclasses.asdict(zone) for zone in self]
+        values["zones"] = [self._as_dict(zone) for zone in self]
         if self.cells is not None:
             values["cells"] = [[int(cell) for cell in row] for row in self.cells]
             if self.sheet.ghosts:
                 values["ghost_cells"] = [[int(cell) for cell in row] for row in self._ghost_cells]
         return values
 
+    def _as_dict(self, zone: Zone) -> dict[str, object]:
+        values = dataclasses.asdict(zone)
+        if not self.sheet.closed:
+            del values["winding"]
+        return values
+
 
 def records_of(frame: Frame, sheet: Sheet) -> np.ndarray:
     """The same of a frame by itself."""
+    if sheet.closed:
+        return around.flat(_closed_records(frame, sheet), sheet.columns)
     if frame.bitmap is not None:
         return labels.moments(labels.label(frame.bitmap, sheet.connectivity))
     return frame.moments if frame.barycenters is None else frame.barycenters
 
 
-def _order(zone: Zone) -> tuple[bool, float, float, int]:
+def _closed_records(frame: Frame, sheet: Sheet) -> np.ndarray:
+    """(n, 4) int64: as they came, of a sheet whose ends meet."""
+    return frame.moments if frame.bitmap is None else around.label(frame.bitmap, sheet.connectivity)[1]
+
+
+def _order(zone: Zone) -> tuple[bool, float, bool, float, int]:
     """Zones that lie nowhere come last."""
-    return zone.y_mm is None, zone.y_mm or 0.0, zone.x_mm or 0.0, zone.area_cells
+    return zone.y_mm is None, zone.y_mm or 0.0, zone.x_mm is None, zone.x_mm or 0.0, zone.area_cells
 
 
 def _line(zone: Zone) -> str:
     where = "nowhere" if zone.x_mm is None else f"at x {zone.x_mm:.2f} mm, y {zone.y_mm:.2f} mm"
+    if zone.winding:
+        where = f"{zone.winding} at y {zone.y_mm:.2f} mm"
     return f"  {zone.area_cells} cells, {zone.area_mm2:g} mm2 {where}"
-
-
-def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
-    """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
-
-    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis toward the y axis, and y
-    along it; ``x_mm`` is the arc length.
-    """
-    if radius_mm is None:
-        return (x_mm, y_mm, 0.0), (0.0, 0.0, 1.0)
-    angle = x_mm / radius_mm
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return (radius_mm * cosine, radius_mm * sine, y_mm), (cosine, sine, 0.0)

@@ -86,7 +86,8 @@ class ZoneHistory:
     def _cell(self, key: Record) -> Cell:
         """The one in which the barycenter lies."""
         x, y = self._place(key)
-        return min(round(y), self._sheet.rows - 1), min(round(x), self._sheet.columns - 1)
+        column = round(x) % self._sheet.columns if self._sheet.closed else min(round(x), self._sheet.columns - 1)
+        return min(round(y), self._sheet.rows - 1), column
 
     def _place(self, key: Record) -> tuple[float, float]:
         """x and y in cells."""
@@ -109,7 +110,7 @@ def cells_of(record: Record, sheet: Sheet) -> tuple[Cell, ...]:
         return ((y, x),)
     if x % 2 and y % 2:
         return ()  # one of two diagonals
-    return (y // 2, x // 2), (-(-y // 2), -(-x // 2))
+    return (y // 2, x // 2 % sheet.columns), (-(-y // 2), -(-x // 2) % sheet.columns)
 
 
 def _keys(records: np.ndarray) -> set[Record]:

@@ -26,7 +26,8 @@ class Labelled:
     cycle: np.ndarray
     """(n,) int64: when the record left."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y of each record."""
+    """(n, 3) int64: area, sum x, sum y of each record; where the sheet's ends meet (n, 4), with the cells past the
+    seam."""
     first_row: np.ndarray
     """(N,) int64: when each frame's first row was handed over."""
     last_row: np.ndarray
@@ -36,7 +37,7 @@ class Labelled:
 
     def sorted_moments(self) -> np.ndarray:
         """The moments, sorted by area, sum x, sum y within each frame instead."""
-        area, sum_x, sum_y = self.moments.T
+        area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
     @property
@@ -110,7 +111,7 @@ class LabelBench:
         timings = native.array_at(self._library.bench_timings(self._bench), frames, _TIMING)
         word = records["zone"]
         fields = []
-        for width in (self._derived.area_bits, self._derived.sum_x_bits, self._derived.sum_y_bits):
+        for width in self._derived.record_bits:
             fields.append((word & np.uint64((1 << width) - 1)).astype(np.int64))
             word = word >> np.uint64(width)
         return Labelled(
@@ -135,6 +136,6 @@ def _model(skin: Skin) -> native.Model:
         defines={
             "ROWS": skin.rows,
             "COLUMNS": skin.columns,
-            "ZONE_BITS": derived.area_bits + derived.sum_x_bits + derived.sum_y_bits,
+            "ZONE_BITS": sum(derived.record_bits),
         },
     )

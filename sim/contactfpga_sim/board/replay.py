@@ -53,11 +53,16 @@ def load(
     connectivity: int = 8,
     pitch_mm: float = 10.0,
     barycenter_bits: int | None = None,
+    closed: bool = False,
 ) -> tuple[np.ndarray, Skin]:
-    """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled."""
+    """The (frames, rows, columns) bool array of a recording, and a Skin for it whose board is compiled.
+
+    ``closed``: the last column is a neighbor of the first, and the sheet a cylinder.
+    """
     frames = Recording.load(path, threshold).pressed
     _, rows, columns = frames.shape
-    skin = skin_for(rows, columns, connectivity, zones_bound(frames, connectivity), pitch_mm, barycenter_bits)
+    bound = zones_bound(frames, connectivity)
+    skin = skin_for(rows, columns, connectivity, bound, pitch_mm, barycenter_bits, closed)
     native.load(model_of(skin))
     return frames, skin
 
@@ -83,6 +88,7 @@ def skin_for(
     zones: int,
     pitch_mm: float = 10.0,
     barycenter_bits: int | None = None,
+    closed: bool = False,
 ) -> Skin:
     """A sheet of this size, scanned as fast as the link can carry frames of this many zones, so that none is dropped.
 
@@ -90,6 +96,8 @@ def skin_for(
     at most, so that recordings of one sheet share few builds.
     """
     shape: dict[str, Any] = {"rows": rows, "columns": columns, "connectivity": connectivity, "settle_us": 10_000.0}
+    if closed:
+        shape |= {"surface": "cylinder", "radius_mm": pitch_mm * columns / (2 * math.pi), "closed": True}
     if barycenter_bits is not None:
         shape |= {"report": "barycenter", "barycenter_bits": barycenter_bits}
     most = Skin(**shape, zone_capacity=1).max_zones()
@@ -103,7 +111,7 @@ def skin_for(
         zone_capacity=capacity,
         settle_us=(row_clocks - 1) / derived.clocks_per_us,
         release_us=1 / derived.clocks_per_us,
-        pitch_x_mm=pitch_mm,
+        **({} if closed else {"pitch_x_mm": pitch_mm}),
         pitch_y_mm=pitch_mm,
     )
 

@@ -265,9 +265,7 @@ class Facts:
 
     @functools.cached_property
     def zones_bits(self) -> int:
-        if self.skin.connectivity == 8:
-            return bits(-(-self.rows // 2) * -(-self.columns // 2))
-        return bits(-(-self.rows * self.columns // 2))
+        return bits(self._most_zones)
 
     @functools.cached_property
     def barycenter_bits(self) -> tuple[int, int, int]:
@@ -286,7 +284,8 @@ class Facts:
         if self.divided:
             width = sum(self.barycenter_bits)
         else:
-            width = self.area_bits + self.sum_x_bits + self.sum_y_bits if self.zones else self.columns
+            sums = self.area_bits + self.sum_x_bits + self.sum_y_bits
+            width = sums + (self.area_bits if self.skin.closed else 0) if self.zones else self.columns
         return -(-width // 8)
 
     @functools.cached_property
@@ -300,10 +299,18 @@ class Facts:
         return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).digest()[:8]
 
     @property
-    def _capacity_by_default(self) -> int:
-        most = math.ceil(self.rows / 2) * math.ceil(self.columns / 2)
+    def _most_zones(self) -> int:
+        """With 8-connectivity one in each 2x2 block, with 4 the checkerboard; around a cylinder no row has more than
+        half its columns."""
+        if self.skin.closed:
+            return self.columns // 2 * (self.rows if self.skin.connectivity == 4 else math.ceil(self.rows / 2))
         if self.skin.connectivity == 4:
-            most = math.ceil(self.rows * self.columns / 2)
+            return math.ceil(self.rows * self.columns / 2)
+        return math.ceil(self.rows / 2) * math.ceil(self.columns / 2)
+
+    @property
+    def _capacity_by_default(self) -> int:
+        most = self._most_zones
         if max(self.rows, self.columns) > 32:
             most = min(most, 256)
         return min(most, 64) if self.divided else most

@@ -11,42 +11,51 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.golden import label_serial, volume
+from contactfpga_sim.golden import cylinder, label_serial, volume
 from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
 from contactfpga_sim.golden.zones import flood, moments
 
 StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
 
 
-def labelling(cells: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> Labelling:
+def labelling(
+    cells: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
+) -> Labelling:
     """Clocks and departures for an (R, C) bool frame."""
     cells = np.ascontiguousarray(cells, bool)
-    return _labelling(cells.tobytes(), cells.shape, connectivity, labellers.find(labeller))
+    return _labelling(cells.tobytes(), cells.shape, connectivity, labellers.find(labeller), closed)
 
 
 @functools.lru_cache(maxsize=4096)
-def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: Labeller) -> Labelling:
+def _labelling(packed: bytes, shape: tuple[int, int], connectivity: int, labeller: Labeller, closed: bool) -> Labelling:
     cells = np.frombuffer(packed, bool).reshape(shape)
-    rule: LabellerRule = labeller.load_golden()
+    rule: LabellerRule | None = labeller.load_golden()
+    rule = rule.closed if rule is not None and closed else rule
+    assert rule is not None, f"{labeller.name} has no rule for a sheet whose ends meet"
     return rule.frame(cells, connectivity)
 
 
-def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks) -> Labelling:
+def exact(cells: np.ndarray, connectivity: int, strip_clocks: StripClocks, closed: bool = False) -> Labelling:
     """The work of an exact labeller on an (R, C) bool frame; ``strip_clocks``: its rule for two adjacent rows."""
     shape = cells.shape
     above = np.vstack([np.zeros((1, shape[1]), bool), cells])
     strips = [strip_clocks(above[y : y + 2], connectivity) for y in range(shape[0])]
-    labels, count = flood(cells, connectivity)
+    labels, turned = cylinder.flood(cells, connectivity) if closed else _on_a_plane(cells, connectivity)
     above_labels = np.vstack([np.zeros((1, shape[1]), int), labels])
     departures = []
-    for zone in range(1, count + 1):
+    for zone in range(1, len(turned) + 1):
         row = min(int(np.nonzero(labels == zone)[0].max()) + 1, shape[0] - 1)
         clock = strips[row][0][above_labels[row : row + 2] == zone].max()
-        departures.append(Departure(row, int(clock), *moments(labels, zone)))
+        departures.append(Departure(row, int(clock), *moments(labels, zone), turned[zone - 1]))
     departures.sort(key=lambda zone: (zone.row, zone.clock))
     places = [(zone.row, zone.clock) for zone in departures]
     assert len(set(places)) == len(places), "two zones would leave in one clock"
     return Labelling(tuple(busy for _, busy, _ in strips), strips[-1][2], tuple(departures))
+
+
+def _on_a_plane(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:
+    labels, count = flood(cells, connectivity)
+    return labels, [0] * count
 
 
 def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
@@ -54,6 +63,17 @@ def run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, i
     when a zone leaves whose last cluster is that of the cell, when the next row can come, and when an end mark leaves.
     """
     last_step, steps = cluster_steps(strip, connectivity)
+    return last_step + 2, steps + 1, steps + 3
+
+
+def closed_run_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
+    """The same where the ends meet: where cells are joined over the seam one more step joins the last cluster with the
+    first."""
+    last_step, steps = cluster_steps(strip, connectivity)
+    first, last = strip[:, 0], strip[:, -1]
+    if first.any() and last.any() if connectivity == 8 else (first & last).any():
+        steps += 1
+        last_step[:, -1][last] = steps
     return last_step + 2, steps + 1, steps + 3
 
 
@@ -77,5 +97,9 @@ def runs(row: np.ndarray) -> int:
     return int(row[0]) + int(np.sum(row[1:] & ~row[:-1]))
 
 
-RUN = LabellerRule(functools.partial(exact, strip_clocks=run_clocks), volume.run_clocks)
+RUN = LabellerRule(
+    functools.partial(exact, strip_clocks=run_clocks),
+    volume.run_clocks,
+    LabellerRule(functools.partial(exact, strip_clocks=closed_run_clocks, closed=True), volume.closed_run_clocks),
+)
 SERIAL = LabellerRule(functools.partial(exact, strip_clocks=label_serial.cluster_clocks), label_serial.strip_clocks)

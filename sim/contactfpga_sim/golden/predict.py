@@ -102,7 +102,7 @@ class Stages:
 
     def frame(self, one: scan.Scan, cells: np.ndarray) -> None:
         """Take all rows of a frame; ``cells`` (R, C) are the samples of ``one``, debounced."""
-        work = label.labelling(cells, self._facts.skin.connectivity, self._facts.skin.labeller)
+        work = self.labelling(cells)
         handed = []
         for row, offered in enumerate(one.offered):
             cycle = max(max(offered, self._handed + 1) + self._late * (row in one.alone), self._free)
@@ -110,6 +110,11 @@ class Stages:
             if self._facts.zones:
                 self._free = cycle + work.busy[row]
         self._end(one, cells, cells, range(self._facts.rows), handed, work)
+
+    def labelling(self, cells: np.ndarray) -> label.Labelling:
+        """The labeller's work on rows that are handed over as a frame."""
+        skin = self._facts.skin
+        return label.labelling(cells, skin.connectivity, skin.labeller, skin.closed)
 
     @property
     def due(self) -> int:
@@ -153,7 +158,10 @@ class Stages:
 
     def _record(self, zone: Departure, sum_y: int) -> int:
         facts = self._facts
-        return join(((zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)))[0]
+        fields = [(zone.area, facts.area_bits), (zone.sum_x, facts.sum_x_bits), (sum_y, facts.sum_y_bits)]
+        if facts.skin.closed:
+            fields.append((zone.turned, facts.area_bits))
+        return join(tuple(fields))[0]
 
 
 class Rows:
@@ -184,7 +192,7 @@ class Rows:
         return self._stages._end(one, cells, np.array(rows), self._places, self._handed, self._work(rows))
 
     def _work(self, rows: list[np.ndarray]) -> label.Labelling:
-        return label.labelling(np.array(rows), self._facts.skin.connectivity, self._facts.skin.labeller)
+        return self._stages.labelling(np.array(rows))
 
     def _counted(self) -> int:
         """The cycle from which a row with a pressed cell can be counted: the one before it is counted, a group of

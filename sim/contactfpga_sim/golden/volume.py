@@ -11,6 +11,7 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
+from contactfpga_sim.golden import cylinder_volume
 from contactfpga_sim.golden.work import LabellerRule
 
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
@@ -27,11 +28,12 @@ class Departures:
     clock: np.ndarray
     """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
     moments: np.ndarray
-    """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave."""
+    """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave. Where the sheet's ends
+    meet (n, 4), with :func:`contactfpga_sim.golden.cylinder.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
         """The moments, sorted by area, sum x, sum y within each frame instead."""
-        area, sum_x, sum_y = self.moments.T
+        area, sum_x, sum_y = self.moments.T[:3]
         return self.moments[np.lexsort((sum_y, sum_x, area, self.frame))]
 
     @property
@@ -40,27 +42,29 @@ class Departures:
         return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
 
-def all_departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> Departures:
+def all_departures(
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
+) -> Departures:
     """Every zone of (N, R, C) bool frames, and when it leaves."""
     frames = np.asarray(frames, bool)
     count, rows, columns = frames.shape
     chunk = max(1, _AT_ONCE // (rows * columns))
-    parts = [_departures(frames[i : i + chunk], connectivity, labeller) for i in range(0, count, chunk)]
+    parts = [_departures(frames[i : i + chunk], connectivity, labeller, closed) for i in range(0, count, chunk)]
     numbers = [np.diff(part.offsets) for part in parts]
     return Departures(
         offsets=np.concatenate([[0], np.cumsum(np.concatenate(numbers or [np.zeros(0, int)]))]),
         row=np.concatenate([np.zeros(0, int), *(part.row for part in parts)]),
         clock=np.concatenate([np.zeros(0, int), *(part.clock for part in parts)]),
-        moments=np.concatenate([np.zeros((0, 3), int), *(part.moments for part in parts)]),
+        moments=np.concatenate([np.zeros((0, 3 + closed), int), *(part.moments for part in parts)]),
     )
 
 
 def row_clocks(
-    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run"
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """(N, R) int64 each, for the rows of (N, R, C) bool frames: clocks from one to the next that can be handed over,
     and to the end mark if it is the last."""
-    return _clocks(np.asarray(frames, bool), connectivity, labeller)[1:]
+    return _clocks(np.asarray(frames, bool), connectivity, labeller, closed)[1:]
 
 
 def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> np.ndarray:
@@ -94,32 +98,42 @@ def min_labels(frames: np.ndarray, connectivity: int) -> np.ndarray:
 
 
 def _clocks(
-    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller, closed: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rule: LabellerRule = labellers.find(labeller).load_golden()
+    rule = rule.closed or rule if closed else rule
     assert rule.strips is not None, f"{labeller} has no rule for many frames at once"
     return rule.strips(frames, connectivity)
 
 
-def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> Departures:
+def _departures(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller, closed: bool) -> Departures:
     count, rows, columns = frames.shape
-    labels = min_labels(frames, connectivity)
+    labels, turns, disagree = cylinder_volume.labels(frames, connectivity) if closed else _flat(frames, connectivity)
     roots, zone = np.unique(labels[frames], return_inverse=True)
     frame, y, x = np.nonzero(frames)
     total = len(roots)
     last_row = np.zeros(total, int)
     np.maximum.at(last_row, zone, y)
     leaves = np.minimum(last_row + 1, rows - 1)
-    last_clock = _clocks(frames, connectivity, labeller)[0]
+    last_clock = _clocks(frames, connectivity, labeller, closed)[0]
     clock = np.zeros(total, int)
     for place in (0, 1):  # the zone's cells in the row before the one worked, and in that row itself
         near = y == leaves[zone] - 1 + place
         np.maximum.at(clock, zone[near], last_clock[frame[near], leaves[zone[near]], x[near]])
-    moments = np.stack([np.bincount(zone, weight, total) for weight in (np.ones(len(y)), x, y)], axis=1)
+    fields = [np.bincount(zone, weight, total) for weight in (np.ones(len(y)), x, y)]
+    if closed:
+        fields.append(cylinder_volume.turned(zone, turns[frames], disagree[frames], rows * columns))
+    moments = np.stack(fields, axis=1)
     owner = roots // (rows * columns)
     order = np.lexsort((clock, leaves, owner))
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
     return Departures(offsets, leaves[order], clock[order], moments.astype(int)[order])
+
+
+def _flat(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """On a plane all lies on one turn."""
+    turns = np.zeros(frames.shape, int)
+    return min_labels(frames, connectivity), turns, turns
 
 
 def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
@@ -149,4 +163,15 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
 def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of ``run``, for every row of (N, R, C) bool frames: :attr:`contactfpga_sim.golden.work.LabellerRule.strips`."""
     last_step, steps = _strips(frames, connectivity)
+    return last_step + 2, steps + 1, steps + 3
+
+
+def closed_run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same where the ends meet: a step more joins the last cluster with the first."""
+    last_step, steps = _strips(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    joined = ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0)
+    steps = steps + joined
+    last_step[..., -1] = np.where(joined, steps, last_step[..., -1])
     return last_step + 2, steps + 1, steps + 3

@@ -17,6 +17,8 @@ class Departure:
     area: int
     sum_x: int
     sum_y: int
+    turned: int = 0
+    """Where the sheet's ends meet: :func:`contactfpga_sim.golden.cylinder.turned`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,3 +46,5 @@ class LabellerRule:
     """The clocks of every row of (N, R, C) bool frames at once, for volume tests: when a zone leaves whose last cluster
     is that of the cell, when the next row can come, and when an end mark leaves; (N, R, C), (N, R) and (N, R) int64.
     Only exact labellers have it."""
+    closed: LabellerRule | None = None
+    """The same of sheets whose ends meet; None: it takes none."""

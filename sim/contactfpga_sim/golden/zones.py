@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-_EDGES = ((-1, 0), (1, 0), (0, -1), (0, 1))
-_CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+EDGES = ((-1, 0), (1, 0), (0, -1), (0, 1))
+CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
 def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
@@ -15,7 +15,7 @@ def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, int]:
     in the order of their first cell.
     """
     rows, columns = cells.shape
-    steps = _EDGES + (_CORNERS if connectivity == 8 else ())
+    steps = EDGES + (CORNERS if connectivity == 8 else ())
     labels = np.zeros((rows, columns), int)
     count = 0
     for seed in zip(*map(np.ndarray.tolist, np.nonzero(cells)), strict=True):

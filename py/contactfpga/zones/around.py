@@ -1,0 +1,100 @@
+"""Zones of a sheet whose ends meet: columns counted on past the seam, and zones that this does not give a place.
+
+A record then has a fourth number: how many of the zone's cells lie past the seam, seen from the others. As many as
+there are: the zone is a ``ring``, a way through its cells leads round the cylinder and back. More: it is ``wound``, its
+cells lie on more than two turns. Such a zone has a y but no x.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+WINDINGS = ("", "ring", "wound")
+"""Names of what :func:`windings` tells; the first one is an ordinary zone."""
+
+Run = tuple[int, int, int]
+"""Row, first column, column after the last one."""
+
+
+def windings(records: np.ndarray) -> np.ndarray:
+    """(n,) int64, places in :data:`WINDINGS`, of (n, 4) records."""
+    area, turned = records[:, 0], records[:, 3]
+    found: np.ndarray = np.where(area == 0, 0, (turned >= area).astype(np.int64) + (turned > area))
+    return found
+
+
+def flat(records: np.ndarray, columns: int) -> np.ndarray:
+    """(n, 3) int64: area and sums of (n, 4) records, with the columns counted on past the seam where that gives an x.
+
+    The x of a zone then lies from 0 to ``columns``.
+    """
+    area, sum_x, sum_y, turned = records.T
+    around = columns * np.maximum(area, 1)
+    unwrapped = (sum_x + columns * turned) % around
+    return np.stack([area, np.where(windings(records) > 0, sum_x, unwrapped), sum_y], axis=1)
+
+
+def label(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
+    """What :func:`contactfpga.zones.labels.label` finds, and the (n, 4) records of the zones."""
+    runs = _runs(cells)
+    neighbors = _neighbors(runs, cells.shape[1], connectivity)
+    turns: dict[int, int] = {}
+    numbers = np.zeros(cells.shape, np.int64)
+    records: list[tuple[int, int, int, int]] = []
+    for seed in range(len(runs)):
+        if seed in turns:
+            continue
+        found, ring = _spread(seed, neighbors, turns)
+        for run in found:
+            row, start, end = runs[run]
+            numbers[row, start:end] = len(records) + 1
+        records.append(_record([runs[run] for run in found], [turns[run] for run in found], ring))
+    return numbers, np.array(records, np.int64).reshape(-1, 4)
+
+
+def _runs(cells: np.ndarray) -> list[Run]:
+    runs = []
+    for row, line in enumerate(np.asarray(cells, bool)):
+        edges = np.flatnonzero(np.diff(line, prepend=False, append=False)).tolist()
+        runs += [(row, start, end) for start, end in zip(edges[::2], edges[1::2])]
+    return runs
+
+
+def _neighbors(runs: list[Run], columns: int, connectivity: int) -> list[list[tuple[int, int]]]:
+    """Of each run those that it touches, and by how many turns these lie further on."""
+    reach = 1 if connectivity == 8 else 0
+    found: list[list[tuple[int, int]]] = [[] for _ in runs]
+    of_row: dict[int, list[int]] = {}
+    for index, (row, start, end) in enumerate(runs):
+        of_row.setdefault(row, []).append(index)
+        near = [(other, turn, reach) for other in of_row.get(row - 1, []) for turn in (-1, 0, 1)]
+        near += [(other, turn, 1) for other in of_row[row] for turn in (-1, 1)]  # in its own row over the seam
+        for other, turn, gap in near:
+            _, first, past = runs[other]
+            if first + turn * columns < end + gap and start < past + turn * columns + gap:
+                found[index].append((other, turn))
+                found[other].append((index, -turn))
+    return found
+
+
+def _spread(seed: int, neighbors: list[list[tuple[int, int]]], turns: dict[int, int]) -> tuple[list[int], bool]:
+    """The runs of a zone, their turns, and whether a way leads round."""
+    turns[seed] = 0
+    found, ring = [seed], False
+    for run in found:
+        for other, turn in neighbors[run]:
+            if other not in turns:
+                turns[other] = turns[run] + turn
+                found.append(other)
+            ring |= turns[other] != turns[run] + turn
+    return found, ring
+
+
+def _record(runs: list[Run], turns: list[int], ring: bool) -> tuple[int, int, int, int]:
+    lengths = [end - start for _, start, end in runs]
+    area, lowest = sum(lengths), min(turns)
+    turned = sum(length for length, turn in zip(lengths, turns) if turn > lowest)
+    if ring or max(turns) - lowest > 1:
+        turned = area if ring else area + 1
+    sum_x = sum((start + end - 1) * (end - start) // 2 for _, start, end in runs)
+    return area, sum_x, sum(row * length for (row, _, _), length in zip(runs, lengths)), turned
