@@ -1,4 +1,5 @@
-"""Runs links through a router, in three processes: boards with their publishers, the router, and who reads them all."""
+"""Runs links through a router, in four processes: boards with their publishers, the router, and two that read half of
+the links each."""
 
 from __future__ import annotations
 
@@ -31,7 +32,9 @@ class Load(NamedTuple):
     """What a run showed; times in s."""
 
     links: int
-    frames: int
+    share: float
+    """Of the frames that were sent, those received by the end; the others are on their way, or lost."""
+    frames: float
     """Received, per second."""
     lost: int
     """Frames and messages that did not come."""
@@ -53,9 +56,15 @@ def measure(links: int, batch_s: float, full: bool = False, seconds: float = SEC
         endpoint = f"tcp/127.0.0.1:{one.getsockname()[1]}"
     with ExitStack() as stack:
         pipes = {}
-        for name, work in (("router", _route), ("publishers", _publish), ("readers", _read)):
+        every = range(links + full)
+        for name, work, mine in (
+            ("router", _route, every),
+            ("publishers", _publish, every),
+            ("reader", _read, every[::2]),
+            ("other reader", _read, every[1::2]),
+        ):
             pipes[name], theirs = context.Pipe()
-            arguments = (theirs, endpoint, links + full, batch_s, full, seconds)
+            arguments = (theirs, endpoint, mine, batch_s, full, seconds)
             process = context.Process(target=work, args=arguments, daemon=True)
             process.start()
             stack.callback(process.kill)
@@ -63,11 +72,13 @@ def measure(links: int, batch_s: float, full: bool = False, seconds: float = SEC
         for pipe in pipes.values():
             pipe.send("go")
         begun_s, firsts = _answer(pipes["publishers"])
-        pipes["readers"].send((begun_s, firsts[0]))
+        for name in ("reader", "other reader"):
+            pipes[name].send((begun_s, firsts[0]))
         found = {name: _answer(pipe) for name, pipe in pipes.items()}
-    frames, lost, messages, latency, bare = found["readers"][1:]
     cpu = {name: value[0] / seconds for name, value in found.items()}
-    return Load(links + full, round(frames / seconds), lost, messages / seconds, cpu, latency, bare)
+    frames, lost, messages = (np.array(found["reader"][1]) + found["other reader"][1]).tolist()
+    sent = (RATE_HZ * links + FULL_HZ * full) * seconds
+    return Load(links + full, frames / sent, frames / seconds, lost, messages / seconds, cpu, *found["reader"][2:])
 
 
 def _answer(pipe: Connection) -> Any:
@@ -76,9 +87,7 @@ def _answer(pipe: Connection) -> Any:
     return pipe.recv()
 
 
-def _route(pipe: Connection, endpoint: str, *_: object) -> None:
-    seconds = _[-1]
-    assert isinstance(seconds, float)
+def _route(pipe: Connection, endpoint: str, _links: range, _batch_s: float, _full: bool, seconds: float) -> None:
     with session.listening(endpoint):
         pipe.send("ready")
         pipe.recv()
@@ -88,10 +97,10 @@ def _route(pipe: Connection, endpoint: str, *_: object) -> None:
         time.sleep(LONG_S)
 
 
-def _publish(pipe: Connection, endpoint: str, links: int, batch_s: float, full: bool, seconds: float) -> None:
+def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full: bool, seconds: float) -> None:
     for low in range(8):
         source.frames(low)
-    boards = [source.Steady() for _ in range(links)]
+    boards = [source.Steady() for _ in links]
     with session.connected(endpoint) as network:
         stop = threading.Event()
         for number, board in enumerate(boards):
@@ -101,7 +110,7 @@ def _publish(pipe: Connection, endpoint: str, links: int, batch_s: float, full: 
         pipe.send("ready")
         pipe.recv()
         begun_s, rng = time.monotonic() + 0.1, random.Random(1)
-        rates = [RATE_HZ] * links
+        rates = [RATE_HZ] * len(links)
         if full:
             rates[-1] = FULL_HZ
         pipe.send(
@@ -123,7 +132,7 @@ def _beat(bare: Any, until_s: float) -> None:
         time.sleep(1 / RATE_HZ)
 
 
-def _read(pipe: Connection, endpoint: str, links: int, batch_s: float, full: bool, seconds: float) -> None:
+def _read(pipe: Connection, endpoint: str, links: range, batch_s: float, full: bool, seconds: float) -> None:
     bare: list[float] = []
     with session.connected(endpoint) as network, ExitStack() as stack:
         network.declare_subscriber(
@@ -131,7 +140,7 @@ def _read(pipe: Connection, endpoint: str, links: int, batch_s: float, full: boo
             lambda sample: bare.append(time.monotonic() - np.frombuffer(sample.payload.to_bytes()[:8])[0]),
         )
         boards = []
-        for number in range(links):
+        for number in links:
             port = f"zenoh://load/{number}?connect={endpoint}"
             boards.append(stack.enter_context(contactfpga.open(port, timeout=LONG_S)))
         pipe.send("ready")
@@ -139,16 +148,25 @@ def _read(pipe: Connection, endpoint: str, links: int, batch_s: float, full: boo
         begun_s, first = _answer(pipe)
         before = [_counted(board) for board in boards]
         used_s, found = time.process_time(), []
-        with boards[0].subscribe(maxsize=1 << 16) as frames:
-            while time.monotonic() < begun_s + seconds:
-                number = source.number_of(frames.next(LONG_S).time_us) - first
-                if number >= 0:
-                    found.append(time.monotonic() - (begun_s + (number + 1) / RATE_HZ))
+        if 0 in links:
+            found = _probed(boards[0], first, begun_s, begun_s + seconds)
+        time.sleep(max(0.0, begun_s + seconds - time.monotonic()))
         used_s = time.process_time() - used_s
-        counts = np.array([_counted(board) for board in boards]) - np.array(before)
-        frames_count, lost, messages = counts.sum(axis=0).tolist()
-        pipe.send((used_s, frames_count, lost, messages, _quantiles(found), _quantiles(bare)))
+        counts = [_counted(board) for board in boards]
+        total = np.array([*counts, (0, 0, 0)]).sum(axis=0) - np.array([*before, (0, 0, 0)]).sum(axis=0)
+        pipe.send((used_s, total.tolist(), _quantiles(found), _quantiles(bare)))
         time.sleep(LONG_S)
+
+
+def _probed(board: contactfpga.Board, first: int, begun_s: float, until_s: float) -> list[float]:
+    """How late each frame of one link is."""
+    found = []
+    with board.subscribe(maxsize=1 << 16) as frames:
+        while time.monotonic() < until_s:
+            number = source.number_of(frames.next(LONG_S).time_us) - first
+            if number >= 0:
+                found.append(time.monotonic() - (begun_s + (number + 1) / RATE_HZ))
+    return found
 
 
 def _counted(board: contactfpga.Board) -> tuple[int, int, int]:
@@ -158,5 +176,7 @@ def _counted(board: contactfpga.Board) -> tuple[int, int, int]:
 
 
 def _quantiles(found: list[float]) -> tuple[float, float]:
+    if not found:
+        return 0.0, 0.0
     middle, most = np.quantile(found, [0.5, 0.99]).tolist()
     return middle, most
