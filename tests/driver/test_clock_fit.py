@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from contactfpga.driver.clock_fit import USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
+from contactfpga_sim.pages import clock_page
 from contactfpga_sim.studies import clock
-from contactfpga_sim.studies.clock import PATHS, Path, accuracy, followed, moments
+from contactfpga_sim.studies.clock import PATHS, accuracy, followed, moments
 
 SKIN = contactfpga.Skin()
 QUIET = dataclasses.replace(PATHS["usb_125us"], rate_hz=200.0)
@@ -26,6 +28,12 @@ def test_the_fit_is_far_nearer_than_arrivals_and_states_its_uncertainty(name):
     assert found.error_s < 0.75 * found.late_s
     assert found.within >= 0.9
     assert found.sigma_s < max(found.late_s, 4 * found.error_s), "not by stating more than anyone believes"
+
+
+def test_the_page_holds_what_a_run_shows():
+    page = (Path(__file__).parents[2] / "docs/clock.md").read_text(encoding="utf-8")
+    (row,) = [line for line in page.splitlines() if line.startswith(f"| {PATHS['slow'].title} |")]
+    assert row in clock_page.accuracy_table(("slow",))
 
 
 def test_no_sample_is_said_to_come_after_its_arrival():
@@ -184,7 +192,7 @@ def test_the_simulated_board_is_on_its_own_clock():
 
 def test_paths_are_worse_than_none_by_what_they_say():
     """The simulation itself: mean delays as their ticks and jitter have them."""
-    path = Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
+    path = clock.Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
     frames = list(moments(path, 0.0, 1, 10.0))
     mean = np.mean([moment.arrived_s - moment.sampled_s for moment in frames])
     assert mean == pytest.approx(clock.SENT_S + 0.5e-3 + 1e-4, rel=0.1)

@@ -32,11 +32,11 @@ def measured(links: int, batch_ms: float, full: bool = False) -> load.Load:
 
 def batch_table() -> str:
     """One link."""
-    rows = [("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50", "CPU, all ends")]
+    head = ("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50 / p99")
+    rows: list[tuple[str, ...]] = [(*head, "CPU, all ends")]
     for batch_ms in BATCHES_MS:
         found = measured(1, batch_ms)
-        ratio = found.latency[0] / found.bare[0]
-        cells = (f"{batch_ms:g} ms", f"{found.messages:,.0f}", _ms(found.latency), _ms(found.bare), f"{ratio:.1f}")
+        cells = (f"{batch_ms:g} ms", f"{found.messages:,.0f}", _ms(found.latency), _ms(found.bare), _ratio(found))
         rows.append((*cells, _percent(sum(found.cpu.values()))))
     return writer.table_of(rows)
 
@@ -44,13 +44,13 @@ def batch_table() -> str:
 def links_table() -> str:
     """From one link to many."""
     head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
-    rows = [(*head, "latency p50 / p99", "of a bare pair")]
+    rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
     for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
         found = measured(links, GROWTH_MS, full)
         name = f"{links}" + (f", and one of {load.FULL_HZ:,.0f} Hz" if full else "")
         cpu = (_percent(used / found.links) for used in _ends(found))
         rates = (f"{found.frames:,.0f}", f"{100 * found.share:.1f} %", f"{found.lost}")
-        rows.append((name, *rates, *cpu, _ms(found.latency), _ms(found.bare)))
+        rows.append((name, *rates, *cpu, _ms(found.latency), _ratio(found)))
     return writer.table_of(rows)
 
 
@@ -82,6 +82,10 @@ def thousand_table() -> str:
         ),
     ]
     return writer.table_of(rows)
+
+
+def _ratio(found: load.Load) -> str:
+    return " / ".join(f"{one / bare:.1f}" for one, bare in zip(found.latency, found.bare, strict=True))
 
 
 def _percent(share: float) -> str:
