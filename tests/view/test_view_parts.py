@@ -251,3 +251,15 @@ def test_latency_is_from_the_sample_to_the_last_byte():
         assert meter.late_s is None
         meter.take_latency(SimpleNamespace(frames=frames), virtual)
         assert meter.late_s == pytest.approx(late_s)
+
+
+def test_silence_is_said(board):
+    """No data is never no contact: what is drawn then is said to be old."""
+    import contactfpga
+    from contactfpga.view.sources import BoardSource
+
+    with contactfpga.open(board.path) as port:
+        source = BoardSource(port, "board")
+        assert "no data" not in dict(source.told())
+        port._link.last_s -= 2.0
+        assert dict(source.told())["no data"].startswith("for 2.")

@@ -29,8 +29,8 @@ from contactfpga.view.sources import BoardSource, Source
 if TYPE_CHECKING:
     import viser
 
-CLOCK_HZ = 6_000_000
-"""Of the virtual board that is shown where nothing is named: half the usual clock, which keeps up with real time."""
+SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
+"""Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
 
 FINGER = 0.9
 """Radius of the mouse's finger, of the pitch."""
@@ -120,7 +120,7 @@ def _virtual(named: Named) -> Any:
     """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
     if named.port is not None:
         return transport.virtual_board(named.port)
-    skin = Skin.load(named.skin) if named.skin is not None else Skin(clock_hz=CLOCK_HZ, send="on_change")
+    skin = Skin.load(named.skin) if named.skin is not None else Skin().replace(**SLOW)
     return transport.virtual_board("sim://?scene=nothing", skin)
 
 

@@ -24,6 +24,9 @@ from contactfpga.zones.zone import Zones
 TURN_S = 0.02
 """A moment is shown for so long."""
 
+SILENT_S = 0.5
+"""After so long without a frame it is said; a board that works sends one at least every 0.1 s."""
+
 KEEPS_UP = 0.97
 """A board that reaches this share of real time is said to keep up."""
 
@@ -121,7 +124,9 @@ class BoardSource:
 
     def told(self) -> list[tuple[str, str]]:
         stats = self.meter.stats
-        rows = [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
+        silent_s = self._board.silence.seconds
+        rows = [("no data", f"for {silent_s:.1f} s; what is drawn is older")] if silent_s > SILENT_S else []
+        rows += [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
         if self.meter.dropped:
             rows.append(("not shown", f"{self.meter.dropped} frames, which came faster than they were read"))
         late = self.meter.late_s

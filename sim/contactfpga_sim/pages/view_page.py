@@ -13,7 +13,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from contactfpga.zones.batch import Batch
 from contactfpga_sim.pages import browser, writer
 
 CLICKS = 20
+PACED_S = 4.0
 WAIT_S = 0.7
 """Between two clicks: two of them at once would be a drag."""
 
@@ -166,6 +167,50 @@ def click_table(found: list[Click]) -> str:
     return writer.table_of(rows)
 
 
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """Processor time per second of board time, all in s."""
+
+    board: float
+    """Simulating the board."""
+    rest: float
+    """Driver and view, without a browser."""
+
+
+def load_of(shown: Shown, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+    """While these fingers press. Processor time does not depend on what else the computer does."""
+    assert shown.hand is not None
+    virtual: Any = shown.hand.board
+    spent, read = [0.0], virtual.read
+
+    def timed(wanted_s: float) -> bytes:
+        started = time.thread_time()
+        data: bytes = read(wanted_s)
+        spent[0] += time.thread_time() - started
+        return data
+
+    for place in fingers:
+        shown.hand.click(*place)
+    virtual.read = timed
+    began_s, began = virtual.clock(), time.thread_time()
+    while virtual.clock() - began_s < seconds:
+        shown.view.turn()
+    passed_s, used = virtual.clock() - began_s, time.thread_time() - began
+    virtual.read = read
+    shown.hand.lift()
+    return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
+
+
+def load_table(shown: Shown) -> str:
+    """Untouched and touched."""
+    rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
+    for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
+        load = load_of(shown, fingers)
+        both = load.board + load.rest
+        rows.append([name, *(f"{share:.0%}".replace("%", " %") for share in (load.board, load.rest, both))])
+    return writer.table_of(rows)
+
+
 def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
     """Three fingers, one of them on its way."""
     pitch_mm = sheet_of(shown).pitch_x_mm
@@ -208,10 +253,12 @@ def main() -> int:
         print(f"make view-page: {error}", file=sys.stderr)
         return 1
     plotted(drawn)
+    with opening.opened(http_port=0) as shown:
+        loads = load_table(shown)
     with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
         found = clicks(shown, visitor)
         picture(shown, visitor, image)
-    writer.write(page, {"view_clicks": lambda: click_table(found)})
+    writer.write(page, {"view_load": lambda: loads, "view_clicks": lambda: click_table(found)})
     return 0
 
 
