@@ -21,7 +21,7 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page closed-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page clock-page closed-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
 
 default: help check
 
@@ -122,6 +122,9 @@ tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recor
 
 closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
 	$(PY) -m contactfpga_sim.pages.closed_page docs/labelling.md
+
+clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
+	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)

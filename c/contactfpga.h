@@ -17,6 +17,8 @@
  * is damaged, is counted and never shown. A board says what it is (a hello) twice a second, so the first frame comes
  * within half a second.
  *
+ * A board with pressure units sends what they read in packets of their own: CONTACTFPGA_SWEEP, then reader.sweep.
+ *
  * CONTACTFPGA_PACKET_BYTES: the longest packet that can be taken. The default takes that of every sheet; define a smaller
  * one before including this file to save memory: a hello needs up to 120 bytes, a frame 14 bytes and its zones.
  */
@@ -37,21 +39,34 @@ extern "C" {
 #endif
 
 #define CONTACTFPGA_MAX_LINES 64
+#define CONTACTFPGA_MAX_UNITS 8
 #define CONTACTFPGA_REQUEST_BYTES 10
 #define CONTACTFPGA_PULSED_REQUEST_BYTES 66
+#define CONTACTFPGA_COMMAND_BYTES 14
+#define CONTACTFPGA_PULSED_COMMAND_BYTES 98
 
 /* What a byte completed. */
 typedef enum {
     CONTACTFPGA_NOTHING = 0,
     CONTACTFPGA_FRAME,
     CONTACTFPGA_HELLO,
-    CONTACTFPGA_FAULTS /* what the board says of its lines has changed: contactfpga_row_open and so on */
+    CONTACTFPGA_FAULTS, /* what the board says of its lines has changed: contactfpga_row_open and so on */
+    CONTACTFPGA_SWEEP   /* the pressure units were read */
 } contactfpga_event;
 
 typedef enum { CONTACTFPGA_MOMENTS = 0, CONTACTFPGA_CELLS = 1, CONTACTFPGA_BARYCENTER = 2 } contactfpga_report;
 
 /* Bits of a frame's flags. */
 enum { CONTACTFPGA_OVERFLOW = 1, CONTACTFPGA_MISMATCH = 2, CONTACTFPGA_FAULT = 4, CONTACTFPGA_MOTION = 8 };
+
+/* What a board can be told to do; it takes those that its Skin has. */
+enum {
+    CONTACTFPGA_SELF_TEST = 1,
+    CONTACTFPGA_SAMPLE_AT = 2,    /* value: clocks after a row is selected; 0: the settle time */
+    CONTACTFPGA_ZERO = 3,         /* value of these three: contactfpga_unit_value */
+    CONTACTFPGA_THRESHOLD = 4,
+    CONTACTFPGA_SUM_THRESHOLD = 5
+};
 
 /* Why packets were refused. */
 enum {
@@ -77,6 +92,11 @@ typedef struct {
     bool guard;           /* it has guard lines, and names faults */
     bool self_test;       /* it can test its lines */
     uint16_t zone_capacity;
+    uint8_t units;         /* pressure units, at most CONTACTFPGA_MAX_UNITS; 0: it has none, and the next five are 0 */
+    uint8_t unit_bits;     /* of a reading */
+    uint8_t sums, sum_bits; /* weighted sums that can have a threshold, and bits of the largest amount of one */
+    uint16_t spacing_clocks; /* from a unit's sample to that of the next one; 0: all are sampled at once */
+    uint32_t sweep_clocks;   /* from one sweep to the next */
     double pitch_x_mm, pitch_y_mm, radius_mm;
     uint8_t fingerprint[8];
     uint32_t clock_hz, baud;
@@ -107,10 +127,19 @@ typedef struct {
     contactfpga_winding winding;
 } contactfpga_zone;
 
+/* What the pressure units read. */
+typedef struct {
+    int64_t time_us; /* sample of the first unit, since power-up; later than that of the sweep before */
+    uint8_t sequence;
+    bool over, armed;  /* a threshold is reached; the board has one */
+    uint8_t saturated; /* a bit for each unit: it read 0 or full scale, so its reading may be anything beyond */
+    uint32_t readings[CONTACTFPGA_MAX_UNITS]; /* in steps of the converter */
+} contactfpga_sweep;
+
 /* What was counted since contactfpga_init; the names are those of the Python driver's board.stats. */
 typedef struct {
     uint32_t frames, lost, unexplained, overwritten, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, fault_reports,
-        before_hello, unknown_kinds, foreign_version, skin_changes, restarts, bytes;
+        sweeps, sweeps_lost, sweeps_unexplained, before_hello, unknown_kinds, foreign_version, skin_changes, restarts, bytes;
 } contactfpga_stats;
 
 /* Widths of a sheet's fields on the wire. */
@@ -122,6 +151,7 @@ typedef struct {
 typedef struct {
     contactfpga_frame frame; /* the last one shown */
     contactfpga_hello hello; /* the last one, once greeted */
+    contactfpga_sweep sweep; /* the last one shown */
     contactfpga_stats stats;
     bool greeted; /* a hello has come */
     /* What follows is the reader's own. */
@@ -138,6 +168,8 @@ typedef struct {
     int64_t last_us;
     uint32_t epoch, before_overwritten;
     uint8_t before_heard;
+    bool swept, sweep_timed; /* a sweep has come; one with its time has */
+    uint8_t sweep_sequence;
     uint8_t packet[CONTACTFPGA_PACKET_BYTES];
 } contactfpga_reader;
 
@@ -174,7 +206,18 @@ static inline void contactfpga_barycenter_mm(
  * first whose ``heard`` is number % 8; docs/protocol.md says what that takes. */
 static inline size_t contactfpga_request(uint32_t number, bool hello, bool pulsed, uint8_t *out);
 
-/* Whether a request may have this number. */
+/* The same with something to do, one of CONTACTFPGA_SELF_TEST and so on, at most 127, and its value, below 2^21. The frame
+ * that answers it was scanned after the board took the command. ``out`` has room for CONTACTFPGA_COMMAND_BYTES, or
+ * CONTACTFPGA_PULSED_COMMAND_BYTES. */
+static inline size_t contactfpga_command(
+    uint32_t number, uint8_t what, uint32_t value, bool hello, bool pulsed, uint8_t *out);
+
+/* The value of a command CONTACTFPGA_ZERO, _THRESHOLD or _SUM_THRESHOLD: for this unit, or sum, this many steps of its
+ * converter. False where the board, whose hello has come, has no such unit or sum, or it never reads as much. */
+static inline bool contactfpga_unit_value(
+    const contactfpga_hello *hello, uint8_t what, uint8_t place, uint32_t steps, uint32_t *value);
+
+/* Whether a request or a command may have this number. */
 static inline bool contactfpga_may_number(uint32_t number);
 
 /* Whether the board, whose hello has come, takes requests as pulses. */
@@ -187,7 +230,9 @@ enum {
     CONTACTFPGA__KIND_HELLO = 4,
     CONTACTFPGA__KIND_REQUEST = 5,
     CONTACTFPGA__KIND_ZONES = 5,
+    CONTACTFPGA__KIND_UNITS = 8,
     CONTACTFPGA__KIND_FAULTS = 9,
+    CONTACTFPGA__KIND_COMMAND = 10,
     CONTACTFPGA__SHEET = 1,
     CONTACTFPGA__STATE = 2,
     CONTACTFPGA__PITCH = 3,
@@ -378,9 +423,12 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
         hello->clock_hz = contactfpga__word(value), hello->baud = contactfpga__word(value + 4);
         break;
     case CONTACTFPGA__COMMANDS: hello->self_test = length && memchr(value, 1, length); break;
-    case CONTACTFPGA__UNITS: /* whose readings are not read here */
+    case CONTACTFPGA__UNITS:
+        hello->units = value[0], hello->unit_bits = value[1], hello->sums = value[2], hello->sum_bits = value[3];
+        hello->spacing_clocks = (uint16_t)(value[4] | value[5] << 8);
+        hello->sweep_clocks = contactfpga__word(value + 6);
         reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_UNITS);
-        if (value[0] < 1 || value[0] > 8 || value[1] < 1 || value[1] > 28 || !contactfpga__word(value + 6))
+        if (value[0] < 1 || value[0] > CONTACTFPGA_MAX_UNITS || value[1] < 1 || value[1] > 28 || !hello->sweep_clocks)
             odd = UINT32_C(1) << CONTACTFPGA__ODD_UNITS;
         break;
     case CONTACTFPGA__NAME: {
@@ -447,6 +495,18 @@ static inline bool contactfpga__same_sheet(const contactfpga_hello *one, const c
         && !memcmp(one->fingerprint, other->fingerprint, sizeof one->fingerprint);
 }
 
+static inline bool contactfpga__same_units(const contactfpga_hello *one, const contactfpga_hello *other) {
+    return one->units == other->units && one->unit_bits == other->unit_bits && one->sums == other->sums
+        && one->sum_bits == other->sum_bits && one->spacing_clocks == other->spacing_clocks
+        && one->sweep_clocks == other->sweep_clocks;
+}
+
+/* The board was restarted, or is another one: what it said of its lines and units holds no longer. */
+static inline void contactfpga__forget(contactfpga_reader *reader) {
+    memset(reader->lines, 0, sizeof reader->lines);
+    reader->swept = reader->sweep_timed = false;
+}
+
 /* ---- how many frames there were, and when ---- */
 
 static inline void contactfpga__restart_time(contactfpga_reader *reader) {
@@ -463,7 +523,7 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
     reader->stats.hellos++;
     if (reader->greeted && !contactfpga__same_sheet(&reader->hello, hello)) {
         reader->stats.skin_changes++;
-        memset(reader->lines, 0, sizeof reader->lines);
+        contactfpga__forget(reader);
         contactfpga__restart_time(reader);
     }
     if (reader->met) {
@@ -472,7 +532,7 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
         int64_t end_us = (int64_t)((hello->epoch + UINT64_C(1)) * CONTACTFPGA__EPOCH_US);
         if (forgot || hello->sent < reader->next || end_us <= reader->last_us - CONTACTFPGA__BEGUN_US) {
             reader->stats.restarts++;
-            memset(reader->lines, 0, sizeof reader->lines);
+            contactfpga__forget(reader);
             reader->before = false;
             reader->last_us = -1;
             first = 0;
@@ -484,6 +544,8 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
     reader->next = hello->sent, reader->epoch = hello->epoch;
     reader->timed = reader->forgot = false;
     reader->waiting = 0;
+    if (!hello->units) reader->swept = false;
+    if (!contactfpga__same_units(&reader->hello, hello)) reader->sweep_timed = false;
     reader->hello = *hello;
     reader->widths = contactfpga__widths(hello);
 }
@@ -657,6 +719,52 @@ static inline bool contactfpga__line(const contactfpga_reader *reader, unsigned 
     return reader->lines[bit / 7] >> bit % 7 & 1;
 }
 
+/* ---- pressure units ---- */
+
+/* The readings of an unsealed packet; returns false where they are not written as they must be. */
+static inline bool contactfpga__read_sweep(const contactfpga_reader *reader, contactfpga_sweep *sweep, uint64_t *trailer) {
+    const contactfpga_hello *hello = &reader->hello;
+    unsigned digits = (hello->unit_bits + 6u) / 7, body = hello->units * digits;
+    uint32_t full = (UINT32_C(1) << hello->unit_bits) - 1;
+    for (unsigned i = 0; i < body + 5; i++)
+        if (!(reader->packet[i] & 0x80)) return false;
+    memset(sweep, 0, sizeof *sweep);
+    for (unsigned unit = 0; unit < hello->units; unit++) {
+        uint32_t reading = (uint32_t)contactfpga__number(reader->packet + unit * digits, digits);
+        if (reading > full) return false;
+        if (!reading || reading == full) sweep->saturated |= (uint8_t)(1u << unit);
+        sweep->readings[unit] = reading;
+    }
+    *trailer = contactfpga__number(reader->packet + body, 5);
+    return !(*trailer >> 32);
+}
+
+/* An unsealed packet of kind units. Its time is that of about now, which the last frame tells. */
+static inline int contactfpga__take_sweep(contactfpga_reader *reader, size_t length, contactfpga_event *event) {
+    contactfpga_sweep sweep;
+    uint64_t trailer;
+    if (length != reader->hello.units * ((reader->hello.unit_bits + 6u) / 7) + 6) return CONTACTFPGA_LENGTH;
+    if (!contactfpga__read_sweep(reader, &sweep, &trailer)) return CONTACTFPGA_CONTENT;
+    sweep.sequence = (uint8_t)(trailer >> 24);
+    sweep.over = reader->packet[length - 1] & 1, sweep.armed = reader->packet[length - 1] >> 1 & 1;
+    reader->stats.sweeps++;
+    if (reader->swept) reader->stats.sweeps_lost += (uint8_t)(sweep.sequence - reader->sweep_sequence - 1);
+    reader->swept = true, reader->sweep_sequence = sweep.sequence;
+    const int64_t half = (int64_t)CONTACTFPGA__WRAP_US / 2;
+    uint64_t ahead = ((trailer & (CONTACTFPGA__WRAP_US - 1)) - (uint64_t)reader->last_us + (uint64_t)half)
+        & (CONTACTFPGA__WRAP_US - 1);
+    sweep.time_us = reader->last_us + (int64_t)ahead - half;
+    bool placed = reader->known && reader->last_us >= 0;
+    if (!placed || (reader->sweep_timed && sweep.time_us <= reader->sweep.time_us)) {
+        reader->stats.sweeps_unexplained++;
+        return CONTACTFPGA__FINE;
+    }
+    reader->sweep_timed = true;
+    reader->sweep = sweep;
+    *event = CONTACTFPGA_SWEEP;
+    return CONTACTFPGA__FINE;
+}
+
 /* ---- packets ---- */
 
 /* Undo the stuffing in place; returns the plain bytes, or 0 where the blocks do not fit the length. */
@@ -713,6 +821,8 @@ static inline int contactfpga__take_packet(contactfpga_reader *reader, size_t le
     }
     if (kind == CONTACTFPGA__KIND_FAULTS && reader->greeted && contactfpga__line_bits(&reader->hello))
         return contactfpga__take_faults(reader, length, event);
+    if (kind == CONTACTFPGA__KIND_UNITS && reader->greeted && reader->hello.units)
+        return contactfpga__take_sweep(reader, length, event);
     if (kind < CONTACTFPGA__KIND_ZONES || kind > CONTACTFPGA__KIND_ZONES + 2) {
         reader->stats.unknown_kinds++;
         return CONTACTFPGA__FINE;
@@ -824,22 +934,48 @@ static inline bool contactfpga_pulsed(const contactfpga_hello *hello) {
     return (uint64_t)hello->clock_hz + hello->baud / 2 < UINT64_C(4) * hello->baud;
 }
 
-static inline size_t contactfpga_request(uint32_t number, bool hello, bool pulsed, uint8_t *out) {
-    uint8_t plain[CONTACTFPGA_REQUEST_BYTES] = {0, 5};
-    size_t length = 0;
-    if (!contactfpga_may_number(number)) return 0;
-    for (int place = 0; place < 3; place++) plain[2 + place] = (uint8_t)(0x80 | (number >> 7 * place & 0x7F));
-    plain[5] = (uint8_t)(CONTACTFPGA__KIND_REQUEST << 4 | hello);
-    contactfpga__check_bytes(contactfpga__crc16(0xFFFF, plain + 1, 5), plain + 6);
+/* Digits of seven bits and a last byte as a packet to the board. */
+static inline size_t contactfpga__sealed(uint64_t word, size_t digits, uint8_t last, bool pulsed, uint8_t *out) {
+    uint8_t plain[CONTACTFPGA_COMMAND_BYTES] = {0};
+    size_t bytes = digits + 7, length = 0;
+    plain[1] = (uint8_t)(digits + 2);
+    for (size_t place = 0; place < digits; place++) plain[2 + place] = (uint8_t)(0x80 | (word >> 7 * place & 0x7F));
+    plain[2 + digits] = last;
+    contactfpga__check_bytes(contactfpga__crc16(0xFFFF, plain + 1, digits + 2), plain + 3 + digits);
     if (!pulsed) {
-        memcpy(out, plain, sizeof plain);
-        return sizeof plain;
+        memcpy(out, plain, bytes);
+        return bytes;
     }
-    for (size_t i = 0; i < sizeof plain; i++) {
+    for (size_t i = 0; i < bytes; i++) {
         if (!plain[i]) out[length++] = 0xF0;
         for (int bit = 0; plain[i] && bit < 8; bit++) out[length++] = plain[i] >> bit & 1 ? 0xFF : 0x00;
     }
     return length;
+}
+
+static inline size_t contactfpga_request(uint32_t number, bool hello, bool pulsed, uint8_t *out) {
+    if (!contactfpga_may_number(number)) return 0;
+    return contactfpga__sealed(number, 3, (uint8_t)(CONTACTFPGA__KIND_REQUEST << 4 | hello), pulsed, out);
+}
+
+static inline size_t contactfpga_command(
+    uint32_t number, uint8_t what, uint32_t value, bool hello, bool pulsed, uint8_t *out) {
+    if (!contactfpga_may_number(number) || what > 0x7F || value >> 21) return 0;
+    uint64_t word = number | (uint64_t)what << 21 | (uint64_t)value << 28;
+    return contactfpga__sealed(word, 7, (uint8_t)(CONTACTFPGA__KIND_COMMAND << 4 | hello), pulsed, out);
+}
+
+static inline bool contactfpga_unit_value(
+    const contactfpga_hello *hello, uint8_t what, uint8_t place, uint32_t steps, uint32_t *value) {
+    bool sum = what == CONTACTFPGA_SUM_THRESHOLD;
+    uint8_t bits = sum ? hello->sum_bits : hello->unit_bits, shift = bits > 18 ? (uint8_t)(bits - 18) : 0;
+    if (what < CONTACTFPGA_ZERO || what > CONTACTFPGA_SUM_THRESHOLD || place >= (sum ? hello->sums : hello->units)
+        || (bits < 32 && steps >> bits))
+        return false;
+    uint32_t kept = steps >> shift;
+    if (steps && !kept && what != CONTACTFPGA_ZERO) kept = 1; /* rounded down, but a threshold stays one */
+    *value = kept << 3 | place;
+    return true;
 }
 
 #ifdef __cplusplus

@@ -19,6 +19,17 @@ static void show_hello(const contactfpga_hello *hello) {
         hello->sent, hello->epoch, hello->heard, hello->stuck, hello->name);
 }
 
+static void show_units(const contactfpga_hello *hello) {
+    printf("units %u %u %u %u %u %" PRIu32 "\n", hello->units, hello->unit_bits, hello->sums, hello->sum_bits,
+        hello->spacing_clocks, hello->sweep_clocks);
+}
+
+static void show_sweep(const contactfpga_sweep *sweep) {
+    printf("sweep %" PRId64 " %u %u %u %u", sweep->time_us, sweep->sequence, sweep->over, sweep->armed, sweep->saturated);
+    for (uint8_t unit = 0; unit < reader.hello.units; unit++) printf(" %" PRIu32, sweep->readings[unit]);
+    printf("\n");
+}
+
 static void show_frame(const contactfpga_frame *frame) {
     contactfpga_zone zone;
     printf("frame %" PRIu64 " %u %u %u %u %u %" PRIu32, frame->time_us, frame->sequence, frame->flags, frame->heard,
@@ -51,6 +62,8 @@ int main(void) {
     while ((byte = getchar()) != EOF) {
         contactfpga_event event = contactfpga_push(&reader, (uint8_t)byte);
         if (event == CONTACTFPGA_HELLO) show_hello(&reader.hello);
+        if (event == CONTACTFPGA_HELLO && reader.hello.units) show_units(&reader.hello);
+        if (event == CONTACTFPGA_SWEEP) show_sweep(&reader.sweep);
         if (event == CONTACTFPGA_FRAME) show_frame(&reader.frame);
         if (event == CONTACTFPGA_FAULTS) show_faults(&reader.hello);
     }
@@ -60,6 +73,8 @@ int main(void) {
     printf(" framing=%" PRIu32 " crc=%" PRIu32 " length=%" PRIu32 " kind=%" PRIu32 " content=%" PRIu32 " noise=%" PRIu32,
         stats->damaged[CONTACTFPGA_FRAMING], stats->damaged[CONTACTFPGA_CRC], stats->damaged[CONTACTFPGA_LENGTH],
         stats->damaged[CONTACTFPGA_KIND], stats->damaged[CONTACTFPGA_CONTENT], stats->damaged[CONTACTFPGA_NOISE]);
+    printf(" sweeps=%" PRIu32 " sweeps_lost=%" PRIu32 " sweeps_unexplained=%" PRIu32, stats->sweeps, stats->sweeps_lost,
+        stats->sweeps_unexplained);
     printf(" resynchronized=%" PRIu32 " hellos=%" PRIu32 " fault_reports=%" PRIu32 " before_hello=%" PRIu32
            " unknown_kinds=%" PRIu32,
         stats->resynchronized, stats->hellos, stats->fault_reports, stats->before_hello, stats->unknown_kinds);

@@ -42,7 +42,7 @@ def guard(board: contactfpga.Board, step: Callable[[], None]) -> Stop:
                 zones = board.latest(left_s)
             except contactfpga.ReadTimeout:
                 break
-            heard_s = board.clock() if zones.host_time_s is None else zones.host_time_s
+            heard_s = board.clock() if zones.arrived_s is None else zones.arrived_s
             if reason := why_stop(zones):
                 return Stop(reason, board.clock(), zones)
         if board.clock() - heard_s > SILENCE_S:

@@ -1,8 +1,8 @@
 """The whole chain for one Skin; wiring only."""
 
-from typing import Any
+from typing import Any, TypeVar
 
-from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.hdl import Module, Mux, ResetInserter, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -25,6 +25,8 @@ from contactfpga_hdl.scan.sample_at import moves_sample
 from contactfpga_hdl.units.ports import unit_pins
 from contactfpga_hdl.units.units import Units
 
+_Stage = TypeVar("_Stage", bound=wiring.Component)
+
 
 class Top(wiring.Component):
     """A Skin's gateware between the pins of the sheet and those of the host.
@@ -41,6 +43,10 @@ class Top(wiring.Component):
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
     the records, and bytes.
 
+    Where the scan finds that a register of it turned by itself, all begins again within two clocks but for what sends
+    bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin ``contact`` is high
+    until a frame after that is packed.
+
     A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
     """
 
@@ -48,6 +54,7 @@ class Top(wiring.Component):
         self.skin = skin
         self.probes = probes
         self.copy = copy
+        self._restarts = Signal(name="restarts")
         self.derived = derived = Derived(skin)
         ports = {
             **row_pins(skin),
@@ -79,15 +86,16 @@ class Top(wiring.Component):
             return self._compared()
         m = Module()
         bit_clocks = self.derived.bit_clocks
-        m.submodules.scan = scan = self.derived.scan.load_gateware()(self.skin)
+        scan = self._put(m, "scan", self.derived.scan.load_gateware()(self.skin))
         rows = self._debounced(m, scan)
         items, summary = self._zones(m, rows) if self.derived.report.zones else self._bitmap(m, rows)
-        m.submodules.packer = packer = Packer(self.skin, offset_bits(self.skin))
-        m.submodules.link = link = Link(self.skin)
+        packer = self._put(m, "packer", Packer(self.skin, offset_bits(self.skin)))
+        link = self._put(m, "link", Link(self.skin))
         m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
         receiver = PulseReceiver(bit_clocks) if self.derived.pulsed else Receiver(bit_clocks)
-        m.submodules.receiver = receiver
-        m.submodules.request = request = RequestReader(commands=bool(self.derived.commands))
+        self._put(m, "receiver", receiver)
+        request = self._put(m, "request", RequestReader(commands=bool(self.derived.commands)))
+        m.d.sync += self._restarts.eq(scan.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
         wiring.connect(m, link.bytes, transmitter.bytes)
@@ -126,8 +134,14 @@ class Top(wiring.Component):
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
+    def _put(self, m: Module, name: str, stage: _Stage) -> _Stage:
+        """Add a stage that begins again when a register is found wrong. The transmitter is none of them, so that the
+        byte on the line is whole and a hello follows it."""
+        m.submodules[name] = stage if self.skin.dual else ResetInserter(self._restarts)(stage)
+        return stage
+
     def _units(self, m: Module, request: RequestReader, link: Link) -> Units:
-        m.submodules.units = units = Units(self.skin)
+        units = self._put(m, "units", Units(self.skin))
         connect_pins(m, units.pins, self)
         wiring.connect(m, units.packet, link.units)
         m.d.comb += [units.command.eq(request.command), units.what.eq(request.what), units.value.eq(request.value)]
@@ -140,13 +154,19 @@ class Top(wiring.Component):
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
         if self.skin.fail_safe:
             # Both may change at once: from a register without a glitch.
-            m.d.sync += self.contact.eq(scan.contact | over | fault | unwatched)
+            m.d.sync += self.contact.eq(scan.contact | over | fault | unwatched | self._blind(m, packer))
         else:
             m.d.comb += self.contact.eq(scan.contact | over)
         if self.skin.alive:
             m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
             watched = scan.watched if self.derived.scan.waits else 0
             m.d.comb += [alive.well.eq(_packed(packer) | watched), alive.fault.eq(fault), self.alive.eq(alive.pin)]
+
+    def _blind(self, m: Module, packer: Packer) -> Value:
+        """From a restart until a whole scan after it."""
+        blind = Signal()
+        m.d.sync += blind.eq(self._restarts | blind & ~_packed(packer))
+        return blind
 
     def _compared(self) -> Module:
         m = Module()
@@ -162,7 +182,7 @@ class Top(wiring.Component):
         even = self.derived.scan.even
         chosen = debounces.find(self.skin.debounce)
         make = chosen.load_gateware() if even else chosen.load_timed_gateware()
-        m.submodules.debounce = debounce = make(self.skin)
+        debounce = self._put(m, "debounce", make(self.skin))
         wiring.connect(m, scan.rows, debounce.raw)
         if not even:
             m.d.comb += [debounce.alone.eq(scan.alone), debounce.now.eq(scan.sampled), scan.busy.eq(debounce.busy)]
@@ -181,9 +201,9 @@ class Top(wiring.Component):
 
     def _zones(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's zones, and its summary."""
-        m.submodules.label = label = self.derived.labeller.load_gateware()(self.skin)
-        m.submodules.audit = audit = Audit(self.skin)
-        m.submodules.backlog = backlog = Backlog(self.skin)
+        label = self._put(m, "label", self.derived.labeller.load_gateware()(self.skin))
+        audit = self._put(m, "audit", Audit(self.skin))
+        backlog = self._put(m, "backlog", Backlog(self.skin))
         self._hand_over(m, rows, label.rows, audit.free)
         wiring.connect(m, label.records, audit.records)
         wiring.connect(m, audit.items, backlog.passed)
@@ -195,7 +215,7 @@ class Top(wiring.Component):
         return items, audit.summary
 
     def _divided(self, m: Module, backlog: Backlog) -> stream.Interface:
-        m.submodules.divide = divide = Divider(self.skin)
+        divide = self._put(m, "divide", Divider(self.skin))
         wiring.connect(m, backlog.waiting, divide.records)
         if self.probes:
             item = divide.items.payload
@@ -204,8 +224,8 @@ class Top(wiring.Component):
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's rows as they are, and its summary."""
-        m.submodules.bitmap = bitmap = Bitmap(self.skin)
-        m.submodules.backlog = backlog = Backlog(self.skin)
+        bitmap = self._put(m, "bitmap", Bitmap(self.skin))
+        backlog = self._put(m, "backlog", Backlog(self.skin))
         self._hand_over(m, rows, bitmap.rows, bitmap.free)
         wiring.connect(m, bitmap.items, backlog.passed)
         if self.probes:

@@ -12,18 +12,26 @@ from contactfpga import __version__
 from contactfpga.commands import (
     arm,
     board,
+    body,
     build,
     chart,
     cover,
     doctor,
+    export,
     failures,
     fit,
     flash,
     flips,
     haptics,
     latency,
+    plot,
+    record,
+    recover,
     replay,
+    ros,
     settle,
+    surface,
+    view,
     wire,
     zones,
 )
@@ -51,6 +59,8 @@ class Command(Protocol):
 
 COMMANDS: dict[str, Command] = {
     "zones": zones,
+    "body": body,
+    "view": view,
     "wire": wire,
     "board": board,
     "doctor": doctor,
@@ -58,7 +68,13 @@ COMMANDS: dict[str, Command] = {
     "flash": flash,
     "replay": replay,
     "latency": latency,
+    "record": record,
+    "recover": recover,
+    "export": export,
+    "ros": ros,
+    "plot": plot,
     "settle": settle,
+    "surface": surface,
     "cover": cover,
     "haptics": haptics,
     "chart": chart,
@@ -76,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
-    args = parser.parse_args(arguments)
+    args = parser.parse_args(_with_usual_topic(sys.argv[1:] if arguments is None else list(arguments)))
     if args.command is None:
         parser.print_help(sys.stderr)
         return 2
@@ -92,6 +108,13 @@ def _run(arguments: Sequence[str] | None) -> int:
         return interrupt.failed(MissingExtra(error.what, command.EXTRA) if command.EXTRA else error)
     except ValueError as error:
         return interrupt.failed(error)
+
+
+def _with_usual_topic(arguments: list[str]) -> list[str]:
+    """`contactfpga body ROBOT.toml` is short for a topic of that command."""
+    if arguments[:1] == ["body"] and arguments[1:2] not in ([], ["-h"], ["--help"], *([name] for name in body.TOPICS)):
+        return ["body", body.USUAL_TOPIC, *arguments[1:]]
+    return arguments
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:

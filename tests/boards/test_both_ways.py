@@ -78,6 +78,15 @@ def test_lines_of_an_unpacked_bitstream():
     assert text.count("1'bz") == 1
 
 
+def test_a_port_of_an_unpacked_bitstream_with_a_line_that_is_never_read():
+    chip = ICEBOX.replace(r"inout [1:0] \rows", r"output [1:0] \rows")
+    chip = chip.replace(r"tran(\rows_0__io [0], \rows_0__io[0] );", r"assign \rows_0__io [0] = \rows_0__io[0] ;")
+    text = both_ways.of_icebox(chip, SKIN)
+    assert r"input [1:0] \rows_0__io , output [1:0] rows_0__o" in text
+    assert r"assign \rows_0__io[0]  = \rows_0__io [0];" in text, "what is read comes from outside"
+    assert "assign rows_0__o[0] = n6;" in text
+
+
 def test_lines_of_a_synthesized_netlist():
     text = flat(both_ways.of_ecp5(ECP5, SKIN))
     assert (
@@ -110,9 +119,19 @@ def test_a_column_that_is_driven_to_the_wrong_level_is_not_driven_right(diodes, 
     assert f"assign columns_drive = columns_oe {driven};" in both_ways.wrapper(SKIN.replace(diodes=diodes))[1]
 
 
+def test_columns_that_are_driven_both_ways_have_the_level_of_the_first_one_and_the_guard_column_the_other():
+    skin = SKIN.replace(columns=3, self_test=True)
+    text = both_ways.wrapper(skin)[1]
+    assert "assign columns_level = columns_o[0];" in text
+    assert "assign columns_drive = columns_oe & ~(columns_o ^ {3{columns_level}});" in text
+    text = both_ways.wrapper(skin.replace(guard=True))[1]
+    assert "assign columns_drive = columns_oe & ~(columns_o ^ {~columns_level, {3{columns_level}}});" in text
+
+
 # ---- whole boards
 
-BOARD, SHEET = BOARDS["ulx3s-12f"], RUNS[-1][1].replace(rows=3, columns=4)
+BOARD = BOARDS["ulx3s-12f"]
+SHEET = next(skin for name, skin in RUNS if skin.scan == "reversal" and name == BOARD.name).replace(rows=3, columns=4)
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +144,21 @@ def test_the_synthesized_netlist_does_what_the_golden_model_says(synthesized, re
     out = replay(SHEET, model_of(SHEET, synthesized), stimulus(SHEET, 1500, []))
     assert out.changes > 3000
     record_property("cases", out.frames)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("fields", [{"guard": True}, {"self_test": True}], ids=["guard", "self_test"])
+def test_columns_that_are_driven_both_ways_do_what_the_golden_model_says(fields, tmp_path, record_property):
+    skin = SHEET.replace(**fields)
+    whole = extract.synthesized(BOARD, skin, tmp_path)
+    out = replay(skin, model_of(skin, whole), stimulus(skin, 600, []))
+    assert out.changes > 1000
+    record_property("cases", out.frames)
+    inverted, count = re.subn(r"assign columns_level = ", "assign columns_level = ~", whole.files["top.v"])
+    assert count == 1
+    broken = native.Netlist(whole.files | {"top.v": inverted}, whole.read)
+    with pytest.raises((Mismatch, Contention)):
+        replay(skin, model_of(skin, broken), stimulus(skin, 200, []))
 
 
 @pytest.mark.campaign

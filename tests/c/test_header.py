@@ -1,6 +1,6 @@
 """The C header reads packets as the Python driver does, to the last counter, from whole and from corrupted streams."""
 
-import functools
+import dataclasses
 import itertools
 import random
 import shutil
@@ -9,28 +9,22 @@ from pathlib import Path
 
 import c_vectors
 import pytest
+from c_compilers import COMPILERS, FOLDER
 from frames import moments
 from model_board import ModelBoard
 from sample import sample
-from wire import digits, last_byte, old_frame, old_hello, request
+from wire import digits, last_byte, old_frame, old_hello
 
 from contactfpga import Skin
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin.widths import LONGEST_PACKET
 from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
-from contactfpga.wire.protocol import FLAGS, encode_request, may_number
+from contactfpga.wire.protocol import FLAGS, may_number
+from contactfpga.wire.units import Sweep
+from contactfpga.zones.units import UnitSamples
 from contactfpga_sim.golden.uart import pulsed
 
-FOLDER = Path(__file__).parents[2] / "c"
-WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-O1"]
-SANITIZED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-COMPILERS = {
-    "gcc": ["gcc", "-std=c99", *WARNINGS, *SANITIZED],
-    "clang": ["clang", "-std=c99", *WARNINGS],
-    "g++": ["g++", "-x", "c++", "-std=c++11", *WARNINGS],
-    "clang++": ["clang++", "-x", "c++", "-std=c++11", *WARNINGS],
-}
 SKINS = [
     Skin(),
     Skin(rows=1, columns=1, connectivity=4),
@@ -42,6 +36,7 @@ SKINS = [
     Skin(rows=63, columns=64, settle_us=12.0, guard=True),
     Skin(rows=6, columns=7, connectivity=4, surface="cylinder", radius_mm=9.0, closed=True),
     Skin(rows=6, columns=5, guard=True, self_test=True, scan="reversal", precharge_us=0.25),
+    Skin(rows=5, columns=4, units=3),
 ]
 
 
@@ -71,10 +66,14 @@ def by_python(data: bytes) -> list[str]:
                 lines.append(frame_line(event))
             elif isinstance(event, Faults):
                 lines.append(faults_line(event))
+            elif isinstance(event, UnitSamples):
+                lines.append(sweep_line(event, talk.units.history.last))
             elif isinstance(event, SelfTestSlot):
                 pass  # the header has no use for these
             elif isinstance(event, Hello) or talk.hello is not None:  # that of another Skin comes as an error
                 lines.append(hello_line(talk.hello))
+                if talk.hello.units is not None:
+                    lines.append(" ".join(map(str, ("units", *dataclasses.astuple(talk.hello.units)))))
     stats = talk.stats.to_dict()
     stats |= {reason: stats["damaged"].get(reason, 0) for reason in REASONS}
     lines = "\n".join(lines).split("\n") if lines else []  # a name may hold anything
@@ -83,7 +82,8 @@ def by_python(data: bytes) -> list[str]:
 
 REASONS = ("framing", "crc", "length", "kind", "content", "noise")
 COUNTED = (
-    *("frames", "lost", "unexplained", "overwritten", *REASONS, "resynchronized", "hellos", "fault_reports"),
+    *("frames", "lost", "unexplained", "overwritten", *REASONS),
+    *("sweeps", "sweeps_lost", "sweeps_unexplained", "resynchronized", "hellos", "fault_reports"),
     *("before_hello", "unknown_kinds", "foreign_version", "skin_changes", "restarts", "bytes"),
 )
 
@@ -109,6 +109,12 @@ def hello_line(hello: Hello) -> str:
         f"{hello.clock_hz} {hello.baud} {hello.sent} {hello.epoch} {hello.heard} {hello.stuck} "
         + hello.name.split("\0")[0]
     )
+
+
+def sweep_line(samples: UnitSamples, sweep: Sweep) -> str:
+    saturated = sum(1 << unit for unit, found in enumerate(samples.saturated) if found)
+    facts = samples.time_us, sweep.sequence, int(sweep.over), int(sweep.armed), saturated
+    return " ".join(map(str, ("sweep", *facts, *map(int, samples.readings))))
 
 
 def faults_line(faults: Faults) -> str:
@@ -153,6 +159,7 @@ class History:
         self.rng = random.Random(seed)
         self.skin = self.rng.choice(SKINS)
         self.board = ModelBoard(self.skin)
+        self.sweeps = 0
         self.numbers = itertools.cycle(number for number in range(129 * 128 + 1, 129 * 128 + 900) if may_number(number))
 
     def packet(self) -> bytes:
@@ -182,6 +189,8 @@ class History:
             return self.odd_hello()
         if kind < 0.215:
             return board.wire.seal(board.wire.trailer() + last_byte(rng.choice([5, 6, 7])))
+        if kind < 0.45 and self.skin.units:
+            return self.sweep()
         if kind < 0.30 and board.wire.known.fault_bits:
             return self.report()
         if kind < 0.22:
@@ -194,6 +203,22 @@ class History:
             options["zones"] = rng.randrange(self.skin.max_zones() + 1)
             options["flags"] = ["overflow"] if rng.random() < 0.5 else []
         return board.frame(**options)
+
+    def sweep(self) -> bytes:
+        """Of the pressure units; some skip numbers, go back in time, or are none of this board."""
+        rng, board = self.rng, self.board
+        self.sweeps += rng.choice([1, 1, 1, 2, 7])
+        time_us = board.time_us + rng.choice([-300, 10, 40, 90, 1 << 21])
+        readings = [rng.choice([0, 1, 2047, 4094, 4095, rng.randrange(4096)]) for _ in range(self.skin.units)]
+        if rng.random() < 0.1:
+            change = rng.randrange(3)
+            if change == 0:
+                readings = readings[1:]
+            elif change == 1:
+                readings[0] = 4096 + rng.randrange(4096)
+            else:
+                return board.wire.seal(bytes(rng.randrange(1, 256) for _ in range(11)) + last_byte(8))
+        return board.wire.sweep(readings, time_us, self.sweeps, rng.randrange(4))
 
     def report(self) -> bytes:
         """Of lines, or a slot of a self-test; some are none of this sheet."""
@@ -282,51 +307,14 @@ def test_the_histories_hold_all_that_is_counted():
     assert seen == set(COUNTED)
 
 
-def test_the_pages_example_compiles(tmp_path):
+def test_the_pages_examples_compile(tmp_path):
     page = (FOLDER.parent / "docs" / "c.md").read_text(encoding="utf-8")
-    example = page.split("```c\n")[1].split("```")[0]
-    (tmp_path / "example.c").write_text(example)
-    command = [*COMPILERS["gcc"], "-Wno-unused-but-set-variable", f"-I{FOLDER}", "-c", "-o", tmp_path / "example.o"]
-    subprocess.run([*command, tmp_path / "example.c"], check=True, timeout=60)
-
-
-REQUESTS = r"""
-#include <stdio.h>
-#include "contactfpga.h"
-int main(void) {
-    uint8_t out[CONTACTFPGA_PULSED_REQUEST_BYTES];
-    unsigned long number;
-    int hello, pulsed;
-    while (scanf("%lu %d %d", &number, &hello, &pulsed) == 3) {
-        size_t length = contactfpga_request((uint32_t)number, hello, pulsed, out);
-        for (size_t i = 0; i < length; i++) printf("%02x", out[i]);
-        printf("\n");
-    }
-    return 0;
-}
-"""
-
-
-@functools.cache
-def asked() -> list[tuple[int, bool, bool]]:
-    rng = random.Random(3)
-    numbers = [0, 1, 129 * 128 + 1, 2**21 - 1, 2**21, 2**32 - 1, *(rng.randrange(2**21) for _ in range(300))]
-    return [(number, rng.random() < 0.5, rng.random() < 0.5) for number in numbers]
-
-
-def test_requests_are_those_of_the_golden_model(tmp_path):
-    (tmp_path / "ask.c").write_text(REQUESTS)
-    subprocess.run(
-        [*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "ask", tmp_path / "ask.c"], check=True, timeout=60
-    )
-    lines = "".join(f"{number} {hello:d} {pulsed:d}\n" for number, hello, pulsed in asked())
-    done = subprocess.run([tmp_path / "ask"], input=lines, capture_output=True, text=True, check=True, timeout=60)
-    for (number, hello, as_pulses), line in zip(asked(), done.stdout.splitlines(), strict=True):
-        if not may_number(number):
-            assert line == ""
-            continue
-        assert bytes.fromhex(line) == request(number, hello, 2 if as_pulses else 8)
-        assert bytes.fromhex(line) == encode_request(number, hello, as_pulses)
+    first, *more = page.split("```c\n")[1:]
+    assert more
+    for example in (first, *more):
+        (tmp_path / "example.c").write_text(example.split("```")[0])
+        command = [*COMPILERS["gcc"], "-Wno-unused-but-set-variable", f"-I{FOLDER}", "-c", "-o", tmp_path / "example.o"]
+        subprocess.run([*command, tmp_path / "example.c"], check=True, timeout=60)
 
 
 def test_a_smaller_reader_refuses_what_is_too_long_and_reads_the_rest(tmp_path):
@@ -423,7 +411,7 @@ def test_vectors_are_those_of_the_golden_encoder():
 
 
 def test_vectors_by_c_and_by_python(decoder):
-    streams = c_vectors.text().split("\n# ")[2:]
+    *streams, _ = c_vectors.text().split("\n# ")[2:]
     assert len(streams) == len(c_vectors.SKINS)
     for stream in streams:
         lines = stream.splitlines()[1:]

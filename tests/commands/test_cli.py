@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fake_board import FakeBoard, background, wait_until
+from sample import sample
 
 import contactfpga
 from contactfpga import cli, commands
@@ -471,25 +472,25 @@ def test_bad_skin_file_is_named(tmp_path, run):
     assert errors == "contactfpga: rows is 65; it must lie between 1 and 64\n"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "module", "extra"),
-    [
-        (["zones", "--once", "sim://"], "rich.console", "cli"),
-        (["wire", "sim://"], "rich.console", "cli"),
-        (["board"], "contactfpga_sim.board.virtual", "sim"),
-        (["replay", "x.npy"], "contactfpga_sim.board.replay", "sim"),
-        (["zones", "--json", "sim://"], "contactfpga_sim.board.virtual", "sim"),
-        (["build", "icestick"], "amaranth.build", "boards"),
-        (["build", "icestick"], "amaranth_boards.icestick", "boards"),
-        (["chart"], "scipy.optimize", "chart"),
-        (["fit", "bumper"], "rich.console", "chart"),
-        (["fit", "bumper"], "scipy.optimize", "chart"),
-        (["board"], "contactfpga_sim.board.pty_board", "sim"),
-        (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
-        (["arm"], "matplotlib.figure", "sim"),
-        (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
-    ],
-)
+EXTRAS = [
+    (["zones", "--once", "sim://"], "rich.console", "cli"),
+    (["board"], "contactfpga_sim.board.virtual", "sim"),
+    (["build", "icestick"], "amaranth.build", "boards"),
+    (["chart"], "scipy.optimize", "chart"),
+    (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+    (["wire", "sim://"], "rich.console", "cli"),
+    (["replay", "x.npy"], "contactfpga_sim.board.replay", "sim"),
+    (["zones", "--json", "sim://"], "contactfpga_sim.board.virtual", "sim"),
+    (["build", "icestick"], "amaranth_boards.icestick", "boards"),
+    (["fit", "bumper"], "rich.console", "chart"),
+    (["fit", "bumper"], "scipy.optimize", "chart"),
+    (["board"], "contactfpga_sim.board.pty_board", "sim"),
+    (["arm"], "matplotlib.figure", "sim"),
+    (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:5]))
 def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):
     code = f"""
 import sys

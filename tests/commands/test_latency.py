@@ -24,6 +24,7 @@ def run(capsys):
     return run
 
 
+@pytest.mark.campaign  # it has a board to compile
 def test_the_fast_example_reaches_its_figures(run):
     """Figures of the issue for 16x16: a fingertip on an untouched sheet, a change while frames are on the wire, and
     frames while it moves; the wire would take 70,588 per second."""

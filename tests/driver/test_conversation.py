@@ -101,17 +101,18 @@ def test_packets_without_a_meaning_are_counted():
     assert line.stats.damaged == {"kind": 1}
 
 
-def test_the_host_time_is_that_of_the_last_byte():
+def test_a_frame_arrives_with_its_last_byte():
     line = Line()
     line.hello()
     data = line.board.frame()
     line.now = 3.0
     assert line.give(data[:5]) == []
     line.now = 4.0
-    assert line.give(data[5:])[0].host_time_s == 4.0
+    assert line.give(data[5:])[0].arrived_s == 4.0
     recording = Line(live=False)
     recording.hello()
-    assert recording.frame()[0].host_time_s is None
+    (zones,) = recording.frame()
+    assert (zones.arrived_s, zones.host_time_s, zones.host_sigma_s) == (None, None, None)
 
 
 # ---- times

@@ -1,14 +1,19 @@
 """The board is found among the ports by its USB ids and its hello."""
 
+import contextlib
 import dataclasses
+import json
+import os
+import select
 from types import SimpleNamespace
 
 import pytest
 from fake_board import FakeBoard
 
 import contactfpga
+from contactfpga import cli
 from contactfpga.boards import BOARDS
-from contactfpga.driver import driver, ports
+from contactfpga.driver import finding, ports
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
@@ -40,10 +45,16 @@ def test_boards_of_one_chip_are_one_candidate_wherever_they_stand_in_the_table()
     assert ports.supported(BOARDS.values()) == ports.SUPPORTED
 
 
-def plug_in(monkeypatch, *devices):
-    found = [ports.Candidate(device, "ULX3S", "A1") for device in devices]
+def plug_in(monkeypatch, *boards):
+    """Boards, or devices that are none."""
+    found = []
+    for index, board in enumerate(boards):
+        if isinstance(board, FakeBoard):
+            board.hello_s = 0.05
+        path = board.path if isinstance(board, FakeBoard) else board
+        found.append(ports.Candidate(path, "ULX3S", f"A{index + 1}"))
     monkeypatch.setattr(ports, "candidates", lambda: found)
-    monkeypatch.setattr(driver, "PROBE_S", 1.0)
+    monkeypatch.setattr(finding, "LISTEN_S", 1.0)
 
 
 def test_no_board_plugged_in(monkeypatch):
@@ -54,24 +65,117 @@ def test_no_board_plugged_in(monkeypatch):
 
 def test_the_one_board_that_answers_is_taken(monkeypatch, board):
     with FakeBoard(SKIN) as silent:
-        silent.answers = False
-        plug_in(monkeypatch, silent.path, board.path)
+        plug_in(monkeypatch, silent, board)
+        silent.hello_s = 0.0
         with contactfpga.open(timeout=LONG) as opened:
             assert opened.port == board.path
         assert contactfpga.read_zones(timeout=LONG)[0].area_cells == 4
+        assert silent.asked == 0
 
 
 def test_several_boards_are_listed(monkeypatch, board):
     with FakeBoard(SKIN) as second:
-        plug_in(monkeypatch, second.path, board.path)
-        with pytest.raises(contactfpga.PortNotFound, match="several boards answer") as caught:
+        plug_in(monkeypatch, second, board)
+        with pytest.raises(contactfpga.PortNotFound, match=r"several boards answer.*usb:A1 or usb:A2") as caught:
             contactfpga.open()
-    for path in (second.path, board.path):
-        assert f"{path} (ULX3S, serial number A1): says hello" in str(caught.value)
+    assert f"{second.path} (ULX3S, serial number A1): says hello" in str(caught.value)
+    assert f"{board.path} (ULX3S, serial number A2): says hello" in str(caught.value)
 
 
 def test_candidates_that_do_not_answer_are_listed(monkeypatch, board):
-    board.answers = False
-    plug_in(monkeypatch, board.path)
+    plug_in(monkeypatch, board)
+    board.hello_s = 0.0
     with pytest.raises(contactfpga.PortNotFound, match=r"no board answers.*not one byte came"):
         contactfpga.open()
+
+
+# ---- boards found by what they are
+
+
+@pytest.fixture
+def three(monkeypatch):
+    """Two boards that differ in their name alone, and one of another Skin."""
+    skins = SKIN.replace(name="LEFT"), SKIN.replace(name="RIGHT"), SKIN.replace(rows=8)
+    with contextlib.ExitStack() as stack:
+        boards = [stack.enter_context(FakeBoard(skin)) for skin in skins]
+        plug_in(monkeypatch, *boards)
+        yield boards
+
+
+def test_a_skin_finds_its_board(three, tmp_path):
+    with contactfpga.open(skin=SKIN.replace(rows=8), timeout=LONG) as opened:
+        assert opened.port == three[2].path
+    file = tmp_path / "bumper.toml"
+    file.write_text("rows = 8\n")
+    with contactfpga.open(skin=file, timeout=LONG) as opened:
+        assert opened.port == three[2].path
+
+
+def test_a_name_tells_identical_boards_apart(three):
+    for name, board in zip(("LEFT", "RIGHT"), three, strict=False):
+        for skin in (None, SKIN):
+            with contactfpga.open(f"name:{name}", skin, timeout=LONG) as opened:
+                assert (opened.port, opened.name) == (board.path, name)
+    with pytest.raises(contactfpga.PortNotFound, match=r"several boards answer with fingerprint .*: name:LEFT or name"):
+        contactfpga.open(skin=SKIN)
+
+
+def test_a_serial_number_opens_its_port_without_a_search(three, monkeypatch):
+    monkeypatch.setattr(finding, "survey", lambda *_: pytest.fail("it searched"))
+    with contactfpga.open("usb:A2", timeout=LONG) as opened:
+        assert opened.name == "RIGHT"
+    with pytest.raises(contactfpga.PortNotFound, match="USB serial number A9 is plugged in; there is A1, A2, A3"):
+        contactfpga.open("usb:A9")
+
+
+def test_what_is_not_there_is_named_with_what_is(three):
+    with pytest.raises(contactfpga.PortNotFound, match=r"no board named 'HEAD' is here.*named 'LEFT'.*named 'RIGHT'"):
+        contactfpga.open("name:HEAD")
+    with pytest.raises(contactfpga.PortNotFound, match=r"no board with fingerprint .* is here"):
+        contactfpga.open(skin=SKIN.replace(rows=9))
+    with pytest.raises(contactfpga.PortNotFound, match=r"no board named 'LEFT' with fingerprint .* is here"):
+        contactfpga.open("name:LEFT", SKIN.replace(rows=8))
+
+
+def test_a_search_writes_to_no_port(three):
+    """Not to boards, and not to whatever else has such a USB chip."""
+    with pytest.raises(contactfpga.PortNotFound):
+        contactfpga.open("name:HEAD")
+    assert [board.asked for board in three] == [0, 0, 0]
+    assert not any(select.select([board._master], [], [], 0)[0] for board in three)
+
+
+def test_a_search_does_not_disturb_an_open_board(three):
+    three[0].slice = 1 << 16
+    with contactfpga.open("name:LEFT", timeout=LONG) as opened:
+        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+            contactfpga.open("name:LEFT")
+        with contactfpga.open("name:RIGHT", timeout=LONG) as other:
+            assert other.name == "RIGHT"
+        three[0].send(b"".join(three[0].frame() for _ in range(50)))
+        assert opened.read(LONG)
+        assert (opened.stats.lost, opened.stats.damaged.total()) == (0, 0)
+
+
+def test_more_ports_are_searched_where_they_are_named(monkeypatch, board):
+    monkeypatch.setenv(ports.MORE, os.pathsep.join([board.path, board.path]))
+    named = [one for one in ports.candidates() if one.device == board.path]
+    assert [str(one) for one in named] == [f"{board.path} (in CONTACTFPGA_PORTS)"]
+
+
+def test_doctor_lists_the_boards(three, capsys, monkeypatch):
+    assert cli.main(["doctor", "--list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert [(one["name"], one["serial_number"], one["rows"]) for one in listed] == [
+        ("LEFT", "A1", 16),
+        ("RIGHT", "A2", 16),
+        ("", "A3", 8),
+    ]
+    assert cli.main(["doctor", "--list"]) == 0
+    assert "named 'LEFT'" in " ".join(capsys.readouterr().out.split())
+    assert cli.main(["doctor", "name:RIGHT", "--seconds", "0.01", "--timeout", "0.5", "--json"]) == 1
+    assert "'RIGHT'" in capsys.readouterr().out
+    for board in three:
+        board.hello_s = 0.0
+    assert cli.main(["doctor", "--list"]) == 1
+    assert "no board said hello" in capsys.readouterr().out

@@ -24,7 +24,8 @@ def test_recording_replays_the_same_frames(board, tmp_path):
         again = list(replay)
         assert replay.stats.lost == 0
     # The first one came before it was known what was on the way when the port was opened.
-    assert [zones.to_dict() for zones in again[1:]] == [zones.to_dict() | {"host_time_s": None} for zones in live]
+    unknown = dict.fromkeys(("arrived_s", "host_time_s", "host_sigma_s"))
+    assert [zones.to_dict() for zones in again[1:]] == [zones.to_dict() | unknown for zones in live]
 
 
 @pytest.mark.parametrize("pace", [1, 2.5])

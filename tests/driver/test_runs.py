@@ -131,7 +131,11 @@ def told(zones):
     arrays = tuple(
         None if one is None else (one.dtype, one.tolist()) for one in (frame.moments, frame.bitmap, frame.barycenters)
     )
-    return repr((dataclasses.replace(frame, moments=None, bitmap=None, barycenters=None), arrays, zones.to_dict()))
+    values = zones.to_dict()
+    if values["host_time_s"] is not None:  # of a run the fit of clocks looks at the last frame alone
+        assert values["host_time_s"] <= values["arrived_s"]
+    del values["host_time_s"], values["host_sigma_s"]
+    return repr((dataclasses.replace(frame, moments=None, bitmap=None, barycenters=None), arrays, values))
 
 
 @pytest.mark.parametrize("name", SKINS)

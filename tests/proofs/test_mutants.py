@@ -12,7 +12,7 @@ from contactfpga_sim.golden import Timeline
 from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
 from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
 
-SAMPLE = 100
+SAMPLE = 60
 
 
 @dataclasses.dataclass

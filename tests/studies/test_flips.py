@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin, cli
+from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native, state
 from contactfpga_sim.board.state import Bit
 from contactfpga_sim.pages import flips_page, writer
@@ -21,16 +22,28 @@ from contactfpga_sim.studies.flips.summary import Design
 SMALL = Skin(rows=4, columns=4, labeller="serial", dual=True, clock_hz=4_000_000, baud=1_000_000)
 
 
-@pytest.fixture(scope="module")
-def followed():
-    """The reference of a small dual board whose flips are followed for less time."""
+PLAIN = SMALL.replace(dual=False, fail_safe=True)
+
+
+def made(skin):
+    """The reference of a small board whose flips are followed for less time."""
     with pytest.MonkeyPatch.context() as patch:
         for module in (reference, flip):
             patch.setattr(module, "AFTER_S", 0.06)
             patch.setattr(module, "LAST_S", 0.14)
-        made = Reference(SMALL)
-        yield made
-        made.board.close()
+        of = Reference(skin)
+        yield of
+        of.board.close()
+
+
+@pytest.fixture(scope="module")
+def followed():
+    yield from made(SMALL)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    yield from made(PLAIN)
 
 
 def place_of(board, name):
@@ -98,6 +111,41 @@ def test_what_is_wrong_in_either_copy_ends_with_a_restart(followed, copy, place)
     found = [flip.follow(followed, Flip(bit, followed.step_clocks * 24 + clock)) for clock in (17, 4321)]
     assert {one.outcome for one in found} <= {"told", "masked"}
     assert "restarts" in {one.kind for one in found}
+
+
+@pytest.mark.parametrize(
+    ("place", "bits"), [("scan.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))]
+)
+def test_a_register_of_the_scan_that_turned_starts_the_board_again(plain, place, bits):
+    """In the middle of a microsecond and of a slot."""
+    clock = plain.step_clocks * 24 + 4 * 3 + 2
+    found = [flip.follow(plain, Flip(Bit(place_of(plain.board, place), 0, bit), clock)) for bit in bits]
+    assert {(one.outcome, one.kind) for one in found} == {("told", "restarts")}
+
+
+@pytest.mark.parametrize("place", ["backlog.queue.put", "backlog.queue.taken"])
+def test_a_queue_that_lost_its_place_is_right_again(plain, place):
+    index, number = place_of(plain.board, place), 24
+    last = number + round(flip.AFTER_S / touches.STEP_S) + 1
+    right = [one.said for step in plain.steps[:last] for one in step.heard]
+    for bit in range(plain.board.places[index].width):
+        _, heard, _ = flip._run(plain, Flip(Bit(index, 0, bit), plain.step_clocks * number + 17))
+        assert [one.said for one in heard][-30:] == right[-30:]
+
+
+def test_contact_is_high_from_a_restart_until_a_frame_after_it():
+    board = state.StateBoard(PLAIN, ("contact", "received"))
+    board.press(np.zeros((4, 4), bool))
+    board.run(10_003)
+    assert board.take("contact")["data"].tolist() in ([], [0])
+    board.flip(Bit(place_of(board, "scan.time"), 0, 20))
+    board.run(10_000)
+    rises, falls = board.take("contact")
+    assert (rises["data"], falls["data"]) == (1, 0)
+    assert rises["cycle"] - 10_003 <= 3
+    scan = Derived(PLAIN).frame_clocks
+    assert scan < falls["cycle"] - rises["cycle"] < 2 * scan + 100
+    board.close()
 
 
 def test_a_bit_that_nothing_reads_changes_nothing(followed):

@@ -7,6 +7,8 @@ import numpy as np
 from wire import Wire
 
 from contactfpga import Skin
+from contactfpga.wire.protocol import may_number
+from contactfpga_sim.golden.request import command, request
 
 PATH = Path(__file__).parents[2] / "c" / "vectors.txt"
 HEAD = """\
@@ -20,13 +22,33 @@ SKINS = {
     "cells on a cylinder": Skin(rows=4, columns=11, report="cells", surface="cylinder", radius_mm=40.0),
     "one cell": Skin(rows=1, columns=1, send="on_change"),
     "faults": Skin(rows=3, columns=4, guard=True),
+    "pressure units": Skin(rows=5, columns=4, units=3),
     "overflow": Skin(rows=8, columns=8, zone_capacity=2, connectivity=4),
     "around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True),
 }
 
 
 def text() -> str:
-    return HEAD + "".join(f"\n# {title}\n{_stream(skin, seed)}" for seed, (title, skin) in enumerate(SKINS.items()))
+    streams = (f"\n# {title}\n{_stream(skin, seed)}" for seed, (title, skin) in enumerate(SKINS.items()))
+    return HEAD + "".join(streams) + _to_the_board()
+
+
+def _to_the_board() -> str:
+    """The numbers of a request, or of a command with what and value; whether it asks for a hello; whether as pulses."""
+    lines, rng = [], random.Random(7)
+    numbers = [129 * 128 + 1, 2**21 - 1, *(number for number in rng.sample(range(2**21), 60) if may_number(number))]
+    for index, number in enumerate(numbers[:12]):
+        hello, pulsed = index % 2, index // 2 % 2
+        bit_clocks = 2 if pulsed else 8
+        if index < 4:
+            lines += [f"request {number} {hello} {pulsed}", f"< {request(number, bool(hello), bit_clocks).hex()}"]
+            continue
+        what, value = 1 + index % 5, rng.getrandbits(21) if index % 5 else 0
+        lines.append(f"command {number} {what} {value} {hello} {pulsed}")
+        lines.append(f"< {command(number, what, value, bool(hello), bit_clocks).hex()}")
+    return (
+        "\n# to the board (<): number, what and value of a command, with a hello, as pulses\n" + "\n".join(lines) + "\n"
+    )
 
 
 def _stream(skin: Skin, seed: int) -> str:
@@ -49,6 +71,13 @@ def _stream(skin: Skin, seed: int) -> str:
         lines.append(_packet(data))
         told = (2**22 + 100 * index, (sent + index) % 256, flags, heard % 8, cells, zones, 0)
         lines.append(" ".join(map(str, ("frame", *told, *words))))
+    if skin.units:
+        lines.insert(2, "units 3 12 0 0 240 720")
+        for index, readings in enumerate([(0, 2048, 4095), (1, 130, 4094)]):
+            time = 2**22 + 250 + 100 * index
+            lines.append(_packet(wire.sweep(readings, time, 254 + index, 3 * index)))
+            said = (time, 254 + index, index, index, 5 if index == 0 else 0)
+            lines.append(" ".join(map(str, ("sweep", *said, *readings))))
     if skin.guard:
         lines += [_packet(wire.report(1 << 1 | 1 << 3 + 2 | 1 << 3 + 4 + 4)), "faults row:1 column:2 stuck:4"]
         lines += [_packet(wire.report(0)), "faults"]

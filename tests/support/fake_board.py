@@ -52,6 +52,7 @@ class FakeBoard(ModelBoard):
         self.answers = True
         self.greets = True
         self.old = False  # speaks protocol 1
+        self.hello_s = 0.0  # says hello so often without being asked; 0: never
         self.stream = b""  # sent over and over, as fast as the port takes it; or a function that makes more
         self.slice = 1 << 16  # bytes written at once
         self.delay_s = 0.0  # from a request to the answer
@@ -102,7 +103,11 @@ class FakeBoard(ModelBoard):
                 data = data[os.write(self._master, data) :]
 
     def _serve(self):
+        due = 0.0
         while not self._stop.is_set():
+            if self.hello_s and time.monotonic() >= due and not self.waiting():
+                due = time.monotonic() + self.hello_s
+                self.send(self.hello())
             ready, _, _ = select.select([self._master], [], [], 0 if self.stream else 0.005)
             if ready:
                 heard = self.hear(os.read(self._master, 100))

@@ -123,6 +123,12 @@ class Wire:
         """A frame with ``report = "cells"``."""
         return self.seal(self.plain_cells(bitmap, **options))
 
+    def sweep(self, readings, time, sequence, flags=0) -> bytes:
+        """What pressure units of 12 bits read; flags: 1, over; 2, armed."""
+        plain = b"".join(digits(reading, 2) for reading in readings)
+        trailer = digits((sequence % 256) << 24 | time % (1 << 24), 5)
+        return self.seal(plain + trailer + bytes([8 << 4 | flags]))
+
     def report(self, word) -> bytes:
         """What the board knows of its lines."""
         return self.seal(digits(word, -(-self.known.fault_bits // 7)) + last_byte(FAULTS))

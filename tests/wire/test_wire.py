@@ -66,11 +66,15 @@ BEHIND = [_frame(name, random.Random(str(index)), 1) for index, (name, _) in enu
 VARIANTS = [(*packet, behind) for packet, behind in zip(PACKETS, BEHIND)]
 QUICK = [VARIANTS[index] for index in (0, 4, 6, 10, len(PACKETS) - 2, len(PACKETS) - 1)]
 """An empty frame, one of two zones, one of the smallest sheet, bitmap rows, a hello, a report of faults."""
-CASES = pytest.mark.parametrize(
-    ("name", "packet", "behind"),
-    sample(VARIANTS, QUICK),
-    ids=[f"{index}-{name}" for index, (name, _) in enumerate(PACKETS)],
-)
+QUICKEST = [QUICK[1], QUICK[-1]]
+
+
+def _cases(quick):
+    ids = [f"{index}-{name}" for index, (name, _) in enumerate(PACKETS)]
+    return pytest.mark.parametrize(("name", "packet", "behind"), sample(VARIANTS, quick), ids=ids)
+
+
+CASES, LONG_CASES = _cases(QUICK), _cases(QUICKEST)
 
 
 class AnyTime:
@@ -215,7 +219,7 @@ ALL_BURSTS = np.arange(1, 1 << 16, 2)
 """Every burst of up to 16 bits that begins with its first bit."""
 
 
-@CASES
+@LONG_CASES
 def test_no_burst_up_to_16_bits(name, packet, behind, record_property):
     """All of them that begin in the packet or its delimiter. What passes the check bytes goes to the driver."""
     stream = packet + behind
@@ -300,7 +304,7 @@ def uart(bits, keep_broken):
     return bytes(out)
 
 
-@CASES
+@LONG_CASES
 @pytest.mark.parametrize("keep_broken", [False, True])
 def test_no_flip_and_no_burst_of_line_bits(name, packet, behind, keep_broken, record_property):
     """Every single flip, start and stop bits among them, and a sample of bursts up to 16 line bits."""

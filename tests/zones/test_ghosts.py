@@ -15,7 +15,7 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import HelloReader
 from contactfpga_hdl.board.build import plan_for
-from contactfpga_sim.cosim import bench_native
+from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, requests
 from contactfpga_sim.sheet.wiring import Wiring
@@ -162,7 +162,7 @@ def test_the_gateware_is_the_golden_models_in_every_clock(record_property):
     frames = np.array([BARE.read(cells)[0] for cells in rng.random((40, 6, 7)) < rng.uniform(0, 0.5, (40, 1, 1))])
     timeline = Timeline.frames(skin, frames, received=requests([5_000], 4))
     cycles = 40 * 6 * 72
-    assert compare(predict(skin, timeline, cycles), bench_native.run(skin, timeline, cycles)) > 1000
+    assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 1000
     record_property("cases", cycles)
 
 

@@ -5,9 +5,10 @@ from amaranth.lib import crc, memory, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import CHECK_BYTES, HELLO_BIT, KEEP_ALIVE_BIT, TIME_BITS, Derived
+from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS, Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.units import plain_bytes
+from contactfpga_hdl.link.due import hello_period, keep_alive
 from contactfpga_hdl.link.faults import Reporter
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
@@ -102,7 +103,10 @@ class Link(wiring.Component):
         hello_due = Signal(init=1)
         self._place_frames(m, wire, regions)
         frames_sent = self._decide(m, wire, regions)
-        self._time_hello(m, wire, hello_due)
+        with m.If(wire.take_hello):
+            m.d.sync += hello_due.eq(0)
+        with m.If(hello_period(m, self) | self.asked):
+            m.d.sync += hello_due.eq(1)
         byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
         reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
         if reporter is not None:
@@ -184,59 +188,9 @@ class Link(wiring.Component):
         with m.If(decide & verdict.send):
             m.d.sync += overwritten.eq(overwritten + drops)
         if self.skin.send == "on_change":
-            self._keep_alive(m)
+            keep_alive(m, self)
             m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | self.due)
         return frames_sent
-
-    def _keep_alive(self, m: Module) -> None:
-        verdict, decide = self.frames.verdict, self.frames.decide
-        if self.derived.scan.waits:
-            most = self.derived.keep_alive_turns
-            turns = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
-            m.d.comb += self.due.eq(turns == most)
-            with m.If(self._turns(m, KEEP_ALIVE_BIT) & ~self.due):
-                m.d.sync += turns.eq(turns + 1)
-            with m.If(decide & verdict.send):
-                m.d.sync += turns.eq(0)
-            return
-        keep_alive = self.derived.keep_alive_frames
-        idle = Signal(range(keep_alive), init=keep_alive - 1)  # since the last frame sent
-        waited, due = self._wait(idle, keep_alive)
-        m.d.comb += self.due.eq(due)
-        with m.If(decide):
-            m.d.sync += idle.eq(Mux(verdict.send, 0, waited))
-
-    def _time_hello(self, m: Module, wire: _Wire, hello_due: Value) -> None:
-        with m.If(wire.take_hello):
-            m.d.sync += hello_due.eq(0)
-        with m.If(self._hello_period(m)):
-            m.d.sync += hello_due.eq(1)
-        with m.If(self.asked):
-            m.d.sync += hello_due.eq(1)
-
-    def _hello_period(self, m: Module) -> Value:
-        """High for a clock when another half second is over."""
-        if self.derived.scan.waits:
-            return self._turns(m, HELLO_BIT)
-        period = self.derived.hello_frames
-        since = Signal(range(max(2, period)))
-        waited, due = self._wait(since, period)
-        with m.If(self.frames.decide):
-            m.d.sync += since.eq(Mux(due, 0, waited))
-        return self.frames.decide & due
-
-    def _turns(self, m: Module, bit: int) -> Value:
-        """High for a clock when another 2^bit us are over."""
-        before = Signal(name=f"time_{bit}")
-        m.d.sync += before.eq(self.time[bit])
-        return self.time[bit] ^ before
-
-    def _wait(self, waited: Value, limit: int) -> tuple[Value, Value]:
-        """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
-        if self.derived.scan.even:
-            return waited + 1, waited == limit - 1
-        longer = waited + self.tag.slots
-        return longer, longer >= limit
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
         """The byte on offer, from the memory or in a hello's state from the counters."""
@@ -309,7 +263,7 @@ class Link(wiring.Component):
 
     def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
         """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
-        m.submodules.odometer = odometer = Odometer(clears=self.skin.dual)
+        m.submodules.odometer = odometer = Odometer()
         place = wire.offset[:STATE_PLACE_BITS]
         high = frames_sent[-1]
         before = Signal()

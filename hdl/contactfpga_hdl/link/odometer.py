@@ -23,11 +23,10 @@ class Odometer(wiring.Component):
     place (in), digit (out): the digit of the place of the clock before, when no carry is under way; 0 at places of
     other counters.
 
-    With ``clears`` it first sets all digits to 0, a clock each: it may be reset, and memory is not.
+    First it sets all digits to 0, a clock each: it may be reset, and memory is not.
     """
 
-    def __init__(self, clears: bool = False):
-        self.clears = clears
+    def __init__(self):
         super().__init__(
             {
                 "sent": In(1),
@@ -51,13 +50,7 @@ class Odometer(wiring.Component):
             write.addr.eq(at),
             write.data.eq(read.data + 1),
         ]
-        with m.FSM(name="carry", init="CLEAR" if self.clears else "REST"):
-            if self.clears:
-                with m.State("CLEAR"):
-                    m.d.comb += [write.en.eq(1), write.data.eq(0)]
-                    m.d.sync += at.eq(at + 1)
-                    with m.If(at == STATE_DIGITS - 1):
-                        m.next = "REST"
+        with m.FSM(name="carry", init="CLEAR"):
             with m.State("REST"):
                 with m.If((sent_waits | epoch_waits) & ~self.hold):
                     m.d.sync += at.eq(Mux(sent_waits, LIVE_DIGITS, _EPOCH))
@@ -72,6 +65,11 @@ class Odometer(wiring.Component):
                 m.next = "REST"
                 with m.If(read.data.all() & (at != _LAST[0]) & (at != _LAST[1])):
                     m.next = "READ"
+            with m.State("CLEAR"):
+                m.d.comb += [write.en.eq(1), write.data.eq(0)]
+                m.d.sync += at.eq(at + 1)
+                with m.If(at == STATE_DIGITS - 1):
+                    m.next = "REST"
         with m.If(self.sent):
             m.d.sync += sent_waits.eq(1)
         with m.If(self.epoch):

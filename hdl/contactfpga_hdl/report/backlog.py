@@ -2,19 +2,19 @@
 
 from amaranth.hdl import Module
 from amaranth.lib import stream, wiring
-from amaranth.lib.fifo import SyncFIFOBuffered
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import passed_layout
+from contactfpga_hdl.util.queue import Queue
 
 
 class Backlog(wiring.Component):
-    """A FIFO for what comes faster than it is divided or packed.
+    """A queue for what comes faster than it is divided or packed.
 
-    Its ``Derived.backlog`` places are enough for any frame, so ``passed`` is always ready. What comes in one clock is
-    offered two clocks later at the earliest.
+    Its places, ``Derived.backlog`` or more, are enough for any frame, so ``passed`` is always ready. What comes in one
+    clock is offered two clocks later at the earliest.
 
     passed (in): zones, or items where nothing is divided, and end marks.
     waiting (out): the same, in the same order.
@@ -27,14 +27,14 @@ class Backlog(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        width = passed_layout(self.derived).size
-        m.submodules.fifo = fifo = SyncFIFOBuffered(width=width, depth=self.derived.backlog)
+        depth = 1 << (self.derived.backlog - 1).bit_length()
+        m.submodules.queue = queue = Queue(passed_layout(self.derived).size, depth)
         m.d.comb += [
-            fifo.w_data.eq(self.passed.payload),
-            fifo.w_en.eq(self.passed.valid),
-            self.passed.ready.eq(fifo.w_rdy),
-            self.waiting.payload.eq(fifo.r_data),
-            self.waiting.valid.eq(fifo.r_rdy),
-            fifo.r_en.eq(self.waiting.ready),
+            queue.items.payload.eq(self.passed.payload),
+            queue.items.valid.eq(self.passed.valid),
+            self.passed.ready.eq(queue.items.ready),
+            self.waiting.payload.eq(queue.waiting.payload),
+            self.waiting.valid.eq(queue.waiting.valid),
+            queue.waiting.ready.eq(self.waiting.ready),
         ]
         return m

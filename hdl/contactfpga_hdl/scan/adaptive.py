@@ -12,6 +12,7 @@ from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.scan.shift import RowChain
 from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
+from contactfpga_hdl.util.upset import upset_count
 
 
 class _Sample:
@@ -71,7 +72,7 @@ class AdaptiveScanner(wiring.Component):
         self._offer_rows(m, seek, sample)
         self._keep_listed(m, seek)
         self._watch_contact(m, seek, sample)
-        self._tag_frame(m, seek)
+        self._tag_frame(m, seek, driver)
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
@@ -176,7 +177,7 @@ class AdaptiveScanner(wiring.Component):
         with m.Elif(seek.ends & ~seen):
             m.d.sync += self.contact.eq(0)
 
-    def _tag_frame(self, m: Module, seek: Seek) -> None:
+    def _tag_frame(self, m: Module, seek: Seek, driver: DirectRows | RowChain) -> None:
         """Time and request at the first strobe, and how many slots there were up to the last."""
         per_us = self.derived.clocks_per_us
         prescaler = Signal(range(max(2, per_us)))
@@ -186,6 +187,8 @@ class AdaptiveScanner(wiring.Component):
         m.d.sync += prescaler.eq(prescaler + 1)
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(driver.upset | upset_count(m, "time", time, prescaler == per_us - 1))
         watch_epoch(m, time, self.epoch)
         with m.If(seek.strobe):
             m.d.sync += slots.eq(slots + 1)

@@ -14,6 +14,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
+from contactfpga_hdl.util.upset import upset
 
 
 def row_pins(skin: Skin) -> dict[str, wiring.Member]:
@@ -105,6 +106,7 @@ def row_driver(skin: Skin) -> wiring.Signature:
     driven already may be shifted again.
     drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
     release (in): high in the last clock in which they are driven.
+    upset (out): see :func:`~contactfpga_hdl.scan.ports.scan_ports`.
 
     Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
     """
@@ -115,6 +117,7 @@ def row_driver(skin: Skin) -> wiring.Signature:
             "shift": In(1),
             "drive": In(1),
             "release": In(1),
+            "upset": Out(1),
         }
     )
 
@@ -159,6 +162,8 @@ class DirectRows(wiring.Component):
         with m.Elif(self.release):
             m.d.sync += selected.eq(0)
         m.d.comb += self.pins.rows.eq(~selected if skin.selects_low else selected)
+        if not skin.dual:
+            m.d.comb += self.upset.eq(upset(m, "selected", selected, self.drive | self.release))
         return m
 
 

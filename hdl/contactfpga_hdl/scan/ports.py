@@ -19,6 +19,8 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
     heard (in): taken over into that tag.
     epoch (out): high for a clock when another 2^22 us are over.
     faults (out): with ``guard`` or ``self_test``, what it knows of faulty lines.
+    upset (out): high for a clock when a register was found to have turned by itself, see
+    :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
     contact (out): high while any switch reads pressed; when it rises and falls is the scan's rule.
     """
     skin = derived.skin
@@ -30,6 +32,7 @@ def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
         "request": In(1),
         "heard": In(HEARD_BITS),
         "epoch": Out(1),
+        "upset": Out(1),
         "contact": Out(1),
         **({"faults": Out(faults)} if faults.size else {}),
         **sample_at_ports(derived),

@@ -12,6 +12,7 @@ from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
 from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
 from contactfpga_hdl.scan.shift import ColumnChain, RowChain
 from contactfpga_hdl.scan.stuck import Stuck, present
+from contactfpga_hdl.util.upset import upset, upset_count
 
 
 class _Slots:
@@ -24,6 +25,7 @@ class _Slots:
         self.first = first_row(derived.skin)
         self.clock = Signal(range(slot), init=(slot - shifting) % slot)
         self.scans = Signal(init=begun)  # in the first slot and after it
+        self.ticks = Signal()  # the clock in us does
         self.following = Signal(lines, init=1 << (self.first + begun) % lines)  # row of the next one, one-hot
 
     @property
@@ -98,6 +100,9 @@ class Scanner(wiring.Component):
         time = self._tag_frame(m, slots, sample)
         if skin.precharge_us:
             self._precharge(m, slots, sample, time)
+        if not skin.dual:
+            found = upset(m, "row", slots.following, driver.drive)
+            m.d.comb += self.upset.eq(driver.upset | found | upset_count(m, "time", time, slots.ticks))
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
@@ -246,10 +251,9 @@ class Scanner(wiring.Component):
         runs = Signal()
         with m.If(slots.is_last):
             m.d.sync += runs.eq(1)
+        m.d.comb += slots.ticks.eq((runs | slots.is_last) & (prescaler == per_us - 1))
         with m.If(runs | slots.is_last):
-            m.d.sync += prescaler.eq(prescaler + 1)
-            with m.If(prescaler == per_us - 1):
-                m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
+            m.d.sync += [prescaler.eq(Mux(slots.ticks, 0, prescaler + 1)), time.eq(time + slots.ticks)]
         watch_epoch(m, time, self.epoch, late=ahead < 0)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         # What comes while columns are shifted in came after their sample: it asks for the next frame. Where the sample

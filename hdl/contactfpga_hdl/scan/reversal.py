@@ -20,13 +20,10 @@ from contactfpga_hdl.scan.reversal_rows import (
     watch_motion,
 )
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
-from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
+from contactfpga_hdl.scan.reversal_turns import take_turns
 from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
 from contactfpga_hdl.scan.stuck import count_columns, present
-from contactfpga_hdl.util.lowest import lowest
-
-SYNCHRONIZED = 3
-"""Clocks that a touch has been there when its row reads touched in a synchronizer's output, that clock included."""
+from contactfpga_hdl.util.upset import upset_count
 
 
 class ReversalScanner(wiring.Component):
@@ -78,7 +75,7 @@ class ReversalScanner(wiring.Component):
         test = SelfTest(self.skin) if self.skin.self_test else None
         self._read_sheet(m, sheet)
         precharge = self._drive_sheet(m, sheet, turn, checks, test)
-        self._take_turns(m, sheet, turn, checks)
+        take_turns(m, self, sheet, turn, checks)
         pressed = self._mask(m, sheet, turn)
         offer_rows = offer_driven_rows if self.derived.skips else offer_all_rows
         offer_rows(m, self, sheet, turn, pressed)
@@ -144,113 +141,6 @@ class ReversalScanner(wiring.Component):
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
         return precharge
 
-    def _take_turns(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks) -> None:
-        """What a state does to the sheet is seen at the pins a clock later."""
-        derived = self.derived
-        project, settle, charge = derived.project_clocks, derived.settle_clocks, derived.release_clocks - 2
-        listened = project + SYNCHRONIZED  # clocks for which columns are driven as a frame begins, and one more
-        charged = min(charge - 1, charge - derived.precharge_clocks + listened)
-        clock = Signal(range(max(listened, settle + 1, charge)))
-        due = Signal(2)  # a sample on its way through the synchronizer
-        touched = sheet.touched.any()
-        m.d.comb += [
-            turn.following.eq(lowest(turn.todo)[: len(turn.y)]),
-            turn.strobe.eq(due[-1]),
-            turn.waits.eq(due.any() | self.rows.valid),
-        ]
-        m.d.sync += [
-            clock.eq(clock + 1),
-            due.eq(due << 1),
-            checks.checked.eq(checks.checked << 1),
-            turn.underway.eq((turn.underway | turn.begins) & ~self.packed),
-            turn.todo.eq(Mux(turn.begins, sheet.touched, turn.todo & ~sheet.selected)),
-            sheet.selected.eq(0),
-            sheet.guard.eq(0),
-        ]
-        moves = moves_sample(derived)
-        moved = SampleAt(m, derived, self.moves, self.clocks, turn.begins) if moves else None
-        with m.FSM(name="turn"):
-            with m.State("LISTEN"):
-                m.d.comb += [
-                    sheet.charges.eq(1),
-                    sheet.listens.eq(1),
-                    turn.settled.eq(clock == listened - 1),
-                ]
-                with m.If(turn.settled):
-                    m.d.sync += clock.eq(clock)
-                    with m.If(turn.rests & touched):  # others may be about to be
-                        m.d.sync += [turn.rests.eq(0), clock.eq(SYNCHRONIZED)]
-                    if self.skin.self_test:
-                        with m.Elif(turn.asked & ~turn.underway):
-                            m.d.comb += turn.lets_go.eq(1)
-                            m.next = "TEST"
-                    if self.skin.guard:
-                        with m.Elif(turn.rests & checks.asked):
-                            checks.begin(m)
-                            m.d.sync += clock.eq(checks.spared)
-                            with m.If(checks.of_rows):
-                                m.next = "ANSWER"
-                            with m.Else():
-                                m.next = "GAP"
-                    with m.Elif(~turn.underway & (~turn.rests | turn.wanted)):
-                        m.d.comb += turn.begins.eq(1)
-                        m.d.sync += turn.rests.eq(~touched)
-                        with m.If(touched):
-                            m.d.sync += clock.eq(charged)
-                            m.next = "CHARGE"
-            with m.State("CHARGE"):
-                m.d.comb += sheet.charges.eq(1)
-                with m.If(clock == charge - 1):
-                    m.d.sync += clock.eq(clock)
-                    with m.If(~turn.waits | checks.selects):
-                        m.next = "GAP"
-            with m.State("GAP"):
-                m.d.sync += clock.eq(0)
-                with m.If(~checks.selects):
-                    m.d.sync += turn.y.eq(turn.following)
-                m.next = "SELECT"
-            with m.State("SELECT"):
-                m.d.sync += [
-                    sheet.selected.eq(Mux(checks.selects, 0, Const(1, self.skin.rows) << turn.y)),
-                    sheet.guard.eq(checks.selects),
-                ]
-                sampled = due[0].eq(~checks.selects)
-                if moved is not None:
-                    with m.If(clock == moved.clock):
-                        m.d.sync += sampled
-                with m.If(clock == settle):
-                    m.d.sync += [sheet.selected.eq(0), sheet.guard.eq(0), clock.eq(0)]
-                    m.d.sync += [*([sampled] if moved is None else []), checks.checked[0].eq(checks.selects)]
-                    with m.If(turn.todo.any()):
-                        m.next = "CHARGE"
-                    with m.Else():
-                        self._end_frame(m, checks)
-            if self.skin.guard:
-                with m.State("ANSWER"):
-                    m.d.comb += [sheet.charges.eq(1), sheet.listens.eq(1), sheet.inverts.eq(1)]
-                    with m.If(clock == checks.clocks):
-                        m.d.sync += [clock.eq(0), checks.checked[0].eq(1)]
-                        m.next = "LISTEN"
-            if self.skin.self_test:
-                with m.State("TEST"):
-                    m.d.comb += [sheet.listens.eq(1), turn.tests.eq(1)]
-                    with m.If(turn.tested):
-                        m.d.sync += clock.eq(0)
-                        m.next = "LISTEN"
-
-    def _end_frame(self, m: Module, checks: Checks) -> None:
-        """The last row was driven, or the guard row."""
-        m.next = "LISTEN"
-        if not self.skin.guard:
-            return
-        m.d.sync += checks.selects.eq(0)
-        with m.If(~checks.selects):
-            checks.begin(m)
-            with m.If(checks.of_rows):
-                m.next = "ANSWER"
-            with m.Else():
-                m.next = "CHARGE"
-
     def _mask(self, m: Module, sheet: Sheet, turn: Turn) -> Value:
         """Columns that read pressed and are not masked in the row."""
         pressed = Signal(self.skin.columns)
@@ -268,6 +158,8 @@ class ReversalScanner(wiring.Component):
         m.d.sync += prescaler.eq(prescaler + 1)
         with m.If(prescaler == per_us - 1):
             m.d.sync += [prescaler.eq(0), self.time.eq(self.time + 1)]
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(upset_count(m, "time", self.time, prescaler == per_us - 1))
         watch_epoch(m, self.time, self.epoch)
         with m.If(turn.begins):
             m.d.sync += [

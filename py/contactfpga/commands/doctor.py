@@ -7,10 +7,11 @@ import json
 from collections.abc import Iterable
 
 from contactfpga.console import flags, numbers, self_testing, terminal, watching
-from contactfpga.driver import driver, health, ports
+from contactfpga.driver import driver, finding, health, ports
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
 
 HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None
@@ -29,11 +30,14 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--self-test", action="store_true", help=tested)
     stuck = "Seconds without a change after which a watch tells a pressed switch (default: 10)."
     parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="T", help=stuck)
+    parser.add_argument("--list", action="store_true", help="Listen to all ports; list the boards and their names.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; status 1 when a fault was found."""
+    if args.list:
+        return _list(args)
     if args.watch and args.self_test:
         raise ContactFPGAError("--watch and --self-test are two commands; give one of them")
     if args.watch:
@@ -64,10 +68,10 @@ class _Report:
         return sum(finding.verdict == "fault" for finding in self._findings)
 
     def add(self, findings: Iterable[Finding]) -> None:
-        for finding in findings:
-            self._findings.append(finding)
+        for one in findings:
+            self._findings.append(one)
             if not self._silent:
-                terminal.say(f"{finding.verdict:5} {finding.sentence}", hang=6)
+                terminal.say(f"{one.verdict:5} {one.sentence}", hang=6)
 
     def to_dict(self) -> dict[str, object]:
         return {
@@ -78,6 +82,34 @@ class _Report:
         }
 
 
+def _list(args: argparse.Namespace) -> int:
+    """All boards; status 1 where there is none."""
+    skin = Skin.load(args.skin) if args.skin else None
+    heard = finding.survey(ports.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
+    boards = [one for one in heard if one.hello is not None]
+    if args.json:
+        print(json.dumps([_listed(one) for one in heard]), flush=True)
+    else:
+        for one in heard:
+            terminal.say(f"{'ok' if one.hello else 'note':5} {one}", hang=6)
+        if not boards:
+            terminal.say("fault no board said hello; is one plugged in, and its bitstream loaded?", hang=6)
+    return 0 if boards else 1
+
+
+def _listed(one: finding.Found) -> dict[str, object]:
+    known = one.hello
+    return {
+        "port": one.candidate.device,
+        "serial_number": one.candidate.serial_number,
+        "name": known and known.name,
+        "fingerprint": known and known.fingerprint.hex(),
+        "rows": known and known.sheet.rows,
+        "columns": known and known.sheet.columns,
+        "problem": one.problem or None,
+    }
+
+
 def _look(args: argparse.Namespace, report: _Report) -> None:
     port = args.port
     if port is None:
@@ -85,10 +117,13 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
         report.add(Finding("note", f"{candidate} may be a board") for candidate in found)
         if len(found) == 1:
             port = found[0].device
-    if port is not None and "://" not in port:
-        report.add(health.rights(port))
-        report.add(health.ftdi(port))
     try:
+        if port is not None and finding.searched(port):
+            skin = Skin.load(args.skin) if args.skin else None
+            port = finding.find(port, skin, args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
+        if port is not None and "://" not in port:
+            report.add(health.rights(port))
+            report.add(health.ftdi(port))
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             report.stats = board.stats
             report.add(health.hello(board))

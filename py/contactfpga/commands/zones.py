@@ -5,7 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from contactfpga.console import flags
+from contactfpga.console import flags, numbers
+from contactfpga.console.forces import Forces
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
+from contactfpga.haptics import WithReadings
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
@@ -22,41 +26,60 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
     )
+    units = "Show the force at each zone too, from the board's pressure units in this TOML file (docs/haptics.md)."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
     record = "Write every byte received to this file; replay://FILE plays it back."
     parser.add_argument("--record", metavar="FILE", help=record)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    if args.friction is not None and args.units is None:
+        raise ContactFPGAError("--friction is of forces; add --units")
     if args.json:
         return _json(args)
     from contactfpga.console import live, views  # rich, which scripts do without
 
-    follow = _Follow(args.tracks)
     with flags.opened(args, args.record) as board:
+        follow = _Follow(args, Forces.of(board, args.units, args.friction))
         return live.show(
-            board, args, lambda zones, room: views.zones_view(board, zones, room, follow.tracks), follow.take
+            board,
+            args,
+            lambda zones, room: views.zones_view(board, zones, room, follow.tracks, follow.forces),
+            follow.take,
+            follow.frames(board),
         )
 
 
 class _Follow:
-    """Follows contacts over all frames, also those that are not shown, where ids are asked for."""
+    """Follows contacts over all frames, also those that are not shown, where ids or forces are asked for."""
 
-    def __init__(self, wanted: bool):
-        self._tracker = Tracker() if wanted else None
+    def __init__(self, args: argparse.Namespace, forces: Forces | None):
+        self._tracker = Tracker() if args.tracks else None
         self.tracks: Tracks | None = None
+        self.forces = forces
+
+    def frames(self, board: Board) -> Board | WithReadings:
+        """The board's frames; with forces, each once its readings are known."""
+        return board if self.forces is None else WithReadings(board)
 
     def take(self, zones: Zones) -> None:
         if self._tracker is not None:
             self.tracks = self._tracker.update(zones)
+        if self.forces is not None:
+            self.forces.take(zones, self.tracks)
 
 
 def _json(args: argparse.Namespace) -> int:
-    follow = _Follow(args.tracks)
     with flags.opened(args, args.record) as board:
-        for zones in board:
+        follow = _Follow(args, Forces.of(board, args.units, args.friction))
+        for zones in follow.frames(board):
             follow.take(zones)
             more = {} if follow.tracks is None else follow.tracks.to_dict()
+            if follow.forces is not None:
+                more |= follow.forces.to_dict()
             print(json.dumps(zones.to_dict() | more), flush=True)
             if args.once:
                 break

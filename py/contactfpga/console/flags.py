@@ -8,7 +8,10 @@ from contactfpga.console import numbers
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
 
-PORT = "Device path, sim:// or replay://FILE (default: the one supported board that is plugged in)."
+PORT = (
+    "Device path, name:NAME or usb:SERIAL of a board, sim:// or replay://FILE (default: the one supported board that "
+    "is plugged in, with --skin the one of that Skin)."
+)
 
 
 def connection(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ import dataclasses
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Protocol
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -48,11 +49,21 @@ def _ignore(zones: Zones) -> None:
     pass
 
 
-def show(board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore) -> int:
-    """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends."""
+class Frames(Protocol):
+    """What gives the frames of a board in order."""
+
+    def next(self, timeout: float = 1.0) -> Zones: ...
+
+
+def show(
+    board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: Frames | None = None
+) -> int:
+    """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends; ``frames``:
+    what gives the board's, by default it does."""
     console = terminal.console()
+    frames = frames or board
     if args.once:
-        zones = board.next(args.timeout)
+        zones = frames.next(args.timeout)
         take(zones)
         console.print(render(zones, room(console, endless=True)))
         return 0
@@ -60,9 +71,9 @@ def show(board: Board, args: argparse.Namespace, render: Render, take: Take = _i
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
             terminal.say(what, sys.stderr, hang=2)
-        return _last(board, args, console, render, take)
+        return _last(board, frames, args, console, render, take)
     with Live(console=console, auto_refresh=False) as live:
-        for found in _paced(board, args.timeout, take, tell_silence=True):
+        for found in _paced(board, frames, args.timeout, take, tell_silence=True):
             shown = str(found) if isinstance(found, Silence) else render(found, room(console))
             live.update(shown, refresh=True)
     return 0
@@ -74,11 +85,11 @@ def room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _last(board: Board, args: argparse.Namespace, console: Console, render: Render, take: Take) -> int:
+def _last(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> int:
     """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
     zones = None
     try:
-        for zones in _paced(board, args.timeout, take):  # noqa: B007
+        for zones in _paced(board, frames, args.timeout, take):  # noqa: B007
             pass
     finally:
         if isinstance(zones, Zones):
@@ -86,7 +97,9 @@ def _last(board: Board, args: argparse.Namespace, console: Console, render: Rend
     return 0
 
 
-def _paced(board: Board, timeout: float, take: Take, tell_silence: bool = False) -> Iterator[Zones | Silence]:
+def _paced(
+    board: Board, frames: Frames, timeout: float, take: Take, tell_silence: bool = False
+) -> Iterator[Zones | Silence]:
     """One frame every REFRESH_US of device time, and the last one of a recording in any case.
 
     With ``tell_silence`` no table stands still: where no frame comes what is yielded says so, until the timeout.
@@ -96,7 +109,7 @@ def _paced(board: Board, timeout: float, take: Take, tell_silence: bool = False)
     skipped = None
     while True:
         try:
-            zones = board.next(wait_s)
+            zones = frames.next(wait_s)
         except ReadTimeout:
             if board.silence.seconds >= timeout:
                 raise

@@ -75,3 +75,5 @@ CELL = number(-1e300, 1e300)
 """A value that cells are compared with."""
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
+DOMAIN = whole(0, 232)
+"""The domains of DDS: beyond, its port numbers end."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from contactfpga.console import drawn_settling, drawn_sheet, terminal
+from contactfpga.console.forces import Forces
 from contactfpga.console.live import Room
 from contactfpga.driver.board import Board
-from contactfpga.errors import ContactFPGAError
+from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.haptics import Contact, Contacts
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.tracking.tracks import Track, Tracks
@@ -33,11 +37,16 @@ NAMED = 12
 """Pressed cells whose places are written out."""
 
 
-def zones_view(board: Board, zones: Zones, room: Room, tracks: Tracks | None = None) -> RenderableType:
-    """The sheet, with the table of its zones beside it or below; with ``tracks``, the ids of their contacts."""
-    below = status(board, zones, room.width)
+def zones_view(
+    board: Board, zones: Zones, room: Room, tracks: Tracks | None = None, forces: Forces | None = None
+) -> RenderableType:
+    """The sheet, with the table of its zones beside it or below; with ``tracks``, the ids of their contacts, with
+    ``forces``, their pushes."""
+    said = () if forces is None else forces.sentences()
+    below = status(board, zones, room.width, said)
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
-    listed = table(zones, left.height, tracks)
+    found = None if forces is None else forces.contacts
+    listed = table(zones, left.height, tracks, found)
     across = listed.__rich_measure__(room.console, room.console.options).maximum
     scale, beside = _layout(zones, left, across)
     drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
@@ -48,7 +57,7 @@ def zones_view(board: Board, zones: Zones, room: Room, tracks: Tracks | None = N
         shown = [both]
     else:
         high = drawn_sheet.size(zones, scale)[1]
-        shown = [_styled(drawing), table(zones, left.without(high).height, tracks)]
+        shown = [_styled(drawing), table(zones, left.without(high).height, tracks, found)]
     return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
@@ -106,7 +115,9 @@ def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
     return drawn_sheet.scales(zones, room.width, room.height)[0], False
 
 
-def table(zones: Zones, lines: int | None = None, tracks: Tracks | None = None) -> Table:
+def table(
+    zones: Zones, lines: int | None = None, tracks: Tracks | None = None, contacts: Contacts | None = None
+) -> Table:
     """The zones, the first of them where there are lines for no more."""
     most = len(zones) if lines is None else max(1, lines - TABLE_LINES)
     left_out = len(zones) - most
@@ -114,13 +125,36 @@ def table(zones: Zones, lines: int | None = None, tracks: Tracks | None = None) 
     caption = f"and {left_out} more" if left_out > 0 else None
     made = Table(title=title, caption=caption)
     ids = {} if tracks is None else {id(track.zone): _names(track) for track in tracks.active}
-    for heading in (*([] if tracks is None else ["id"]), "cells", "mm²", "x mm", "y mm"):
+    pushes = _pushes(zones, contacts)
+    before, after = [] if tracks is None else ["id"], [] if contacts is None else ["N", "from", "to"]
+    for heading in (*before, "cells", "mm²", "x mm", "y mm", *after):
         made.add_column(heading, justify="right", no_wrap=True)
-    for zone in zones[:most]:
+    for zone, push in list(zip(zones, pushes))[:most]:
         place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
         name = [] if tracks is None else [ids.get(id(zone), "-")]
-        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", *place)
+        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", *place, *push)
     return made
+
+
+def _pushes(zones: Zones, contacts: Contacts | None) -> list[tuple[str, ...]]:
+    """Of each zone its push in N, and the least and largest one that friction allows."""
+    if contacts is None:
+        return [()] * len(zones)
+    left, found = iter(contacts), []
+    for zone in zones:
+        one = None if zone.point_mm is None else next(left)
+        low, high = (None, None) if one is None else _interval(one)
+        numbers = (None if one is None else one.normal_n, low, high)
+        found.append(tuple("-" if number is None else f"{number:.2f}" for number in numbers))
+    return found
+
+
+def _interval(contact: Contact) -> tuple[float | None, float | None]:
+    """Unknown where the solver for it is not installed."""
+    try:
+        return contact.interval_n or (None, None)
+    except MissingExtra:
+        return None, None
 
 
 def _names(track: Track) -> str:
@@ -146,14 +180,15 @@ def _styled(drawing: drawn_sheet.Drawing) -> Text:
     return text
 
 
-def status(board: Board, zones: Zones, width: int) -> str:
-    """The lines below a frame: which one it is, and what went wrong so far."""
+def status(board: Board, zones: Zones, width: int, said: Iterable[str] = ()) -> str:
+    """The lines below a frame: which one it is, what went wrong so far, and what else there is to say."""
     stats = board.stats
     parts = [
         f"{board.port}: frame at {zones.time_us / 1e6:.3f} s",
         f"{zones.pressed} cells pressed",
         *sorted(zones.flags - {"fault"}),
         *sorted(zones.faults),
+        *said,
         f"{stats.frames} frames, {stats.lost} lost, {stats.overwritten} overwritten, {stats.damaged.total()} damaged",
     ]
     return terminal.listed("", [part for part in parts if part], width, " · ")

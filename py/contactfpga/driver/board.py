@@ -56,6 +56,11 @@ class Board:
         return self._link.transport.name
 
     @property
+    def live(self) -> bool:
+        """Whether a board is at the other end, which can be asked; else what comes is a recording."""
+        return self._live
+
+    @property
     def hello(self) -> Hello:
         """What the board last said of itself; it does so twice per second."""
         self._link.check_open()

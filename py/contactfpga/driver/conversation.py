@@ -12,6 +12,7 @@ import random
 
 import numpy as np
 
+from contactfpga.driver.clock_fit import ClockFit
 from contactfpga.driver.lines import Lines
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
@@ -28,6 +29,7 @@ from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS
+from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.run import Run, frame_of
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
@@ -74,6 +76,8 @@ class Conversation:
         self._live = live
         self._requests = Requests(rng)
         self._timeline = Timeline(self.stats, live)
+        self._clock = ClockFit() if live else None
+        self._byte_s = 0.0
         self._reader = protocol.HelloReader()
         self._widths: Widths | None = None
         self._rest = b""
@@ -148,7 +152,7 @@ class Conversation:
         while at < len(packets) and self._widths is widths and self._before() == before:
             in_run = follows and not self.lines.fading
             if in_run and table is not None and ends[at] - at >= FEW_IN_RUN:
-                events.append(self._take_run(table, at, ends[at], now))
+                events.append(self._take_run(table, at, ends[at], len(packets[ends[at] - 1]), now))
                 at, follows = ends[at], False
                 continue
             event = self._packet(packets[at], now)
@@ -167,17 +171,33 @@ class Conversation:
         places = np.where(np.append(found, False), len(found), np.arange(len(found) + 1))
         return np.minimum.accumulate(places[::-1])[::-1].tolist(), expected
 
-    def _take_run(self, table: many.Table, start: int, end: int, now: float) -> Run:
+    def _take_run(self, table: many.Table, start: int, end: int, last_bytes: int, now: float) -> Run:
         assert self._widths is not None
         widths = self._widths
         packets, starts = table.packets[start:end], table.starts[start : end + 1]
         last = frame_of(packets[-1].item(), table.records[starts[-2] : starts[-1]], widths.sheet)
         before = self._timeline.before
         times_us = self._timeline.take_run(packets, widths, last, now)
-        self._requests.take_frame(last.heard, now)  # all of them carry the same
+        line = self._heard(last.heard, int(times_us[-1]), last_bytes, now)  # all of them carry the same
         self._passed()
-        arrived, faults = now if self._live else None, self.lines.names(flagged=True)
-        return Run(widths.sheet, packets, starts, table.records, times_us, arrived, before, faults, self.units.history)
+        faults = self.lines.names(flagged=True)
+        return Run(widths.sheet, packets, starts, table.records, times_us, line, before, faults, self.units.history)
+
+    def _heard(self, heard: int, time_us: int, packet_bytes: int, now: float) -> HostLine | None:
+        """A frame whose time is known carries these bits of a request's number: news of requests and clocks."""
+        answered = self._requests.answered
+        self._requests.take_frame(heard, now)
+        if self._clock is None:
+            return None
+        self._clock.arrived(time_us, now, (packet_bytes + 1) * self._byte_s)
+        if self._requests.answered > answered:
+            self._clock.answered(time_us, self._requests.answered_sent_s)
+        return self._clock.line(now)
+
+    def _forget_times(self) -> None:
+        """The board was restarted, or is another one."""
+        if self._clock is not None:
+            self._clock.forget()
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
@@ -215,6 +235,7 @@ class Conversation:
             return None
         self.hello = self.sheet = self._widths = None
         self._timeline = Timeline(self.stats, self._live)
+        self._forget_times()
         return VersionMismatch(
             f"{self.port} speaks protocol version 1, this host version {framing.VERSION}; "
             "load a bitstream and install a contactfpga of the same release"
@@ -241,7 +262,7 @@ class Conversation:
         if self._widths is None:
             self.stats.foreign_skin += 1
             return None
-        return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, now)
+        return self._take_frame(protocol.decode_frame(plain, self._widths), self._widths, len(packet), now)
 
     def _take_lines(self, plain: bytes, hello: Hello) -> Faults | SelfTestSlot | None:
         if is_slot(plain):
@@ -254,14 +275,14 @@ class Conversation:
     def _before(self) -> bytes:
         return protocol.check_prefix(self.hello) if self.hello else b""
 
-    def _take_frame(self, frame: Frame, widths: Widths, now: float) -> Arrival | None:
+    def _take_frame(self, frame: Frame, widths: Widths, packet_bytes: int, now: float) -> Arrival | None:
         before = self._timeline.before
         time_us = self._timeline.take_frame(frame, widths, now)
         if time_us is None:
             return None
-        self._requests.take_frame(frame.heard, now)
+        line = self._heard(frame.heard, time_us, packet_bytes, now)
         faults = self.lines.names("fault" in frame.flags)
-        zones = Zones(frame, widths.sheet, time_us, before, now if self._live else None, faults, self.units.history)
+        zones = Zones(frame, widths.sheet, time_us, before, line, faults, self.units.history)
         return Arrival(zones, self._requests.answered)
 
     def _take_hello(self, hello: Hello, now: float) -> Hello | SkinMismatch:
@@ -273,6 +294,7 @@ class Conversation:
             self.lines.forget()
             self.units.forget()
             self._timeline = Timeline(self.stats, self._live)
+            self._forget_times()
         expected = self._expected
         if expected is not None and hello.fingerprint != expected.fingerprint:
             self.sheet = self._widths = None
@@ -282,10 +304,12 @@ class Conversation:
         if self.stats.restarts > restarts:
             self.lines.forget()
             self.units.forget()
+            self._forget_times()
         self.lines.take_hello(hello)
         self.units.take_hello(hello)
         self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
+        self._byte_s = 10 / hello.baud
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud
         if self.sheet != hello.sheet:
             self.sheet = hello.sheet

@@ -7,18 +7,16 @@ import contextlib
 import threading
 from pathlib import Path
 
-from contactfpga.driver import ports
+from contactfpga.driver import finding, recording
 from contactfpga.driver.board import Board
+from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
-from contactfpga.errors import BoardClosed, ContactFPGAError, PortLost, PortNotFound
+from contactfpga.errors import BoardClosed, PortLost
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
-
-PROBE_S = 0.3
-"""How long a port may take to say hello while the board is searched."""
 
 
 def open(
@@ -26,16 +24,18 @@ def open(
     skin: Skin | str | Path | None = None,
     *,
     baud: int | None = None,
-    record: str | Path | None = None,
+    record: str | Path | Tap | None = None,
     timeout: float = 1.0,
 ) -> Board:
     """Open a board and wait for its hello.
 
-    ``port``: a device path, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own
-    time, else as fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which
-    is closed with the board), or None for the one supported board that is plugged in. ``skin``: the Skin (or its
-    file) the board must be built from; None takes what the board says. ``baud``: bits per second; by default that of
-    ``skin``, or 3,000,000. ``record``: a file that gets every byte received; ``replay://`` reads it.
+    ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB
+    serial number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, else as
+    fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which is closed with
+    the board), or None for the one supported board that is plugged in; with ``skin``, for the one of that Skin.
+    ``skin``: the Skin (or its file) the board must be built from; None takes what the board says. ``baud``: bits per
+    second; by default that of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
+    ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
     ``timeout`` in seconds, for the hello.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
@@ -46,12 +46,15 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
-    if port is None:
-        port = _find(baud)
+    if isinstance(record, str | Path):
+        recording.check(record)
+    if port is None or (isinstance(port, str) and finding.searched(port)):
+        port = finding.find(port, skin, baud)
     transport = connect(port, baud)
     try:
         if record is not None:
-            transport = RecordingTransport(transport, record)
+            tap = FileTap(record, transport.name) if isinstance(record, (str, Path)) else record
+            transport = RecordingTransport(transport, tap)
         board = Board(transport, skin)
     except BaseException:
         transport.close()
@@ -107,26 +110,3 @@ def _close_all() -> None:
     for port in list(_boards):
         with contextlib.suppress(Exception):
             _forget(port)
-
-
-def _find(baud: int) -> str:
-    """The one port that a board answers on."""
-    found = ports.candidates()
-    if not found:
-        known = ", ".join(f"{usb.vid:04x}:{usb.pid:04x} ({usb.boards})" for usb in ports.SUPPORTED)
-        raise PortNotFound(
-            f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
-        )
-    answers: list[str] = []
-    report: list[str] = []
-    for candidate in found:
-        try:
-            open(candidate.device, baud=baud, timeout=PROBE_S).close()
-            answers.append(candidate.device)
-            report.append(f"{candidate}: says hello")
-        except ContactFPGAError as error:
-            report.append(f"{candidate}: {error}")
-    if len(answers) == 1:
-        return answers[0]
-    many = "several boards answer; name one of them" if answers else "no board answers"
-    raise PortNotFound(f"{many}. Candidates: " + "; ".join(report))

@@ -123,7 +123,7 @@ NEXT_STEPS = {
 
 def lines(board: Board, zones: Zones) -> Iterator[Finding]:
     """What the board says of its lines, and how old that is."""
-    if zones.host_time_s is not None:
+    if zones.arrived_s is not None:
         yield Finding("ok", f"the last frame came {1000 * board.silence.seconds:.0f} ms ago")
     if zones.faults == (STUCK,):
         count = f"{board.hello.stuck} columns" if board.hello.stuck else "columns"

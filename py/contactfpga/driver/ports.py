@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import os
 from collections.abc import Iterable
 
 from contactfpga.boards import BOARDS
@@ -47,11 +48,18 @@ class Candidate:
         return f"{visible(self.device)} ({self.boards}{number})"
 
 
+MORE = "CONTACTFPGA_PORTS"
+"""Environment variable with more ports to search, separated as in PATH: those that have no USB ids."""
+
+
 def candidates() -> list[Candidate]:
-    """Ports with the USB ids of supported boards, in the order of their names."""
+    """Ports with the USB ids of supported boards, in the order of their names, and those of :data:`MORE`."""
     from serialx import list_serial_ports
 
-    return choose(list_serial_ports())
+    found = choose(list_serial_ports())
+    there = {one.device for one in found}
+    more = dict.fromkeys(device for device in os.environ.get(MORE, "").split(os.pathsep) if device)
+    return found + [Candidate(device, f"in {MORE}") for device in more if device not in there]
 
 
 def choose(ports: Iterable[object]) -> list[Candidate]:

@@ -88,7 +88,7 @@ class FrameQueue:
     def drop_older(self, moment: float) -> None:
         """Drop a frame that waits alone and came before that moment."""
         item = self._items[0] if self._length == 1 else None
-        if isinstance(item, Zones) and item.host_time_s is not None and item.host_time_s < moment:
+        if isinstance(item, Zones) and item.arrived_s is not None and item.arrived_s < moment:
             self.clear()
 
     def clear(self) -> None:

@@ -2,38 +2,140 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import os
+import re
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
+from urllib.parse import unquote
 
+from contactfpga.driver.mcap_bytes import MAGIC, McapStream
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 
 SCHEME = "replay://"
-PACE = "?pace="
-"""Comes after the path in a name, with how fast it is to be played."""
+_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
+"""Where they begin; a path may have other question marks."""
 
 
-def open_recorded(name: str) -> BinaryIO:
+class Recorded(Protocol):
+    """Recorded bytes."""
+
+    def read(self, count: int, /) -> bytes:
+        """At most ``count``; b"" at the end."""
+
+    def close(self) -> None:
+        """Let the file go."""
+
+
+class Tap(Protocol):
+    """Gets every byte that is read from a port."""
+
+    def take(self, data: bytes, clock_s: float) -> None:
+        """Bytes that came then, on the port's clock; b"" where none came."""
+
+    def close(self) -> None:
+        """No more will come; may be called twice."""
+
+
+class FileTap:
+    """Writes the bytes to a file."""
+
+    def __init__(self, path: str | Path, port: str):
+        self._file = create(path, port)
+
+    def take(self, data: bytes, clock_s: float) -> None:
+        """Append them."""
+        self._file.write(data)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+@dataclasses.dataclass(frozen=True)
+class ReplayAddress:
+    """What ``replay://FILE?pace=1&start=2.5&link=NAME`` asks for."""
+
+    path: Path
+    pace: float | None = None
+    """How many times as fast as it was recorded; None: as fast as it is read."""
+    start_s: float = 0.0
+    """Of an MCAP file: from the hello on that came last before this time since its beginning."""
+    link: str | None = None
+    """Of an MCAP file with several."""
+
+
+def parse(name: str) -> ReplayAddress:
+    """Read an address; raises :class:`PortNotFound` that says what is wrong."""
+    path, *rest = _OPTIONS.split(name.removeprefix(SCHEME), maxsplit=1)
+    found: dict[str, str] = {}
+    for part in rest[0].split("&") if rest else ():
+        key, equals, value = part.partition("=")
+        if not equals or key not in ("pace", "start", "link"):
+            raise PortNotFound(
+                f"{name}: {part!r} is no option; there are ?pace=1, ?start=SECONDS and ?link=NAME, with & between"
+            )
+        if key in found:
+            raise PortNotFound(f"{name}: {key} is given twice")
+        found[key] = value
+    pace = _number(name, "pace", found.get("pace"), "a positive number, 1 for the time of the recording")
+    start = _number(name, "start", found.get("start"), "a number of seconds, 0 or more")
+    if pace == 0:
+        raise PortNotFound(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
+    link = unquote(found["link"]) if "link" in found else None
+    return ReplayAddress(Path(path).expanduser(), pace, start or 0.0, link)
+
+
+def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
+    return value
+
+
+def open_recorded(name: str) -> Recorded:
     """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
     try:
-        return open_regular(_path(name))
+        asked = parse(name)
+        file = open_regular(asked.path)
+        if file.read(len(MAGIC)) == MAGIC:
+            file.close()
+            return McapStream(asked.path, asked.link, asked.start_s)
+        file.seek(0)
     except OSError as error:
         reason = error.strerror or told(error)
         raise PortNotFound(f"{name} cannot be opened: {reason}; is the path right?") from None
     except (RuntimeError, ValueError) as error:  # ~nobody, a path with a zero byte
         raise PortNotFound(f"{name} cannot be opened: {error}") from None
+    if asked.start_s or asked.link is not None:
+        file.close()
+        raise PortNotFound(
+            f"{name}: this file holds bytes alone; start and link are of what `contactfpga record` makes"
+        )
+    return file
+
+
+def check(path: str | Path) -> None:
+    """Refuse a file that cannot be made, before a board is opened or built for it."""
+    place = Path(path)
+    if place.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: it is a folder; name a file")
+    if not place.parent.is_dir():
+        raise ContactFPGAError(f"{path} cannot be written: there is no folder {place.parent}")
 
 
 def create(path: str | Path, port: str) -> BinaryIO:
     """The file that gets every byte from ``port``, empty; never the one that is being replayed."""
     try:
-        if port.startswith(SCHEME) and os.path.exists(path) and os.path.samefile(path, _path(port)):
+        if port.startswith(SCHEME) and os.path.exists(path) and os.path.samefile(path, parse(port).path):
             raise ContactFPGAError(f"{path} is what {port} reads; record to another file")
         return open(path, "wb")
     except OSError as error:
         raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
-
-
-def _path(name: str) -> Path:
-    return Path(name.removeprefix(SCHEME).partition(PACE)[0]).expanduser()

@@ -40,6 +40,8 @@ class Requests:
         """Whether the board reads pulses; None: unknown, so it is sent both, of which it takes one for a request."""
         self.answered = 0
         """All tickets up to this one are answered."""
+        self.answered_sent_s = 0.0
+        """When the request was sent that was answered last."""
         self._rng = rng or random.SystemRandom()
         self._out = bytearray()
         self._stage = _Stage.UNKNOWN
@@ -48,7 +50,7 @@ class Requests:
         self._sent_at = 0.0
         self._number = 0
         self._step = self._seen = 0  # of the numbers last sent and last seen, counted
-        self._stands_for: dict[int, int] = {}  # step: ticket
+        self._stands_for: dict[int, tuple[int, float]] = {}  # step: ticket, and when it was sent
         self._command: Command | None = None
         self._commanding = 0  # its ticket
         self._command_until = 0.0
@@ -117,7 +119,9 @@ class Requests:
                 self._stage, self._in_flight = _Stage.UNKNOWN, False
                 return
             for known in range(self._seen, step + 1):
-                self.answered = max(self.answered, self._stands_for.pop(known, 0))
+                ticket, sent_s = self._stands_for.pop(known, (0, 0.0))
+                if ticket > self.answered:
+                    self.answered, self.answered_sent_s = ticket, sent_s
             self._seen = step
             if self._command is not None and self._commanding <= self.answered:
                 self.end_command()
@@ -136,7 +140,7 @@ class Requests:
         while not protocol.may_number(number % _NUMBERS):
             number += 1
         self._step += 1
-        self._stands_for[self._step] = self._tickets
+        self._stands_for[self._step] = self._tickets, now
         self._in_flight = self._command is not None and now < self._command_until
         self._put(number % _NUMBERS, now, hello, self._command if self._in_flight else None)
 

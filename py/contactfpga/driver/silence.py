@@ -36,7 +36,7 @@ class Silence:
         return f"{self.port}: no data for {self.seconds:.3g} s, {last}; {came} since"
 
 
-def longest_pause_s(hello: Hello, skin: Skin | None) -> float:
+def longest_pause_s(hello: Hello | Skin, skin: Skin | None) -> float:
     """The longest time from a frame's last byte to the next one's, of a board that works: a keep-alive or a scan, and
     a frame on the wire. Of a board whose Skin is not known its scan counts nothing, and its keep-alive the most."""
     wire_s = (Widths(hello.sheet).max_frame_bytes + BETWEEN_BYTES) * 10 / hello.baud

@@ -1,4 +1,4 @@
-"""What `sim://?scene=NAME&skin=FILE&threshold=NUMBER` asks for."""
+"""What `sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE` asks for."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from urllib.parse import unquote
 
 from contactfpga.errors import PortNotFound
 
-OPTIONS = ("scene", "skin", "threshold")
-_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE and &threshold=NUMBER where wanted"
+OPTIONS = ("scene", "skin", "threshold", "units")
+_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER and &units=FILE where wanted"
 _ESCAPES = "a % that is meant is written %25, a & %26"
 
 
@@ -23,6 +23,8 @@ class SimAddress:
     skin: str | None = None
     threshold: float | None = None
     """Above which a recording's numbers count as pressed."""
+    units: str | None = None
+    """File of the pressure units that the scene presses on."""
 
 
 def parse(name: str) -> SimAddress:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import time
-from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import Protocol
 
 from contactfpga.circuit import Circuit, load_checked
 from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
-from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, ReplayEnded
+from contactfpga.driver.replay import ReplayTransport
+from contactfpga.errors import MissingExtra, PortLost, PortNotFound
 from contactfpga.skin import Skin
 
 CHUNK = 65_536
@@ -124,17 +122,8 @@ class SimTransport:
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
-        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER``"""
-        asked = sim_address.parse(name)
-        skin = Skin.load(asked.skin) if asked.skin is not None else None
-        cover = load_cover(asked.skin) if asked.skin is not None else None
-        circuit = load_checked(asked.skin, skin) if asked.skin is not None and skin is not None else None
-        try:
-            return cls(name, _virtual_board(asked, skin, cover, circuit))
-        except ModuleNotFoundError as error:
-            raise MissingExtra(f"sim:// ({error})", "sim") from None
-        except ValueError as error:  # a scene that is not known, or that does not fit the sheet
-            raise PortNotFound(f"{name}: {error}") from None
+        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``"""
+        return cls(name, virtual_board(name))
 
     def read(self, timeout_s: float) -> bytes:
         # Not less than a clock: time that rounds to none would not pass, and the deadline never come.
@@ -150,105 +139,24 @@ class SimTransport:
         self._board.close()
 
 
-class ReplayTransport:
-    """A recorded byte stream, as ``open(port, record=FILE)`` writes it: ``replay://FILE``, as fast as it is read, or
-    ``replay://FILE?pace=1`` in the time in which it was recorded."""
-
-    live = threaded = False
-
-    def __init__(self, name: str):
-        self.name = name
-        pace = name.partition(recording.PACE)[2]
-        self._pace = _pace(name, pace) if pace else None
-        self._file = recording.open_recorded(name)
-
-    def read(self, timeout_s: float) -> bytes:
-        if self._pace is not None:
-            return self._pace.read(self._file, timeout_s)
-        return _more(self._file, 4096, self.name)
-
-    def write(self, data: bytes) -> None:
-        raise ContactFPGAError(f"{self.name} is a recording; it cannot be asked for anything")
-
-    def clock(self) -> float:
-        # A recording has no times of its own, and nothing in it is waited for unless it is paced.
-        return 0.0 if self._pace is None else time.monotonic()
-
-    def close(self) -> None:
-        self._file.close()
-
-
-class _Pace:
-    """Holds back the packets of a recording until their time has come."""
-
-    def __init__(self, name: str, factor: float):
-        self._name = name
-        self._factor = factor
-        self._conversation = Conversation(name, live=False)
-        self._held = b""
-        self._due_s = -math.inf
-        self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
-        self._last_us = 0
-
-    def read(self, file: BinaryIO, timeout_s: float) -> bytes:
-        if not self._held:
-            self._held = _more(file, 1, self._name)
-            while not self._held.endswith(b"\0") and (more := file.read(1)):
-                self._held += more
-            for event in self._conversation.receive(self._held, 0.0):
-                if isinstance(event, Arrival):
-                    self._schedule(event.zones.time_us)
-        wait_s = self._due_s - time.monotonic()
-        if wait_s > 0:
-            time.sleep(min(wait_s, max(0.0, timeout_s)))
-        if wait_s > timeout_s:
-            return b""
-        data, self._held = self._held, b""
-        return data
-
-    def _schedule(self, time_us: int) -> None:
-        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins again
-            self._begun = time.monotonic(), time_us
-        moment_s, begun_us = self._begun
-        self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor
-        self._last_us = time_us
-
-
-def _pace(name: str, text: str) -> _Pace:
-    try:
-        factor = float(text)
-    except ValueError:
-        factor = math.nan
-    if not 0 < factor < math.inf:
-        raise PortNotFound(f"{name}: pace is {text!r}; it must be a positive number, 1 for the time of the recording")
-    return _Pace(name, factor)
-
-
-def _more(file: BinaryIO, count: int, name: str) -> bytes:
-    data = file.read(count)
-    if not data:
-        raise ReplayEnded(f"{name} ends here")
-    return data
-
-
 class RecordingTransport:
-    """Passes everything on and writes each byte that is read to a file."""
+    """Passes everything on, and each byte that is read to a tap."""
 
-    def __init__(self, transport: Transport, path: str | Path):
+    def __init__(self, transport: Transport, tap: recording.Tap):
         self._transport = transport
         self.name = transport.name
         self.live, self.threaded = transport.live, transport.threaded
         self.write = transport.write
         self.clock = transport.clock
-        self._file = recording.create(path, transport.name)
+        self._tap = tap
 
     def read(self, timeout_s: float) -> bytes:
         data = self._transport.read(timeout_s)
-        self._file.write(data)
+        self._tap.take(data, self._transport.clock())
         return data
 
     def close(self) -> None:
-        self._file.close()
+        self._tap.close()
         self._transport.close()
 
 
@@ -263,13 +171,34 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     return SerialTransport(name, baud)
 
 
+def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
+    ``skin``: where it names no file."""
+    asked = sim_address.parse(name)
+    cover, circuit = None, None
+    if asked.skin is not None:
+        skin = Skin.load(asked.skin)
+        cover, circuit = load_cover(asked.skin), load_checked(asked.skin, skin)
+    try:
+        return _virtual_board(asked, skin, cover, circuit)
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"sim:// ({error})", "sim") from None
+    except ValueError as error:  # a scene that is not known, or that does not fit the sheet
+        raise PortNotFound(f"{name}: {error}") from None
+
+
 def _virtual_board(
     asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None, circuit: Circuit | None
 ) -> SimulatedPort:
     """The one place at which the host loads the simulation, which need not be installed."""
     from contactfpga_sim.board import virtual
 
-    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit)
+    units = None
+    if asked.units is not None:
+        from contactfpga.haptics import LoadCells  # which most boards have no use for
+
+        units = LoadCells.load(asked.units)
+    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
 
 
 def _reason(error: Exception) -> str:

@@ -6,9 +6,11 @@ below 0.
 
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.calibrate import Calibration, calibrate
+from contactfpga.haptics.closings import ClosingWatch
 from contactfpga.haptics.contact import Contact, Contacts, Touch
 from contactfpga.haptics.drift import Drift, DriftWatch
 from contactfpga.haptics.evidence import Closing
+from contactfpga.haptics.live import WithReadings, felt
 from contactfpga.haptics.locate import Locator, Place, closed
 from contactfpga.haptics.reach import Reach
 from contactfpga.haptics.solve import contacts
@@ -22,6 +24,7 @@ __all__ = [
     "Calibration",
     "Center",
     "Closing",
+    "ClosingWatch",
     "Contact",
     "Contacts",
     "Cylinder",
@@ -37,8 +40,10 @@ __all__ = [
     "Reach",
     "Touch",
     "Unit",
+    "WithReadings",
     "Wrench",
     "calibrate",
     "closed",
     "contacts",
+    "felt",
 ]

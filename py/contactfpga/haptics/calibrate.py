@@ -66,12 +66,8 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     length = float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum() / len(points))) or 1.0
     rank, open_ones = rank_of(known, length)
     missing = tuple(" with ".join(_named(one)) for one in reduced(open_ones))
-    units = [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(cells.units, zeros)]
-    better = LoadCells(
-        units, frame=cells.frame, bumper=cells.bumper, zero_gravity_m_s2=cells.zero_gravity_m_s2, matrix=matrix
-    )
     off = _rms(after)
-    return Calibration(better, rank, missing, off, _rms(rest), _advice(cells, rank, missing, off))
+    return Calibration(cells.changed(zeros, matrix), rank, missing, off, _rms(rest), _advice(cells, rank, missing, off))
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:

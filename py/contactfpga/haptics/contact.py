@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import overload
 
+import numpy as np
+
 from contactfpga.haptics.answer import Floats, HapticsError, Vector
 from contactfpga.haptics.surface import Center
 from contactfpga.haptics.wrench import ALARM, Wrench
@@ -46,26 +48,47 @@ class Touch:
             raise HapticsError(f"{name} is {shown(getattr(self, name))}; it must be a number from 0 to 1000")
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class Seen:
+    """What is known of the contacts of a frame besides forces."""
+
+    link: str = ""
+    time_us: int | None = None
+    tracks: Sequence[int | None] = ()
+    """Of each contact; fewer where the rest is not followed."""
+
+
+NOTHING_MORE = Seen()
+
+
 class Contact:
     """A touch with its force."""
 
-    __slots__ = ("_intervals", "_number", "force_n", "frame", "normal_n", "touch")
+    __slots__ = ("_intervals", "_number", "force_n", "frame", "link", "normal_n", "time_us", "touch", "track")
 
     def __init__(
         self,
         touch: Touch,
-        force_n: Vector,
-        normal_n: float,
+        force_n: Vector | None,
+        normal_n: float | None,
         frame: str,
-        intervals: Callable[[], list[Interval]],
-        number: int,
+        intervals: Callable[[], list[Interval]] | None = None,
+        number: int = 0,
+        seen: Seen = NOTHING_MORE,
     ):
         self.touch = touch
         self.force_n = force_n
-        """On the link."""
+        """On the link; None where no unit measures it."""
         self.normal_n = normal_n
-        """Push, 0 or above: a contact never pulls."""
+        """Push, 0 or above: a contact never pulls. None as ``force_n``."""
         self.frame = frame
+        """Name of the frame in which point, normal and force are."""
+        self.link = seen.link
+        """Name of the link that is touched."""
+        self.time_us = seen.time_us
+        """Device time of the frame that shows it, in us since power-up; None where no frame does."""
+        self.track = seen.tracks[number] if number < len(seen.tracks) else None
+        """Id that stays from frame to frame (:class:`~contactfpga.tracking.tracker.Tracker`); None: not followed."""
         self._intervals = intervals
         self._number = number
 
@@ -80,15 +103,38 @@ class Contact:
         return self.touch.normal
 
     @property
-    def interval_n(self) -> Interval:
+    def covariance_m2(self) -> Floats:
+        """(3, 3) of the point: as far as it may be off along the surface."""
+        normal = np.array(self.touch.normal)
+        return np.asarray(self.touch.point_sigma_m**2 * (np.eye(3) - np.outer(normal, normal)))
+
+    @property
+    def interval_n(self) -> Interval | None:
         """Least and largest push among all forces that friction allows and that exert the same wrench; the second is
         None where there is no largest one. With three contacts or more it may need Clarabel: raises
-        :class:`~contactfpga.MissingExtra` without it."""
-        return self._intervals()[self._number]
+        :class:`~contactfpga.MissingExtra` without it. None as ``force_n``."""
+        return None if self._intervals is None else self._intervals()[self._number]
+
+    def to_dict(self) -> dict[str, object]:
+        """All of it in plain Python values, ready for JSON."""
+        interval, force = self.interval_n, self.force_n
+        return {
+            "link": self.link,
+            "frame": self.frame,
+            "time_us": self.time_us,
+            "track": self.track,
+            "point_m": list(self.point_m),
+            "covariance_m2": self.covariance_m2.tolist(),
+            "normal": list(self.normal),
+            "force_n": None if force is None else list(force),
+            "normal_n": self.normal_n,
+            "interval_n": None if interval is None else list(interval),
+        }
 
     def __repr__(self) -> str:
         x, y, z = (1e3 * one for one in self.point_m)
-        return f"<Contact: {self.normal_n:.3f} N at ({x:.2f}, {y:.2f}, {z:.2f}) mm>"
+        push = "" if self.normal_n is None else f"{self.normal_n:.3f} N "
+        return f"<Contact: {push}at ({x:.2f}, {y:.2f}, {z:.2f}) mm>"
 
 
 @dataclasses.dataclass(slots=True)
@@ -125,7 +171,14 @@ class Solution:
 class Contacts(Sequence[Contact]):
     """The contacts of one frame, in the order in which they were given."""
 
-    def __init__(self, wrench: Wrench, touches: Sequence[Touch], solution: Solution, center: Center | None = None):
+    def __init__(
+        self,
+        wrench: Wrench,
+        touches: Sequence[Touch],
+        solution: Solution,
+        center: Center | None = None,
+        seen: Seen = NOTHING_MORE,
+    ):
         self.wrench = wrench
         self.center = center
         """Where no zone was given: the contact that the wrench alone shows, or None."""
@@ -142,11 +195,12 @@ class Contacts(Sequence[Contact]):
         self.beyond_friction = solution.beyond_friction
         """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
         Intervals then hold for pushes with any friction."""
+        seen = seen if seen.link else dataclasses.replace(seen, link=wrench.frame)
         made = []
         for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
             nx, ny, nz = touch.normal
             push = -(nx * force[0] + ny * force[1] + nz * force[2])
-            made.append(Contact(touch, force, push if push > 0 else 0.0, wrench.frame, self._intervals, number))
+            made.append(Contact(touch, force, push if push > 0 else 0.0, wrench.frame, self._intervals, number, seen))
         self._contacts = tuple(made)
 
     def _intervals(self) -> list[Interval]:
@@ -185,7 +239,7 @@ class Contacts(Sequence[Contact]):
             if covariance is not None:
                 normal, part = one.normal, slice(3 * number, 3 * number + 3)
                 sigma = math.sqrt(max(0.0, float(normal @ covariance[part, part] @ normal)))
-            if one.interval_n[0] <= 3.3 * sigma + 1e-9:
+            if self._kept_intervals[number][0] <= 3.3 * sigma + 1e-9:
                 found.append(one)
         return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class DriftWatch:
         self._since_s = 0.0
         self._last_s: float | None = None
 
-    def update(self, time_s: float, readings: Floats, zones: int) -> Drift:
+    def update(self, time_s: float, readings: Sequence[float] | Floats, zones: int) -> Drift:
         """Take one reading per unit, with the number of zones pressed; returns what is known by now."""
         last, self._last_s = self._last_s, time_s
         if zones or last is None or time_s <= last:

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from contactfpga.haptics import few, many
 from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.contact import FULL_WRENCH, Contacts, Solution, Touch
+from contactfpga.haptics.contact import FULL_WRENCH, Contacts, Seen, Solution, Touch
 from contactfpga.haptics.surface import Surface
 from contactfpga.haptics.system import System, distinct
 from contactfpga.haptics.wrench import Wrench
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 
@@ -21,6 +22,9 @@ def contacts(
     friction: float = 0.5,
     *,
     cones: bool = False,
+    sheet_m: tuple[float, float] = (0.0, 0.0),
+    link: str = "",
+    tracks: Tracks | None = None,
 ) -> Contacts:
     """The force at each zone, or at each place in a list of :class:`Touch`.
 
@@ -33,13 +37,25 @@ def contacts(
     Args:
         surface: the bumper's outside, on which zones are placed.
         friction: of zones; a :class:`Touch` has its own.
+        sheet_m: where column 0 and row 0 lie on the surface laid flat.
+        link: name of the link; by default that of the wrench's frame.
+        tracks: of the same zones, for :attr:`Contact.track`.
     """
-    touches = touched(zones, surface, friction) if isinstance(zones, Zones) else zones
+    if isinstance(zones, Zones):
+        touches: Sequence[Touch] = touched(zones, surface, friction, sheet_m)
+        seen = Seen(link, zones.time_us, () if tracks is None else _tracked(zones, tracks))
+    else:
+        touches, seen = zones, Seen(link)
     if not touches:
-        return Contacts(wrench, (), _nothing(wrench), None if surface is None else surface.center(wrench))
+        return Contacts(wrench, (), _nothing(wrench), None if surface is None else surface.center(wrench), seen)
     if len(touches) > 1:
         distinct(touches)
-    return Contacts(wrench, touches, _chosen(wrench, touches, cones))
+    return Contacts(wrench, touches, _chosen(wrench, touches, cones), seen=seen)
+
+
+def _tracked(zones: Zones, tracks: Tracks) -> list[int | None]:
+    names = {id(track.zone): track.id for track in tracks.active}
+    return [names.get(id(zone)) for zone in zones if zone.point_mm is not None]
 
 
 def _chosen(wrench: Wrench, touches: Sequence[Touch], cones: bool) -> Solution:
@@ -62,7 +78,9 @@ def _nothing(wrench: Wrench) -> Solution:
     return Solution(FULL_WRENCH, [], list, 0, [], chi2, 6 if noise is None else noise.rank, (), wrench, lambda: None)
 
 
-def touched(zones: Zones, surface: Surface | None, friction: float = 0.5) -> list[Touch]:
+def touched(
+    zones: Zones, surface: Surface | None, friction: float = 0.5, sheet_m: tuple[float, float] = (0.0, 0.0)
+) -> list[Touch]:
     """The zones as places on the bumper's outside. A barycenter is taken to be off by no more than chance within a
     cell, a pitch over the root of 12; :class:`~contactfpga.haptics.Locator` knows better."""
     if surface is None:
@@ -73,6 +91,7 @@ def touched(zones: Zones, surface: Surface | None, friction: float = 0.5) -> lis
     for zone in zones:
         if zone.point_mm is not None:
             x, y, z = zone.point_mm
-            point, normal = surface.place(*surface.flat((1e-3 * x, 1e-3 * y, 1e-3 * z)))
+            along, across = surface.flat((1e-3 * x, 1e-3 * y, 1e-3 * z))
+            point, normal = surface.place(along + sheet_m[0], across + sheet_m[1])
             found.append(Touch(point, normal, friction, sigma))
     return found

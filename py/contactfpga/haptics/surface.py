@@ -11,6 +11,7 @@ import numpy as np
 from contactfpga.haptics.answer import Floats, HapticsError, Vector, number, positive
 from contactfpga.haptics.wrench import Wrench
 from contactfpga.inputs.values import shown
+from contactfpga.surfaces import shapes
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -64,7 +65,7 @@ class Plane:
 
     def place(self, x_m: float, y_m: float) -> tuple[Vector, Vector]:
         """Point and outward normal at a place of the surface laid flat."""
-        return (x_m, y_m, self.height_m), (0.0, 0.0, 1.0)
+        return shapes.on_plane(x_m, y_m, self.height_m)
 
     def flat(self, point_m: Vector) -> tuple[float, float]:
         """The place, laid flat, of the surface's point nearest to this one."""
@@ -116,12 +117,11 @@ class Cylinder:
 
     def place(self, x_m: float, y_m: float) -> tuple[Vector, Vector]:
         """Point and outward normal at a place of the surface laid flat."""
-        cosine, sine = math.cos(x_m / self.radius_m), math.sin(x_m / self.radius_m)
-        return (self.radius_m * cosine, self.radius_m * sine, y_m), (cosine, sine, 0.0)
+        return shapes.on_cylinder(x_m, y_m, self.radius_m)
 
     def flat(self, point_m: Vector) -> tuple[float, float]:
         """The place, laid flat, of the surface's point nearest to this one."""
-        return self.radius_m * math.atan2(point_m[1], point_m[0]), point_m[2]
+        return shapes.off_cylinder(point_m, self.radius_m)
 
 
 Surface = Plane | Cylinder

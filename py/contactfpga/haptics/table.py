@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga.haptics import surface
 from contactfpga.haptics.answer import HapticsError, direction, matrix, number, positive, vector
 from contactfpga.haptics.unit import Unit
 from contactfpga.haptics.wrench import Bumper
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from contactfpga.haptics.units import LoadCells
 
 MAX_UNITS = 64
-KEYS = ("frame", "zero_gravity_m_s2", "matrix", "bumper", "unit")
+KEYS = ("frame", "zero_gravity_m_s2", "matrix", "surface", "bumper", "unit")
 UNIT_KEYS = ("point_m", "axis", "gain_n", "zero", "sigma_n", "range", "preload_n")
 BUMPER_KEYS = ("mass_kg", "center_m", "inertia_kg_m2")
 
@@ -47,7 +48,19 @@ def read(values: dict[str, Any]) -> dict[str, Any]:
     gravity = vector("zero_gravity_m_s2", values.get("zero_gravity_m_s2", (0, 0, 0)), "m/s2")
     found = matrix("matrix", values["matrix"], 6, len(units)) if "matrix" in values else None
     bumper = _bumper(values["bumper"]) if "bumper" in values else None
-    return {"units": units, "frame": frame, "bumper": bumper, "zero_gravity_m_s2": gravity, "matrix": found}
+    made = {"units": units, "frame": frame, "bumper": bumper, "zero_gravity_m_s2": gravity, "matrix": found}
+    return made | (_surface(values["surface"]) if "surface" in values else {})
+
+
+def _surface(values: Any) -> dict[str, Any]:
+    """The bumper's outside, and where the sheet begins on it."""
+    kind = dict(values) if isinstance(values, dict) else values
+    place = kind.pop("sheet_m", (0.0, 0.0)) if isinstance(kind, dict) else None
+    found = surface.read(kind)
+    if not isinstance(place, (list, tuple)) or len(place) != 2:
+        raise HapticsError(f"surface.sheet_m is {shown(place)}; it must be two numbers, x and y in m")
+    x, y = (number(f"surface.sheet_m[{index}]", one, unit="m") for index, one in enumerate(place))
+    return {"surface": found, "sheet_m": (x, y)}
 
 
 def _unit(values: Any, name: str) -> Unit:
@@ -105,6 +118,8 @@ def write(cells: LoadCells) -> str:
         lines.append(f"zero_gravity_m_s2 = {json.dumps(list(cells.zero_gravity_m_s2))}")
     if cells.calibrated:
         lines.append(f"matrix = {json.dumps(np.asarray(cells.matrix).tolist())}")
+    if cells.surface:
+        lines += ["", "[surface]", *_written(cells.surface), f"sheet_m = {json.dumps(list(cells.sheet_m))}"]
     if cells.bumper:
         lines += ["", "[bumper]", f"mass_kg = {cells.bumper.mass_kg!r}"]
         lines.append(f"center_m = {json.dumps(list(cells.bumper.center_m))}")
@@ -116,3 +131,9 @@ def write(cells: LoadCells) -> str:
             if value is not None:
                 lines.append(f"{key} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
     return "\n".join(lines) + "\n"
+
+
+def _written(outside: surface.Surface) -> list[str]:
+    kind = next(name for name, (made, _) in surface.KINDS.items() if isinstance(outside, made))
+    length = surface.KINDS[kind][1]
+    return [f'kind = "{kind}"', f"{length} = {getattr(outside, length)!r}"]

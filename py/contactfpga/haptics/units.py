@@ -12,6 +12,7 @@ import numpy as np
 
 from contactfpga.haptics import table
 from contactfpga.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.haptics.surface import Surface
 from contactfpga.haptics.unit import Unit
 from contactfpga.haptics.vectors import turning
 from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
@@ -31,6 +32,8 @@ class LoadCells:
         bumper: Bumper | None = None,
         zero_gravity_m_s2: Vector = (0.0, 0.0, 0.0),
         matrix: Floats | None = None,
+        surface: Surface | None = None,
+        sheet_m: tuple[float, float] = (0.0, 0.0),
     ):
         """Raises :class:`HapticsError` where there is no unit.
 
@@ -39,11 +42,15 @@ class LoadCells:
             bumper: the mass on the units; None: it weighs nothing.
             zero_gravity_m_s2: which way things fell when the zeros were read, in the link's frame; 0: without bumper.
             matrix: (6, n): the wrench of a step of each reading, from a calibration; None: from places and axes.
+            surface: the bumper's outside.
+            sheet_m: where column 0 and row 0 of the sheet lie on the surface laid flat.
         """
         if not units:
             raise HapticsError("there is no unit; give at least one")
         self.units = tuple(units)
         self.frame = frame
+        self.surface = surface
+        self.sheet_m = sheet_m
         self.bumper = bumper
         self.zero_gravity_m_s2 = zero_gravity_m_s2
         self.calibrated = matrix is not None
@@ -187,10 +194,19 @@ class LoadCells:
                 raise HapticsError(
                     f"unit {number} varies by {varies[number]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
                 )
-        units = [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, read.mean(axis=0))]
-        gravity = self.zero_gravity_m_s2 if gravity_m_s2 is None else gravity_m_s2
-        matrix = self.matrix if self.calibrated else None
-        return LoadCells(units, frame=self.frame, bumper=self.bumper, zero_gravity_m_s2=gravity, matrix=matrix)
+        return self.changed(read.mean(axis=0), self.matrix if self.calibrated else None, gravity_m_s2)
+
+    def changed(self, zeros: Floats, matrix: Floats | None, gravity_m_s2: Vector | None = None) -> LoadCells:
+        """The same with other zeros, and with this calibration; None: none."""
+        return LoadCells(
+            [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
+            frame=self.frame,
+            bumper=self.bumper,
+            zero_gravity_m_s2=self.zero_gravity_m_s2 if gravity_m_s2 is None else gravity_m_s2,
+            matrix=matrix,
+            surface=self.surface,
+            sheet_m=self.sheet_m,
+        )
 
 
 def reduced(rows: Floats) -> Floats:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.wire.many import FAULT, MISMATCH, MOTION, OVERFLOW
 from contactfpga.zones import around
 from contactfpga.zones.run import Run
@@ -17,6 +18,8 @@ FRAME_DTYPE = np.dtype(
     [
         ("time_us", np.int64),
         ("host_time_s", np.float64),
+        ("host_sigma_s", np.float64),
+        ("arrived_s", np.float64),
         ("sequence", np.int64),
         ("overwritten", np.int64),
         ("pressed", np.int64),
@@ -27,7 +30,8 @@ FRAME_DTYPE = np.dtype(
         ("motion", np.bool_),
     ]
 )
-"""Fields of :attr:`Batch.frames`: those of :class:`Zones` and its flags; ``host_time_s`` is NaN in a recording."""
+"""Fields of :attr:`Batch.frames`: those of :class:`Zones` and its flags; times on the host's clock are NaN in a
+recording."""
 
 _WHICH = [("frame", np.int64), ("time_us", np.int64), ("sequence", np.int64)]
 ZONE_DTYPE = np.dtype(_WHICH + [(name, DTYPE[name]) for name in DTYPE.names or ()])
@@ -80,7 +84,7 @@ def _row(one: Zones) -> tuple[float, ...]:
     """Of :data:`FRAME_DTYPE`."""
     return (
         one.time_us,
-        math.nan if one.host_time_s is None else one.host_time_s,
+        *(math.nan if value is None else value for value in (one.host_time_s, one.host_sigma_s, one.arrived_s)),
         one.sequence,
         one.overwritten,
         one.pressed,
@@ -96,7 +100,10 @@ _FLAGS = {"overflow": OVERFLOW, "mismatch": MISMATCH, "fault": FAULT, "motion": 
 def _describe(run: Run, out: np.ndarray) -> None:
     """The same of the frames of a run."""
     out["time_us"] = run.times_us
-    out["host_time_s"] = math.nan if run.host_time_s is None else run.host_time_s
+    line = run.line
+    out["host_time_s"] = math.nan if line is None else line.at(run.times_us)
+    out["host_sigma_s"] = math.nan if line is None else line.sigma_s
+    out["arrived_s"] = math.nan if line is None else line.arrived_s
     for name, sent in _SENT.items():
         out[name] = run.packets[sent]
     for name, bit in _FLAGS.items():
@@ -125,7 +132,9 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     for name, sums, pitch in (("x_mm", x, sheet.pitch_x_mm), ("y_mm", y, sheet.pitch_y_mm)):
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
     out["x_mm"][out["winding"] != ""] = math.nan
-    _place(out, sheet.radius_mm)
+    nowhere = np.isnan(out["x_mm"])
+    out["point_mm"], out["normal"] = surfaces.of(sheet).place(out["x_mm"], out["y_mm"])
+    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan
     if sheet.ghosts:
         out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]
@@ -139,18 +148,3 @@ def _records(items: Sequence[Zones | Run]) -> tuple[np.ndarray, np.ndarray]:
         return records, np.zeros(0, np.int64)
     records = np.concatenate([one.carried if isinstance(one, Run) else one.closed_records for one in items])
     return around.flat(records, sheet.columns), around.windings(records)
-
-
-def _place(out: np.ndarray, radius_mm: float | None) -> None:
-    """Points and normals, as :func:`contactfpga.zones.zone.on_surface` has them."""
-    nowhere = np.isnan(out["x_mm"])
-    if radius_mm is None:
-        out["point_mm"][:, 0], out["point_mm"][:, 1] = out["x_mm"], out["y_mm"]
-        out["normal"][:, 2] = 1.0
-    else:
-        angles = (np.where(nowhere, 0.0, out["x_mm"]) / radius_mm).tolist()
-        for axis, function in enumerate((math.cos, math.sin)):  # numpy's may differ in the last bit
-            out["normal"][:, axis] = [function(angle) for angle in angles]
-            out["point_mm"][:, axis] = radius_mm * out["normal"][:, axis]
-        out["point_mm"][:, 2] = out["y_mm"]
-    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan

@@ -12,6 +12,7 @@ import numpy as np
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import FLAG_SETS, Frame, no_records
+from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
 
@@ -29,7 +30,8 @@ class Run:
     """(m, 3) int64, or (m, 4) where the ends of the sheet meet, at least up to the last start."""
     times_us: np.ndarray
     """(n,) int64, since power-up."""
-    host_time_s: float | None
+    line: HostLine | None
+    """When they arrived, and their times on the host's clock; None in a recording."""
     before: Frame | None = None
     """The frame before the first one."""
     faults: tuple[str, ...] = (STUCK,)
@@ -58,7 +60,7 @@ class Run:
     def __getitem__(self, index: int) -> Zones:
         before = self._frame(index - 1) if index else self.before
         time_us = self._plain[2][index]
-        return Zones(self._frame(index), self.sheet, time_us, before, self.host_time_s, self.faults, self.history)
+        return Zones(self._frame(index), self.sheet, time_us, before, self.line, self.faults, self.history)
 
     def _frame(self, index: int) -> Frame:
         if (made := self._made.get(index)) is None:

@@ -10,13 +10,14 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import surfaces
 from contactfpga.skin.sheet import Sheet
+from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones import around, ghosts, labels, motion
+from contactfpga.zones.host_line import HostLine
 from contactfpga.zones.units import UnitHistory, UnitSamples
-
-Vector = tuple[float, float, float]
 
 DTYPE = np.dtype(
     [
@@ -81,7 +82,7 @@ class Zones(Sequence[Zone]):
         sheet: Sheet,
         time_us: int | None = None,
         before: Frame | None = None,
-        host_time_s: float | None = None,
+        line: HostLine | None = None,
         faults: tuple[str, ...] = (STUCK,),
         history: UnitHistory | None = None,
     ):
@@ -91,17 +92,32 @@ class Zones(Sequence[Zone]):
         """The sheet, as the board's hello tells it."""
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, since power-up."""
-        self.host_time_s = host_time_s
-        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
-        None in a recording."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
         """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
         ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
         are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
         the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
         self._before = before
+        self._line = line
         self._history = history
         self._units: UnitSamples | None = None
+
+    @property
+    def arrived_s(self) -> float | None:
+        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
+        None in a recording."""
+        return None if self._line is None else self._line.arrived_s
+
+    @property
+    def host_time_s(self) -> float | None:
+        """:attr:`time_us` on that clock, as far as it was known when the frame arrived (docs/clock.md); None in a
+        recording."""
+        return None if self._line is None else self._line.at(self.time_us)
+
+    @property
+    def host_sigma_s(self) -> float | None:
+        """Standard deviation of :attr:`host_time_s` in s; None in a recording."""
+        return None if self._line is None else self._line.sigma_s
 
     @property
     def units(self) -> UnitSamples | None:
@@ -236,8 +252,12 @@ class Zones(Sequence[Zone]):
         if place is None:
             return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
         x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
-        point_mm, normal = on_surface(x_mm, y_mm, self.sheet.radius_mm)
+        point_mm, normal = self._surface.place(x_mm, y_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
+
+    @functools.cached_property
+    def _surface(self) -> surfaces.Surface:
+        return surfaces.of(self.sheet)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -285,7 +305,16 @@ class Zones(Sequence[Zone]):
         """Everything in plain Python values, ready for JSON."""
         values: dict[str, object] = {
             name: getattr(self, name)
-            for name in ("sequence", "time_us", "host_time_s", "overwritten", "total_zones", "pressed")
+            for name in (
+                "sequence",
+                "time_us",
+                "host_time_s",
+                "host_sigma_s",
+                "arrived_s",
+                "overwritten",
+                "total_zones",
+                "pressed",
+            )
         }
         values["faults"] = list(self.faults)
         values["flags"] = sorted(self.flags)
@@ -330,16 +359,3 @@ def _line(zone: Zone) -> str:
     if zone.winding:
         where = f"{zone.winding} at y {zone.y_mm:.2f} mm"
     return f"  {zone.area_cells} cells, {zone.area_mm2:g} mm2 {where}"
-
-
-def on_surface(x_mm: float, y_mm: float, radius_mm: float | None) -> tuple[Vector, Vector]:
-    """Point in mm and outward unit normal, in the link's frame, of a place on the sheet.
-
-    A plane lies at z = 0. On a cylinder x runs around the link's z axis, from the x axis toward the y axis, and y
-    along it; ``x_mm`` is the arc length.
-    """
-    if radius_mm is None:
-        return (x_mm, y_mm, 0.0), (0.0, 0.0, 1.0)
-    angle = x_mm / radius_mm
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return (radius_mm * cosine, radius_mm * sine, y_mm), (cosine, sine, 0.0)

@@ -55,7 +55,6 @@ class PtyBoard:
         cover: Cover | None = None,
         circuit: Circuit | None = None,
     ):
-        self._board = VirtualBoard(skin, scene, cover, circuit)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         # The board keeps its own end of the slave open: without it, a client that leaves would end the terminal.
@@ -71,8 +70,13 @@ class PtyBoard:
         self.failure: BaseException | None = None
         """What ended the thread, if it did not end by :meth:`stop`."""
         self._link = Path(link) if link else None
-        if self._link:
-            self._make_link(self._link)
+        try:
+            if self._link:
+                self._make_link(self._link)
+            self._board = VirtualBoard(skin, scene, cover, circuit)
+        except BaseException:
+            self._close_port()
+            raise
 
     @property
     def skin(self) -> Skin:
@@ -93,12 +97,15 @@ class PtyBoard:
         if self._thread and self._thread is not threading.current_thread():
             self._thread.join()
         if self._master >= 0:
-            os.close(self._master)
-            os.close(self._slave)
-            self._master = self._slave = -1
+            self._close_port()
             self._board.close()
-            if self._link:
-                self._remove_link(self._link)
+
+    def _close_port(self) -> None:
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
+        if self._link:
+            self._remove_link(self._link)
 
     def __enter__(self) -> PtyBoard:
         self.start()
@@ -177,7 +184,6 @@ class PtyBoard:
             link.symlink_to(self.port)
         except OSError as error:
             self._link = None
-            self.stop()
             raise ContactFPGAError(f"cannot link {link} to {self.port}: {error.strerror}") from None
 
     def _remove_link(self, link: Path) -> None:

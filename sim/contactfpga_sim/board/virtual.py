@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
 
 from contactfpga.choices import converters
 from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
+from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.scenes import contacts
+from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import Source
+from contactfpga_sim.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.scenes.scene import scene as make_scene
 from contactfpga_sim.sheet.line import Line
 
@@ -20,6 +26,27 @@ CHUNK_S = 0.2e-3
 
 UnitSource = Callable[[float], Sequence[int]]
 """From the simulated time in s to what each pressure unit reads, in steps of its converter."""
+
+
+def _unit_source(skin: Skin, scene: Source, units: UnitSource | LoadCells | None) -> UnitSource:
+    """Raises ValueError for units that the Skin or the scene has no use for."""
+    if not isinstance(units, LoadCells):
+        return units or _at_rest(skin)
+    if len(units.units) != skin.units:
+        raise ValueError(f"there are {len(units.units)} units; the Skin has units = {skin.units}")
+    contacts = contacts_of(skin, scene)
+    if contacts is None:
+        raise ValueError(f"scene {scene!r} has no forces, which units need; take one of {', '.join(CONTACTS)}")
+    return Felt(contacts, units, skin)
+
+
+class Finger(Protocol):
+    """A round contact, placed on the sheet laid flat."""
+
+    x_mm: float
+    y_mm: float
+    radius_mm: float
+    force_n: float
 
 
 def _at_rest(skin: Skin) -> UnitSource:
@@ -34,7 +61,9 @@ class VirtualBoard:
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
     contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
     slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
-    of the simulated time in s that returns what each pressure unit reads, by default half of full scale.
+    of the simulated time in s that returns what each pressure unit reads, by default half of full scale; or the
+    LoadCells that the scene's contacts press on, if it has contacts; look_s: simulated time between two looks at the
+    scene.
 
     ``contactfpga.open(VirtualBoard())`` makes a board of it as of any port. What the function raises comes out of the
     call that waits for a frame.
@@ -48,12 +77,18 @@ class VirtualBoard:
         circuit: Circuit | None = None,
         slow_rows: Mapping[int, float] | None = None,
         slow_columns: Mapping[int, float] | None = None,
-        units: UnitSource | None = None,
+        units: UnitSource | LoadCells | None = None,
+        look_s: float = CHUNK_S,
     ):
         self.skin = skin or Skin()
+        self._look_s = look_s
+        self._units = _unit_source(self.skin, scene, units)
         self._scene = make_scene(self.skin, scene, cover)
+        self._cover = cover
+        self._touch: CellsAt | None = None
+        self.pressed = np.zeros((self.skin.rows, self.skin.columns), bool)
+        """(rows, columns) bool: the switches that are closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
-        self._units = units or _at_rest(self.skin)
         if circuit is not None:
             self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
         elif slow_rows or slow_columns:
@@ -71,13 +106,23 @@ class VirtualBoard:
         while True:
             if (data := self._board.receive()) or left <= 0:
                 return data
-            cycles = min(left, max(1, round(CHUNK_S * self.skin.clock_hz)))
+            cycles = min(left, max(1, round(self._look_s * self.skin.clock_hz)))
             self.advance(cycles)
             left -= cycles
 
+    def touch(self, fingers: Iterable[Finger]) -> None:
+        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+        placed = [
+            contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
+            for one in fingers
+        ]
+        self._touch = Scene(tuple(placed)).on(self.skin, self._cover) if placed else None
+
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the scene as it is now."""
-        self._board.press(self._scene(self.clock()))
+        touch, pressed = self._touch, self._scene(self.clock())
+        self.pressed = pressed if touch is None else pressed | touch(self.clock())
+        self._board.press(self.pressed)
         if self.skin.units:
             self._board.load(self._units(self.clock()))
         self._board.run(cycles)
@@ -98,11 +143,17 @@ class VirtualBoard:
 
 
 def board_for(
-    scene: str | None, skin: Skin | None, threshold: float | None, cover: Cover | None, circuit: Circuit | None = None
+    scene: str | None,
+    skin: Skin | None,
+    threshold: float | None,
+    cover: Cover | None,
+    circuit: Circuit | None = None,
+    units: LoadCells | None = None,
 ) -> VirtualBoard:
-    """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed."""
+    """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed; ``units``: that
+    the scene presses on."""
     if threshold is None:
-        return VirtualBoard(skin, scene, cover, circuit)
+        return VirtualBoard(skin, scene, cover, circuit, units=units)
     if scene is None or not scene.endswith((".npy", ".npz")):
         raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
-    return VirtualBoard(skin, Recording.load(scene, threshold), circuit=circuit)
+    return VirtualBoard(skin, Recording.load(scene, threshold), circuit=circuit, units=units)

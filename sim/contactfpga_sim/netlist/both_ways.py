@@ -9,7 +9,7 @@ import re
 
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.pins import column_pins, row_pins
+from contactfpga_hdl.scan.pins import column_pins, drives_columns_both_ways, row_pins
 
 
 class WrongPins(ContactFPGAError):
@@ -23,14 +23,18 @@ def lines(skin: Skin) -> dict[str, int]:
 
 
 def of_icebox(chip: str, skin: Skin) -> str:
-    """The Verilog of ``icebox_vlog`` with an input ``NAME_0__io`` and outputs ``NAME_0__o`` and ``NAME_0__oe``."""
+    """The Verilog of ``icebox_vlog`` with an input ``NAME_0__io`` and outputs ``NAME_0__o`` and ``NAME_0__oe``.
+
+    Where a line of a port is never read, as a guard row is not, ``icebox_vlog`` makes the port an output.
+    """
     for name, width in lines(skin).items():
         port = rf"\{name}_0__io " if width > 1 else f"{name}_0__io"
         size = _size(width)
         declared = f"input {size}{port}, output {size}{name}_0__o, output {size}{name}_0__oe"
-        chip = _put(chip, _once(chip, f"inout {re.escape(size + port)}"), declared)
+        chip = _put(chip, _once(chip, f"(?:inout|output) {re.escape(size + port)}"), declared)
         for line in range(width):
             pin = rf"\{name}_0__io[{line}] " if width > 1 else port
+            chip = chip.replace(f"assign {port}[{line}] = {pin};", f"assign {pin} = {port}[{line}];")
             hit = _once(chip, rf"assign {re.escape(pin)} *= (\S+) \? (\S+) : 1'bz;")
             chip = _put(chip, hit, _driven(name, line, width, level=hit[2], enable=hit[1]))
     return chip
@@ -68,7 +72,8 @@ def _driven(name: str, line: int, width: int, level: str, enable: str) -> str:
 def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
     """For each port of the chip that this module makes what it is connected to, and the Verilog that this needs.
 
-    A column that is not driven to the released level counts as one that is not driven.
+    A column counts as driven only if it is driven to the level that it should have: the released one, or where columns
+    are driven both ways that of the first column, and the guard column the other one.
     """
     ports: dict[str, str] = {}
     text = ""
@@ -79,8 +84,19 @@ def wrapper(skin: Skin) -> tuple[dict[str, str], str]:
         if name == "rows":
             text += "assign rows = rows_o;\nassign rows_drive = rows_oe;\n"
         else:
-            text += f"assign columns_drive = columns_oe & {'' if skin.selects_low else '~'}columns_o;\n"
+            text += _columns(skin, width)
     return ports, text
+
+
+def _columns(skin: Skin, width: int) -> str:
+    if not drives_columns_both_ways(skin):
+        return f"assign columns_drive = columns_oe & {'' if skin.selects_low else '~'}columns_o;\n"
+    level = f"{{{skin.columns}{{columns_level}}}}"
+    wanted = f"{{~columns_level, {level}}}" if skin.guard else level
+    return (
+        f"assign columns_level = {_bit('columns_o', 0, width)};\n"
+        f"assign columns_drive = columns_oe & ~(columns_o ^ {wanted});\n"
+    )
 
 
 def _size(width: int) -> str:

@@ -51,10 +51,12 @@ RUNS: tuple[tuple[str, Skin], ...] = (
     ("ulx3s-12f", BOARDS["ulx3s-12f"].skin.replace(rows=8, columns=8)),
     ("icebreaker", _REVERSAL.replace(rows=11, columns=12, clock_hz=24_000_000, baud=12_000_000)),
     ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, clock_hz=30_000_000, baud=3_000_000)),
+    ("icebreaker", _REVERSAL.replace(rows=8, columns=8, guard=True, clock_hz=24_000_000, baud=12_000_000)),
+    ("ulx3s-12f", _REVERSAL.replace(rows=8, columns=8, self_test=True, clock_hz=30_000_000, baud=3_000_000)),
 )
 """Boards and sheets that are replayed when no board is named. The first one sends every frame, the others overwrite
-some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last two drive and read
-their pins."""
+some; the second one has its rows on shift registers, the fourth its clock from the PLL, and the last four drive and
+read their pins; of these the third has guard lines, and the last one a self-test."""
 
 
 @dataclasses.dataclass(frozen=True)

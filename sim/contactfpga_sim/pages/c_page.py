@@ -29,7 +29,7 @@ HELLO_BYTES = 120
 """The longest hello of today's boards, with a name of 32 bytes."""
 
 USES = {
-    "read zones": """
+    "read zones and pressure units": """
 contactfpga_reader reader;
 void begin(void) { contactfpga_init(&reader); }
 int take(uint8_t byte) { return contactfpga_push(&reader, byte); }
@@ -37,6 +37,13 @@ int zone(uint16_t index, contactfpga_zone *out) { return contactfpga_zone_at(&re
 """,
     "and ask for frames": """
 size_t ask(uint32_t number, uint8_t *out) { return contactfpga_request(number, false, false, out); }
+""",
+    "and set zeros and thresholds of units": """
+size_t tell(uint32_t number, uint8_t what, uint8_t unit, uint32_t steps, uint8_t *out) {
+    uint32_t value;
+    if (!contactfpga_unit_value(&reader.hello, what, unit, steps, &value)) return 0;
+    return contactfpga_command(number, what, value, false, false, out);
+}
 """,
 }
 

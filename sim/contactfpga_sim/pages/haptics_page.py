@@ -13,7 +13,7 @@ from pathlib import Path
 from contactfpga.console import interrupt, outputs
 from contactfpga.haptics import Cylinder, drawing
 from contactfpga.haptics.rate import Rating, Task, compared
-from contactfpga_sim.pages import writer
+from contactfpga_sim.pages import haptics_felt, writer
 from contactfpga_sim.studies.haptics import coverage
 from contactfpga_sim.studies.haptics.coverage import Case
 
@@ -79,7 +79,12 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-TABLES: writer.Tables = {"layouts": layouts_table, "places": places_table, "wrong": wrong_table}
+TABLES: writer.Tables = {
+    "layouts": layouts_table,
+    "places": places_table,
+    "wrong": wrong_table,
+    **haptics_felt.TABLES,
+}
 
 
 def main() -> int:
@@ -93,6 +98,8 @@ def main() -> int:
     writer.write(args.page, TABLES)
     print(f"wrote {args.page}")
     print(f"drew {drawing.draw(args.folder / 'haptics-place.svg', LINK, compared(LINK, RING_M))}")
+    for path in haptics_felt.draw(args.folder):
+        print(f"drew {path}")
     return 0
 
 

@@ -30,6 +30,7 @@ from contactfpga_sim.proofs import (
     streams,
     uart,
     units,
+    upset,
 )
 from contactfpga_sim.proofs.case import Case
 
@@ -58,6 +59,7 @@ CASES: tuple[Case, ...] = (
     *pulses.CASES,
     *dual.CASES,
     *units.CASES,
+    *upset.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)
 

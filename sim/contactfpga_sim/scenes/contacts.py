@@ -67,24 +67,30 @@ class Contact:
     """How far the shape is turned."""
     force_n: Value = 10.0
     """Normal force in N; none at 0 and below."""
+    drag_n: tuple[Value, Value] = (0.0, 0.0)
+    """Force along the surface in N, toward columns and rows that count up; switches do not feel it, units do."""
+    torsion_nm: Value = 0.0
+    """Moment in Nm about the outward normal; units feel it."""
 
     @property
     def still(self) -> bool:
         """Nothing about it changes with time."""
-        return not any(callable(getattr(self, field.name)) for field in dataclasses.fields(self))
+        values = (getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "drag_n")
+        return not any(map(callable, (*values, *self.drag_n)))
 
     def load(self, seconds: float) -> Load | None:
         """What it puts on the cover at that time; None while it does not touch."""
-        force = _at(self.force_n, seconds)
+        force = at(self.force_n, seconds)
         if not force > 0:
             return None
         parts = self.shape(seconds) if callable(self.shape) else self.shape
-        x, y = _at(self.x_mm, seconds) * M, _at(self.y_mm, seconds) * M
-        angle = math.radians(_at(self.angle_deg, seconds))
+        x, y = at(self.x_mm, seconds) * M, at(self.y_mm, seconds) * M
+        angle = math.radians(at(self.angle_deg, seconds))
         return Load(tuple(part.placed(x, y, angle) for part in parts), force)
 
 
-def _at(value: Value, seconds: float) -> float:
+def at(value: Value, seconds: float) -> float:
+    """What a value is at that time."""
     return value(seconds) if callable(value) else value
 
 
@@ -132,7 +138,7 @@ class Pressed:
     force_n: Value
 
     def __call__(self, seconds: float) -> Shape:
-        radius = self.ball.patch_m(_at(self.force_n, seconds))
+        radius = self.ball.patch_m(at(self.force_n, seconds))
         return (Ellipse(radius, radius),)
 
 

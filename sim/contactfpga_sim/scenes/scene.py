@@ -116,13 +116,23 @@ def moving(skin: Skin) -> Scene:
     return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y),))
 
 
+def pushing(skin: Skin) -> Scene:
+    """Two fingertips whose forces swing between 2 and 18 N, one rising while the other falls, once per second."""
+    width, height = _extent(skin)
+    left, right = Swing(10.0, 8.0, 1.0), Swing(10.0, 8.0, 1.0, math.pi)
+    places = ((0.3 * width, 0.35 * height, left), (0.7 * width, 0.65 * height, right))
+    return Scene(
+        tuple(Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=y, force_n=force) for x, y, force in places)
+    )
+
+
 def nothing(skin: Skin) -> Scene:
     """An untouched sheet."""
     return Scene(())
 
 
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
-    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, nothing)
+    scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
 }
 """Every contact scene by its name."""
 
@@ -160,6 +170,15 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
     if not name.endswith((".npy", ".npz")):
         raise ValueError(f"scene {name!r} is not known; take a .npy or .npz file or one of {', '.join(NAMES)}")
     return Recording.load(name).on(skin)
+
+
+def contacts_of(skin: Skin, source: Source) -> Scene | None:
+    """The contacts of a source, where it has some: a Scene, or the name of one."""
+    if isinstance(source, Scene):
+        return source
+    if source is None:
+        source = "fingertip"
+    return CONTACTS[source](skin) if isinstance(source, str) and source in CONTACTS else None
 
 
 def _checked(skin: Skin, callback: CellsAt) -> CellsAt:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.haptics import contacts, place, wrench
+from contactfpga.commands.haptics import contacts, place, threshold, wrench, zero
 from contactfpga.console import interrupt
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.inputs import files
@@ -15,7 +15,7 @@ EXTRA = "haptics"
 BAD_INPUT = 2
 """Exit status: scripts tell a file that cannot be used from a failure."""
 
-TOPICS = {"contacts": contacts, "wrench": wrench, "place": place}
+TOPICS = {"contacts": contacts, "wrench": wrench, "place": place, "zero": zero, "threshold": threshold}
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -38,9 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _answer(found: Contacts) -> dict[str, Any]:
-    ones = [
-        {"force_n": list(one.force_n), "normal_n": one.normal_n, "interval_n": list(one.interval_n)} for one in found
-    ]
+    ones = [{name: one.to_dict()[name] for name in ("force_n", "normal_n", "interval_n")} for one in found]
     spaces = {"model": found.model, "rank": found.rank, "null_space": found.null_space}
     return {"contacts": ones, **spaces, "chi2": found.chi2}
 
@@ -52,10 +50,10 @@ def _center(center: Center) -> dict[str, Any]:
 
 def _show(found: Contacts, asked_center: bool) -> None:
     for number, one in enumerate(found):
-        low, high = one.interval_n
+        low, high = one.interval_n or (0.0, None)
         upper = "no limit" if high is None else f"{high:.4g} N"
         # What is rounding is shown as 0.
-        x, y, z = (round(part, 9) + 0.0 for part in one.force_n)
+        x, y, z = (round(part, 9) + 0.0 for part in one.force_n or ())
         terminal.say(
             f"contact {number}: pushes {one.normal_n:.4g} N, from {low:.4g} N to {upper} as friction allows; force "
             f"({x:.4g}, {y:.4g}, {z:.4g}) N",

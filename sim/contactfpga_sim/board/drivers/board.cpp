@@ -274,7 +274,7 @@ class Board {
     auto &columns() { return model_.top.p_columns; }
 #endif
 
-#if (GUARD || KEEPS) && REVERSAL && PROBES
+#if (GUARD || KEEPS) && REVERSAL
     Word columns_driven() {
         const auto &top = model_.top;
         return Matrix::feeding(static_cast<Word>(get(top.p_columns__drive)), get(top.p_columns__level));
@@ -285,7 +285,7 @@ class Board {
     Word columns_driven() { return 0; }
 #endif
 
-#if KEEPS && PROBES
+#if KEEPS
     Word columns_held() { return static_cast<Word>(get(model_.top.p_columns__drive)) & ~columns_driven(); }
 #else
     Word columns_held() { return 0; }

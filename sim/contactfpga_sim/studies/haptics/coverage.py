@@ -29,9 +29,9 @@ RING_M = 0.075
 
 
 @functools.cache
-def reach_of(model: Model) -> Reach:
+def reach_of(model: Model, ball: Ball = BALL) -> Reach:
     """Of 5 mm of foam over the prototype's switches."""
-    return Reach(Foam(Switch(), 0.005, BALL), model)
+    return Reach(Foam(Switch(), 0.005, ball), model)
 
 
 @functools.cache
@@ -59,6 +59,12 @@ class Case:
     true_sigma_n: float | None = None
     drift_n: float = 0.0
     """Of one unit."""
+    ball: Ball = BALL
+    """Of a true patch."""
+    late_n: float = 0.0
+    """By how much a push rises until it is measured."""
+    inside_mm: float | None = None
+    """How far inside the outermost column contacts lie; None: in the middle."""
     wrong: str = ""
     """What the method does not know."""
 
@@ -138,10 +144,11 @@ def press(case: Case, rng: np.random.Generator) -> Pressed:
     """A push that rises at a random place of a cell."""
     pitch = 1e-3 * case.pitch_mm
     x, y = (MIDDLE + rng.random(2)) * pitch
+    x = x if case.inside_mm is None else 1e-3 * case.inside_mm
     along = np.arange(LINES) * pitch
     distance = np.hypot(*(axis - at for axis, at in zip(np.meshgrid(along, along), (x, y))))
     spread = case.spread if case.true_spread is None else case.true_spread
-    closing = reach_of(case.true).closing_n(distance) * (1 + spread * rng.standard_normal(distance.shape))
+    closing = reach_of(case.true, case.ball).closing_n(distance) * (1 + spread * rng.standard_normal(distance.shape))
     push = float(rng.uniform(*case.push_n))
     rows, columns = np.nonzero(closing <= push)
     cells = list(zip(rows.tolist(), columns.tolist()))
@@ -154,7 +161,7 @@ def _measured(case: Case, rng: np.random.Generator, force: float) -> float:
 
 
 def _closings(case: Case, rng: np.random.Generator, one: Pressed) -> list[Closing]:
-    return [Closing(*cell, _measured(case, rng, force)) for cell, force in zip(one.cells, one.closing_n)]
+    return [Closing(*cell, _measured(case, rng, force + case.late_n)) for cell, force in zip(one.cells, one.closing_n)]
 
 
 def by_barycenter(case: Case, finder: Locator, rng: np.random.Generator, one: Pressed) -> tuple[Place, float]:

@@ -1,0 +1,53 @@
+"""What the link sends unasked: a hello every half second, and a frame after a long pause."""
+
+from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.lib import wiring
+
+from contactfpga.skin.derived import HELLO_BIT, KEEP_ALIVE_BIT
+
+
+def hello_period(m: Module, link: wiring.Component) -> Value:
+    """High for a clock when another half second is over."""
+    if link.derived.scan.waits:
+        return _turns(m, link, HELLO_BIT)
+    period = link.derived.hello_frames
+    since = Signal(range(max(2, period)))
+    waited, due = _wait(link, since, period)
+    with m.If(link.frames.decide):
+        m.d.sync += since.eq(Mux(due, 0, waited))
+    return link.frames.decide & due
+
+
+def keep_alive(m: Module, link: wiring.Component) -> None:
+    """``link.due``: a frame is to be sent though nothing has changed."""
+    decide, sends = link.frames.decide, link.frames.verdict.send
+    if link.derived.scan.waits:
+        most = link.derived.keep_alive_turns
+        turns = Signal(range(most + 1), init=most)  # of the clock's bit, since the last frame sent
+        m.d.comb += link.due.eq(turns == most)
+        with m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due):
+            m.d.sync += turns.eq(turns + 1)
+        with m.If(decide & sends):
+            m.d.sync += turns.eq(0)
+        return
+    limit = link.derived.keep_alive_frames
+    idle = Signal(range(limit), init=limit - 1)  # since the last frame sent
+    waited, due = _wait(link, idle, limit)
+    m.d.comb += link.due.eq(due)
+    with m.If(decide):
+        m.d.sync += idle.eq(Mux(sends, 0, waited))
+
+
+def _turns(m: Module, link: wiring.Component, bit: int) -> Value:
+    """High for a clock when another 2^bit us are over."""
+    before = Signal(name=f"time_{bit}")
+    m.d.sync += before.eq(link.time[bit])
+    return link.time[bit] ^ before
+
+
+def _wait(link: wiring.Component, waited: Value, limit: int) -> tuple[Value, Value]:
+    """A time with this frame's added, and whether that is ``limit``: in scans, adaptive ones in row times."""
+    if link.derived.scan.even:
+        return waited + 1, waited == limit - 1
+    longer = waited + link.tag.slots
+    return longer, longer >= limit

@@ -1,0 +1,21 @@
+"""A robot with a sheet on each of several links: contacts in one frame, on one clock."""
+
+from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
+from contactfpga.body.body import Body
+from contactfpga.body.contact import Contact
+from contactfpga.body.joints import JointHistory
+from contactfpga.body.open_body import OpenBody, SnapshotQueue
+from contactfpga.body.snapshot import LinkState, Snapshot
+
+__all__ = [
+    "Body",
+    "BodyError",
+    "Contact",
+    "JointHistory",
+    "LinkState",
+    "NoJoints",
+    "NoLinkData",
+    "OpenBody",
+    "Snapshot",
+    "SnapshotQueue",
+]

@@ -1,0 +1,79 @@
+"""A robot with a sheet on each of several links, as `robot.toml` has it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from contactfpga.body import plan, urdf
+from contactfpga.body.answer import BodyError
+from contactfpga.body.joints import Joints
+from contactfpga.body.kinematics import Kinematics
+from contactfpga.body.plan import Plan
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
+
+if TYPE_CHECKING:
+    from contactfpga.body.open_body import OpenBody
+
+KEYS = ("urdf", "links")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Body:
+    """The links that have a sheet, and how they hang together."""
+
+    links: dict[str, Plan]
+    kinematics: Kinematics | None = None
+    """None: no URDF is known, so there is no base frame."""
+
+    @classmethod
+    def load(cls, path: str | Path) -> Body:
+        """Read `robot.toml`; the paths in it count from its folder. Raises :class:`BodyError`, OSError."""
+        path = Path(path)
+        values = tomlfile.load(path, BodyError)
+        try:
+            for key in values:
+                if key not in KEYS:
+                    raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
+            tables = values.get("links")
+            if not isinstance(tables, list) or not tables:
+                raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")
+            kinematics = None
+            if "urdf" in values:
+                kinematics = Kinematics(urdf.load(urdf.located(plan.text(values, "urdf"), path.parent)))
+            return cls(_by_name([plan.read(one, path.parent) for one in tables], kinematics), kinematics)
+        except BodyError as error:
+            raise BodyError(f"{path}: {error}") from None
+
+    def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
+        """Open every link's board, each in a thread of its own, and return once each was tried; what does not answer is
+        tried again until it does.
+
+        Args:
+            joints: from a time on the host's clock to the joint angles then, for instance a :class:`JointHistory`;
+                without it there are contacts in the links' frames alone.
+            timeout: seconds for a board's hello.
+            period_s: how often at most a link's newest frame is taken.
+        """
+        from contactfpga.body.open_body import OpenBody
+
+        return OpenBody(self, joints, timeout=timeout, period_s=period_s)
+
+
+def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan]:
+    found: dict[str, Plan] = {}
+    ports: dict[str, str] = {}
+    for one in plans:
+        if one.name in found:
+            raise BodyError(f"two links are named {shown(one.name)}")
+        if kinematics is not None and one.frame not in kinematics.robot.links:
+            raise BodyError(f"link {shown(one.name)}: frame is {shown(one.frame)}; the URDF has no such link")
+        if one.port is not None and not one.port.startswith("sim:"):
+            if one.port in ports:
+                both = f"{shown(ports[one.port])} and {shown(one.name)}"
+                raise BodyError(f"links {both} have one port, {shown(one.port)}")
+            ports[one.port] = one.name
+        found[one.name] = one
+    return found

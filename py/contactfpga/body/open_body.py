@@ -1,0 +1,221 @@
+"""An open body: a thread per link, and snapshots of all."""
+
+from __future__ import annotations
+
+import collections
+import threading
+import time
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from contactfpga.body.joints import Joints
+from contactfpga.body.plan import Plan
+from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
+from contactfpga.body.snapshot import Snapshot
+from contactfpga.driver import driver
+from contactfpga.driver.subscription import checked
+from contactfpga.errors import BoardClosed, ReadTimeout
+
+if TYPE_CHECKING:
+    from contactfpga.body.body import Body
+
+
+class OpenBody:
+    """Every link's board, read until it is closed: a context manager that iterates snapshots.
+
+    Made by :meth:`Body.open`. No link's failure raises: its state says so, the others go on, and it is opened again as
+    soon as it can be.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        joints: Joints | None = None,
+        *,
+        timeout: float = 1.0,
+        period_s: float = 0.002,
+        opened: Callable[[Plan], OpenBoard] | None = None,
+    ):
+        self.body = body
+        self._joints = joints
+        self._timeout, self._period_s = checked(timeout), period_s
+        self._changed = threading.Condition()
+        self._changes = self._given = 0
+        self._closing = False
+        self._queues: list[SnapshotQueue] = []
+        self._readers = {
+            name: LinkReader(plan, opened or self._open_board, self.clock) for name, plan in body.links.items()
+        }
+        self._threads = [
+            threading.Thread(target=self._read, args=(reader,), name=f"reader of link {name}", daemon=True)
+            for name, reader in self._readers.items()
+        ]
+        for thread in self._threads:
+            thread.start()
+        with self._changed:
+            self._changed.wait_for(lambda: all(reader.tried for reader in self._readers.values()))
+
+    def _open_board(self, plan: Plan) -> OpenBoard:
+        return driver.open(plan.port, plan.skin, timeout=self._timeout)
+
+    @staticmethod
+    def clock() -> float:
+        """Seconds on the body's clock, ``time.monotonic``; virtual boards' frames are put on it, too."""
+        return time.monotonic()
+
+    def _read(self, reader: LinkReader) -> None:
+        before = None
+        while not self._closing:
+            pause_s = max(reader.step(), self._period_s)
+            state = reader.state()
+            now = (state.status, state.frame_s)
+            if now != before or not reader.tried:
+                before = now
+                self._tell()
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing, min(pause_s, RETRY_S))
+
+    def _tell(self) -> None:
+        with self._changed:
+            self._changes += 1
+            snapshot = self._snapshot() if self._queues else None
+            for queue in self._queues:
+                assert snapshot is not None
+                queue.put(snapshot)
+            self._changed.notify_all()
+
+    def _snapshot(self) -> Snapshot:
+        states = {name: reader.state() for name, reader in self._readers.items()}
+        return Snapshot(self.body, self.clock(), states, self._joints)
+
+    # ---- snapshots
+
+    def latest(self, timeout: float = 1.0) -> Snapshot:
+        """All links as they are now; waits for nothing."""
+        checked(timeout)
+        self._check_open()
+        return self._snapshot()
+
+    def read(self, timeout: float = 1.0) -> Snapshot:
+        """All links, each with a frame that was scanned after this call; those of which none came within ``timeout``
+        seconds as they are then, which their state and age say."""
+        timeout = checked(timeout)
+        self._check_open()
+        asked = {name: reader.ask() for name, reader in self._readers.items()}
+
+        def settled() -> bool:
+            return self._closing or all(
+                self._readers[name].answered >= number or self._readers[name].state().status in ("lost", "mismatch")
+                for name, number in asked.items()
+            )
+
+        with self._changed:
+            self._changed.wait_for(settled, timeout)
+        return self.latest()
+
+    def next(self, timeout: float = 1.0) -> Snapshot:
+        """The newest snapshot in which a link has a newer frame or another state than in the last one that this method
+        returned. Raises :class:`ReadTimeout` where nothing changes for ``timeout`` seconds, as when every link is
+        lost."""
+        timeout = checked(timeout)
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._closing or self._changes > self._given, timeout):
+                raise ReadTimeout(f"no link has changed within {timeout:g} s: {self._snapshot()}")
+            self._given = self._changes
+        return self.latest()
+
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> list[Snapshot]:
+        """All snapshots of the next ``max_s`` seconds; the first one is waited for, for ``timeout`` seconds."""
+        with self.subscribe() as queue:
+            found = [queue.next(timeout)]
+            end_s = self.clock() + max_s
+            while (left_s := end_s - self.clock()) > 0:
+                try:
+                    found.append(queue.next(left_s))
+                except ReadTimeout:
+                    break
+        return found
+
+    def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
+        """A queue of its own for the snapshot at each change from now on."""
+        self._check_open()
+        queue = SnapshotQueue(self, maxsize)
+        with self._changed:
+            self._queues.append(queue)
+        return queue
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        """The newest snapshot again and again, forever, at every change or once per second."""
+        while True:
+            try:
+                yield self.next()
+            except ReadTimeout:
+                yield self.latest()
+
+    def _check_open(self) -> None:
+        if self._closing:
+            raise BoardClosed("this body was closed; open it again")
+
+    # ---- its end
+
+    def __enter__(self) -> OpenBody:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give all ports back; may be called twice."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        for thread in self._threads:
+            thread.join()
+        for reader in self._readers.values():
+            reader.close()
+
+
+class SnapshotQueue:
+    """Snapshots from a moment on; at most ``maxsize`` wait, beyond, the oldest are dropped and counted."""
+
+    def __init__(self, body: OpenBody, maxsize: int):
+        if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
+            raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of snapshots, 1 or more")
+        self._body = body
+        self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
+        self.dropped = 0
+        """Snapshots that were not taken in time."""
+
+    def put(self, snapshot: Snapshot) -> None:
+        """Add one; the body's lock is held."""
+        self.dropped += len(self._waiting) == self._waiting.maxlen
+        self._waiting.append(snapshot)
+
+    def next(self, timeout: float = 1.0) -> Snapshot:
+        """The next one, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
+        timeout = checked(timeout)
+        with self._body._changed:
+            self._body._changed.wait_for(lambda: self._waiting or self._body._closing, timeout)
+            self._body._check_open()
+            if not self._waiting:
+                raise ReadTimeout(f"no link has changed within {timeout:g} s")
+            return self._waiting.popleft()
+
+    def close(self) -> None:
+        """Take no more."""
+        with self._body._changed:
+            if self in self._body._queues:
+                self._body._queues.remove(self)
+
+    def __enter__(self) -> SnapshotQueue:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        while True:
+            yield self.next()

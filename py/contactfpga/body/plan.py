@@ -1,0 +1,149 @@
+"""What `robot.toml` says of each link: its board, and where its sheet lies."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from contactfpga import surfaces
+from contactfpga.body.answer import BodyError
+from contactfpga.body.pose import Pose
+from contactfpga.driver import sim_address
+from contactfpga.driver.silence import longest_pause_s
+from contactfpga.errors import ContactFPGAError
+from contactfpga.haptics.units import LoadCells
+from contactfpga.inputs.values import is_finite, shown
+from contactfpga.skin import Skin
+from contactfpga.surfaces import Mesh, Surface
+
+KEYS = (
+    "name", "frame", "skin", "port", "point_m", "rpy_rad", "mirrored", "surface", "units", "friction", "late_s",
+    "silent_s", "folds",
+)  # fmt: skip
+MARGIN_S = 0.05
+"""Beyond the longest pause of a board that works, before its link is late."""
+SILENT_S = 0.5
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Plan:
+    """One link of a body."""
+
+    name: str
+    frame: str
+    """Name of the link's frame, in the URDF and in contacts."""
+    skin: Skin
+    port: str | None
+    """None: the board is found by its Skin."""
+    pose: Pose
+    """Of the surface's frame in the link's."""
+    mirrored: bool
+    """Columns run the other way: x counts from the last one."""
+    surface: Surface
+    units: LoadCells | None
+    friction: float
+    late_s: float
+    """Age in s from which on the newest frame is no word on what touches now."""
+    silent_s: float
+    """From which on the link is silent."""
+    folds: Path | None = None
+    """File of the cells that the folding cover presses (:mod:`contactfpga.body.folds`)."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.late_s <= self.silent_s:
+            raise BodyError(
+                f"late_s is {self.late_s:g} and silent_s {self.silent_s:g}; a link is late above 0 s, and silent no "
+                "earlier than late"
+            )
+        least = longest_pause_s(self.skin, self.skin)
+        if self.late_s < least:
+            raise BodyError(f"late_s is {self.late_s:g}; a board of this Skin may be silent for {least:.3g} s")
+
+
+def read(values: Any, folder: Path) -> Plan:
+    """One table of links; paths count from ``folder``. Raises :class:`BodyError`, OSError."""
+    if not isinstance(values, dict):
+        raise BodyError(f"a link is {shown(values)}; it must be a table, [[links]]")
+    name = text(values, "name")
+    try:
+        return _plan(name, values, folder)
+    except ContactFPGAError as error:
+        raise BodyError(f"link {shown(name)}: {error}") from None
+
+
+def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
+    for key in values:
+        if key not in KEYS:
+            raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
+    skin_path = folder / text(values, "skin")
+    skin = Skin.load(skin_path)
+    late_s = _number(values, "late_s", longest_pause_s(skin, skin) + MARGIN_S)
+    mirrored = values.get("mirrored", False)
+    if not isinstance(mirrored, bool):
+        raise BodyError(f"mirrored is {shown(mirrored)}; it must be true or false")
+    return Plan(
+        name=name,
+        frame=text(values, "frame", name),
+        skin=skin,
+        port=_port(values, skin_path),
+        pose=Pose.of(_vector(values, "point_m"), _vector(values, "rpy_rad")),
+        mirrored=mirrored,
+        surface=_surface(values.get("surface"), skin, folder),
+        units=LoadCells.load(folder / text(values, "units")) if "units" in values else None,
+        friction=_number(values, "friction", 0.5),
+        late_s=late_s,
+        silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
+        folds=folder / text(values, "folds") if "folds" in values else None,
+    )
+
+
+def _port(values: dict[str, Any], skin_path: Path) -> str | None:
+    """A virtual board gets the link's Skin unless its address names one."""
+    if "port" not in values:
+        return None
+    port = text(values, "port")
+    if port.startswith("sim:") and sim_address.parse(port).skin is None:
+        return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
+    return port
+
+
+def _surface(values: Any, skin: Skin, folder: Path) -> Surface:
+    if values is None:
+        return surfaces.of(skin.sheet)
+    if isinstance(values, dict):
+        if set(values) != {"radius_mm", "slope"}:
+            raise BodyError(f"surface is {shown(values)}; a cone is {{radius_mm = ..., slope = ...}}")
+        return surfaces.Cone(**values)
+    if not isinstance(values, str):
+        raise BodyError(f"surface is {shown(values)}; it must be the name of a table, or a cone's radius_mm and slope")
+    table = Mesh.load(folder / values)
+    if table.lines != (skin.rows, skin.columns):
+        raise BodyError(f"surface {shown(values)} is of {table.lines} cells; the Skin has {(skin.rows, skin.columns)}")
+    return table
+
+
+def text(values: dict[str, Any], key: str, usual: str | None = None) -> str:
+    """The text of this key; raises :class:`BodyError` where it is none, or is missing without a usual one."""
+    found = values.get(key, usual)
+    if found is None:
+        raise BodyError(f"{key} is missing")
+    if not isinstance(found, str) or not found:
+        raise BodyError(f"{key} is {shown(found)}; it must be a text")
+    return found
+
+
+def _number(values: dict[str, Any], key: str, usual: float) -> float:
+    found = values.get(key, usual)
+    if not is_finite(found) or not 0 <= found <= 1e3:
+        raise BodyError(f"{key} is {shown(found)}; it must be a number from 0 to 1000")
+    return float(found)
+
+
+def _vector(values: dict[str, Any], key: str) -> tuple[float, float, float]:
+    found = values.get(key, [0.0, 0.0, 0.0])
+    if not isinstance(found, list) or len(found) != 3 or not all(is_finite(one) and abs(one) <= 1e3 for one in found):
+        raise BodyError(f"{key} is {shown(found)}; it must be a list of three numbers, each at most 1000")
+    x, y, z = (float(one) for one in found)
+    return x, y, z

@@ -1,0 +1,178 @@
+"""Where a sheet sits on its link, from a few known points that were pressed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga.body.answer import BodyError
+from contactfpga.body.plan import Plan
+from contactfpga.body.pose import Pose
+from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import is_finite, shown
+from contactfpga.surfaces.shapes import Floats
+from contactfpga.zones.zone import Zones
+
+KEYS = ("point_m", "normal", "pressed_mm")
+CLEARER = 2.0
+"""By this factor the residual of the other way of mounting must be larger."""
+LARGEST_RAD = 0.35
+"""Of the standard deviation of the angles: more is no registration."""
+HELD_S = 0.3
+"""How long a point must be pressed, with one zone that stays where it is."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Press:
+    """A point of the link, and what was pressed there."""
+
+    point_m: tuple[float, float, float]
+    """In the link's frame."""
+    normal: tuple[float, float, float] | None = None
+    """Outward there, unit vector; None: not known."""
+    pressed_mm: tuple[float, float] | None = None
+    """x and y of the zone; None: not pressed yet."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Registration:
+    """Where the sheet sits."""
+
+    pose: Pose
+    """Of the sheet's own frame in the link's: for `robot.toml`."""
+    mirrored: bool
+    residuals_mm: tuple[float, ...]
+    """How far each point lies from where its press says."""
+    other_mm: float
+    """Root of the mean square of the residuals if it were mounted the other way."""
+    sigma_mm: float
+    """Standard deviation of the sheet's middle, by the cells' size and the number of points."""
+    sigma_rad: float
+    """Of the angle that is known worst."""
+    turned_rad: float
+    """By how much the pose is turned against the one in `robot.toml`."""
+
+    @property
+    def rms_mm(self) -> float:
+        """Root of the mean square of the residuals."""
+        return math.sqrt(sum(one * one for one in self.residuals_mm) / len(self.residuals_mm))
+
+    def to_toml(self) -> str:
+        """Lines for the link's table."""
+        point, rpy = (
+            "[" + ", ".join(f"{value + 0.0:.6g}" for value in values) + "]"
+            for values in (self.pose.point_m.tolist(), self.pose.rpy_rad)
+        )
+        return f"point_m = {point}\nrpy_rad = {rpy}\nmirrored = {str(self.mirrored).lower()}\n"
+
+
+def register(plan: Plan, presses: Sequence[Press]) -> Registration:
+    """The pose and way of mounting that fit best. Raises :class:`BodyError` where the points do not tell."""
+    if len(presses) < 3:
+        raise BodyError(f"{len(presses)} points were pressed; a pose takes at least 3")
+    fits = {mirrored: _fit(plan, presses, mirrored) for mirrored in (False, True)}
+    mirrored = min(fits, key=lambda one: _rms(fits[one][1]))
+    pose, residuals, levers = fits[mirrored]
+    other = _rms(fits[not mirrored][1])
+    cell_mm = math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
+    sigma_rad = cell_mm / max(1e-9, levers)
+    if sigma_rad > LARGEST_RAD:
+        raise BodyError(
+            f"the points lie so nearly in a line that the angle is known to {math.degrees(sigma_rad):.0f} degrees "
+            "only; press others, farther apart"
+        )
+    worst = max(_rms(residuals), cell_mm)
+    if other < CLEARER * worst:
+        raise BodyError(
+            f"mounted as it is or mirrored, the points fit to {_rms(residuals):.1f} and {other:.1f} mm, which does not "
+            "tell the two apart; give normals, or press points that do not lie in a plane"
+        )
+    between = plan.pose.rotation.T @ pose.rotation
+    turned = math.acos(min(1.0, max(-1.0, (float(np.trace(between)) - 1) / 2)))
+    spread = cell_mm / math.sqrt(len(presses))
+    return Registration(pose, mirrored, tuple(residuals.tolist()), other, spread, sigma_rad, turned)
+
+
+def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Floats, float]:
+    """Pose, residuals in mm with those of normals as lengths, and by which lever in mm the worst angle is known."""
+    places = [_placed(plan, press, mirrored) for press in presses]
+    ours = np.array([place[0] for place in places]) / 1000
+    known = np.array([press.point_m for press in presses], float)
+    middle, there = ours.mean(axis=0), known.mean(axis=0)
+    pairs_ours, pairs_known = [*(ours - middle)], [*(known - there)]
+    lever = math.sqrt(float(((ours - middle) ** 2).sum() / len(ours)))
+    for press, place in zip(presses, places):
+        if press.normal is not None:  # a normal counts as a point on it, as far out as the others are apart
+            pairs_ours.append(lever * np.array(place[1]))
+            pairs_known.append(lever * np.array(press.normal))
+    a, b = np.array(pairs_ours), np.array(pairs_known)
+    left, _, right = np.linalg.svd(a.T @ b)
+    flip = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(right.T @ left.T)))])
+    rotation = right.T @ flip @ left.T
+    pose = Pose(rotation, there - rotation @ middle)
+    residuals = 1000 * np.linalg.norm(b - a @ rotation.T, axis=1)
+    inertia = (a**2).sum() * np.eye(3) - a.T @ a
+    return pose, residuals, 1000 * math.sqrt(max(0.0, float(np.linalg.eigvalsh(inertia)[0])))
+
+
+def _placed(plan: Plan, press: Press, mirrored: bool) -> tuple[Any, Any]:
+    assert press.pressed_mm is not None
+    x, y = press.pressed_mm
+    x = (plan.skin.columns - 1) * plan.skin.pitch_x_mm - x if mirrored else x
+    return plan.surface.place(x, y)
+
+
+def _rms(residuals: Floats) -> float:
+    return math.sqrt(float((residuals**2).mean()))
+
+
+def load(path: str | Path) -> list[Press]:
+    """The points in a TOML file, [[point]] each. Raises :class:`BodyError`, OSError."""
+    values = tomlfile.load(path, BodyError)
+    points = values.get("point")
+    if set(values) != {"point"} or not isinstance(points, list):
+        raise BodyError(f"{path}: it holds no points; give a table [[point]] with point_m for each")
+    return [_read(one, f"{path}: point {number}") for number, one in enumerate(points, 1)]
+
+
+def _read(values: Any, where: str) -> Press:
+    if not isinstance(values, dict) or "point_m" not in values or not set(values) <= set(KEYS):
+        raise BodyError(f"{where} is {shown(values)}; it has point_m, and normal or pressed_mm where they are known")
+    point, normal, pressed = (_numbers(values, key, 2 if key == "pressed_mm" else 3, where) for key in KEYS)
+    assert point is not None
+    if normal is not None:
+        size = float(np.linalg.norm(normal))
+        if size < 1e-9:
+            raise BodyError(f"{where}: normal is {shown(values['normal'])}, which has no direction")
+        normal = tuple(value / size for value in normal)
+    return Press(point, normal, pressed)
+
+
+def _numbers(values: dict[str, Any], key: str, count: int, where: str) -> Any:
+    found = values.get(key)
+    if found is None:
+        return None
+    if not isinstance(found, list) or len(found) != count or not all(map(is_finite, found)):
+        raise BodyError(f"{where}: {key} is {shown(found)}; it must be {count} numbers")
+    return tuple(map(float, found))
+
+
+def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
+    """Where a single zone has stayed for :data:`HELD_S`, in mm; frames until then are used up."""
+    kept: list[tuple[int, float, float]] = []
+    for zones in frames:
+        if len(zones) != 1 or zones[0].x_mm is None or zones[0].y_mm is None:
+            kept.clear()
+            continue
+        x, y = zones[0].x_mm, zones[0].y_mm
+        if kept and (zones.time_us < kept[-1][0] or math.hypot(x - kept[0][1], y - kept[0][2]) > skin_pitch_mm):
+            kept.clear()
+        kept.append((zones.time_us, x, y))
+        if kept[-1][0] - kept[0][0] >= 1e6 * HELD_S:
+            return float(np.mean([one[1] for one in kept])), float(np.mean([one[2] for one in kept]))
+    raise BodyError("the frames ended before a point was pressed")

@@ -1,0 +1,133 @@
+"""All links of a body at one moment, and their contacts."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contactfpga.body import contact
+from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
+from contactfpga.body.contact import Contact
+from contactfpga.body.joints import Joints
+from contactfpga.body.kinematics import Kinematics
+from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import shown
+from contactfpga.surfaces.shapes import Floats
+from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.body.body import Body
+
+STATUSES = ("ok", "late", "silent", "lost", "mismatch")
+BASE, LINK = "base", "link"
+
+
+@dataclasses.dataclass(frozen=True)
+class LinkState:
+    """What is known of a link at a moment."""
+
+    zones: Zones | None
+    """Its newest frame; None unless it is ok or late: what came before a board was lost says nothing of now."""
+    age_s: float | None
+    """How long ago, on the body's clock, the newest frame was scanned that ever came; None: none ever did."""
+    status: str
+    """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
+    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin or version is there."""
+    reason: str = ""
+    """Why it is not ok."""
+    frame_s: float | None = None
+    """When the frame was scanned, on the body's clock."""
+
+    def __str__(self) -> str:
+        age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"
+        return f"{self.status} ({age}{'; ' if self.reason else ''}{self.reason})"
+
+
+class Snapshot:
+    """Every link's newest frame with its age, and the contacts on them."""
+
+    def __init__(self, body: Body, host_time_s: float, links: Mapping[str, LinkState], joints: Joints | None = None):
+        self.host_time_s = host_time_s
+        """When it was taken, on the body's clock."""
+        self.links = dict(links)
+        self._body = body
+        self._angles: dict[str, Mapping[str, float] | ContactFPGAError] = {}
+        if joints is not None:  # looked up now, as a history is short
+            for name in self.answering:
+                self._angles[name] = _angles(joints, self.links[name])
+
+    @property
+    def answering(self) -> tuple[str, ...]:
+        """Links that are ok: those of which is known what touches them."""
+        return tuple(name for name, state in self.links.items() if state.status == "ok")
+
+    def contacts(self, frame: str = BASE, links: Collection[str] | None = None) -> list[Contact]:
+        """The contacts on all links, or on these.
+
+        Raises :class:`NoLinkData` where one of them is not ok: no data is never no contact.
+        ``links=snapshot.answering`` asks the rest. In the base frame it raises :class:`NoJoints` where the angles at a
+        frame's time are not known.
+
+        Args:
+            frame: ``base``, or ``link`` for each in the frame of its own link.
+        """
+        if frame not in (BASE, LINK):
+            raise BodyError(f"frame is {shown(frame)}; it must be 'base' or 'link'")
+        asked = list(self.links) if links is None else list(links)
+        for name in asked:
+            if name not in self.links:
+                raise BodyError(f"link {shown(name)} is not known; there are {', '.join(self.links)}")
+        missing = {name: self.links[name] for name in asked if self.links[name].status != "ok"}
+        if missing:
+            raise NoLinkData(missing)
+        found: list[Contact] = []
+        for name in asked:
+            mine = contact.on_link(self._body.links[name], self.links[name])
+            if frame == BASE and mine:
+                pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
+                mine = [one.moved(pose, BASE) for one in mine]
+            found += mine
+        return found
+
+    def jacobian(self, one: Contact) -> Floats:
+        """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
+        frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
+        frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
+        point = np.array(one.point_m)
+        if one.frame != BASE:
+            point = self._kinematics.pose(frame, angles).apply(point)
+        return self._kinematics.jacobian(frame, point, angles)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The columns of a Jacobian."""
+        return self._kinematics.joint_names
+
+    @property
+    def _kinematics(self) -> Kinematics:
+        if self._body.kinematics is None:
+            raise BodyError("the base frame is not known; give robot.toml a urdf")
+        return self._body.kinematics
+
+    def _angles_of(self, name: str) -> Mapping[str, float]:
+        found = self._angles.get(name)
+        if found is None:
+            raise NoJoints(f"link {shown(name)}: no joint angles are known; give them to Body.open(joints)")
+        if isinstance(found, ContactFPGAError):
+            raise NoJoints(f"link {shown(name)}: {found}")
+        return found
+
+    def __repr__(self) -> str:
+        states = ", ".join(f"{name} {state.status}" for name, state in self.links.items())
+        return f"<Snapshot at {self.host_time_s:.3f} s: {states}>"
+
+
+def _angles(joints: Joints, state: LinkState) -> Mapping[str, float] | ContactFPGAError:
+    assert state.frame_s is not None
+    try:
+        return joints(state.frame_s)
+    except ContactFPGAError as error:  # said to whoever asks for what needs them
+        return error

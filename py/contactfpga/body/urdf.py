@@ -1,0 +1,169 @@
+"""Links and joints from a URDF file; masses, meshes and colors are left out."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from contactfpga.body.answer import BodyError
+from contactfpga.body.pose import Pose
+from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.values import shown
+from contactfpga.surfaces.shapes import Floats, Vector
+
+MAX_BYTES = 20_000_000
+PACKAGE = "package://"
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint between two links."""
+
+    name: str
+    kind: str
+    """One of :data:`MOVING`, or ``fixed``."""
+    parent: str
+    child: str
+    origin: Pose
+    """Of the child's frame in the parent's, at an angle of 0."""
+    axis: Floats
+    """(3,): unit vector in the child's frame; 0 where it is fixed."""
+    mimic: tuple[str, float, float] | None = None
+    """The joint that it follows, by which factor, and from which offset on."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Robot:
+    """What a URDF says of frames."""
+
+    name: str
+    links: tuple[str, ...]
+    joints: dict[str, Joint]
+    root: str
+    """The link that is no joint's child: the base frame."""
+
+
+def located(urdf: str, folder: Path) -> Path:
+    """The file that a robot's table names: a path, counted from ``folder``, or ``package://NAME/PATH`` in an installed
+    Python package. Raises :class:`BodyError`."""
+    if not urdf.startswith(PACKAGE):
+        return folder / urdf
+    name, _, inside = urdf.removeprefix(PACKAGE).partition("/")
+    found = importlib.util.find_spec(name) if name.isidentifier() else None
+    if found is None or not found.submodule_search_locations:
+        raise BodyError(
+            f"urdf is {shown(urdf)}; no Python package {shown(name)} is installed: install it, for the example with "
+            "pip install '.[body]'"
+        )
+    if ".." in Path(inside).parts or Path(inside).is_absolute():
+        raise BodyError(f"urdf is {shown(urdf)}; it must name a file inside the package")
+    return Path(next(iter(found.submodule_search_locations))) / inside
+
+
+def load(path: Path) -> Robot:
+    """Read a URDF file. Raises :class:`BodyError`, OSError."""
+    with open_regular(path) as file:
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise BodyError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a URDF file?")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities of entities would fill the memory
+        raise BodyError(f"{path}: it declares a document type, which no URDF needs; remove it")
+    try:
+        tree = ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise BodyError(f"{path}: not a URDF file: {error}") from None
+    try:
+        return _robot(tree)
+    except BodyError as error:
+        raise BodyError(f"{path}: {error}") from None
+
+
+def _robot(tree: ElementTree.Element) -> Robot:
+    if tree.tag != "robot":
+        raise BodyError(f"its outermost element is {shown(tree.tag)}; in a URDF it is 'robot'")
+    links = tuple(_text(link, "name", "a link") for link in tree.findall("link"))
+    joints: dict[str, Joint] = {}
+    for element in tree.findall("joint"):
+        joint = _joint(element)
+        if joint.name in joints:
+            raise BodyError(f"two joints are named {shown(joint.name)}")
+        joints[joint.name] = joint
+    children = [joint.child for joint in joints.values()]
+    for joint in joints.values():
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise BodyError(f"joint {shown(joint.name)} names the link {shown(link)}, which is not there")
+        if children.count(joint.child) > 1:
+            raise BodyError(f"link {shown(joint.child)} hangs on two joints; a URDF is a tree")
+        if joint.mimic is not None and joint.mimic[0] not in joints:
+            raise BodyError(f"joint {shown(joint.name)} follows {shown(joint.mimic[0])}, which is not there")
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1:
+        raise BodyError(f"{len(roots)} links hang on no joint; a robot has one base")
+    return Robot(tree.get("name", ""), links, joints, roots[0])
+
+
+def _joint(element: ElementTree.Element) -> Joint:
+    name = _text(element, "name", "a joint")
+    where = f"joint {shown(name)}"
+    kind = element.get("type", "")
+    if kind not in (*MOVING, "fixed"):
+        raise BodyError(f"{where} is of type {shown(kind)}; it must be one of {', '.join(MOVING)}, fixed")
+    ends = [_text(_child(element, tag, where), "link", f"{tag} of {where}") for tag in ("parent", "child")]
+    placed = element.find("origin")
+    point, rpy = (_vector(placed, key, where) for key in ("xyz", "rpy"))
+    axis = np.zeros(3)
+    if kind in MOVING:
+        told = element.find("axis")
+        axis = np.array((1.0, 0.0, 0.0) if told is None else _vector(told, "xyz", where))
+        length = float(np.linalg.norm(axis))
+        if length < 1e-9:
+            raise BodyError(f"the axis of {where} has no direction")
+        axis = axis / length
+    return Joint(name, kind, ends[0], ends[1], Pose.of(point, rpy), axis, _mimic(element, where))
+
+
+def _mimic(element: ElementTree.Element, where: str) -> tuple[str, float, float] | None:
+    told = element.find("mimic")
+    if told is None:
+        return None
+    factor, offset = (_number(told.get(key, usual), where) for key, usual in (("multiplier", "1"), ("offset", "0")))
+    return _text(told, "joint", f"mimic of {where}"), factor, offset
+
+
+def _child(element: ElementTree.Element, tag: str, where: str) -> ElementTree.Element:
+    found = element.find(tag)
+    if found is None:
+        raise BodyError(f"{where} has no {tag}")
+    return found
+
+
+def _text(element: ElementTree.Element, key: str, where: str) -> str:
+    if not (found := element.get(key)):
+        raise BodyError(f"{where} has no {key}")
+    return found
+
+
+def _vector(element: ElementTree.Element | None, key: str, where: str) -> Vector:
+    text = "0 0 0" if element is None else element.get(key, "0 0 0")
+    parts = text.split()
+    if len(parts) != 3:
+        raise BodyError(f"{key} of {where} is {shown(text)}; it must be three numbers")
+    x, y, z = (_number(part, where) for part in parts)
+    return x, y, z
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise BodyError(f"{where} says {shown(text)} where a finite number is due")
+    return value

@@ -1,0 +1,103 @@
+"""`contactfpga body register`: where a sheet sits on its link, by pressing known points."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+
+from contactfpga.body import Body, registration
+from contactfpga.body.plan import Plan
+from contactfpga.body.registration import Press, Registration
+from contactfpga.console import numbers, terminal
+from contactfpga.driver import driver
+from contactfpga.driver.board import Board
+from contactfpga.inputs.values import shown
+
+HELP = "Find where a sheet sits on its link, by pressing a few known points."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
+    parser.add_argument("link", metavar="LINK", help="Name of the link.")
+    points = "Points of the link, [[point]] with point_m each; those without pressed_mm are to be pressed now."
+    parser.add_argument("points", metavar="POINTS.toml", help=points)
+    wait = "Seconds to wait for each press (default: 60)."
+    parser.add_argument("--wait", type=numbers.SECONDS, default=60.0, metavar="S", help=wait)
+    parser.add_argument("--json", action="store_true", help="Print one JSON object.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    plan = link(Body.load(args.robot), args.link)
+    presses = registration.load(args.points)
+    if any(press.pressed_mm is None for press in presses):
+        with driver.open(plan.port, plan.skin) as board:
+            presses = [_pressed(board, plan, number, press, args.wait) for number, press in enumerate(presses, 1)]
+    found = registration.register(plan, presses)
+    if args.json:
+        print(json.dumps(_values(found)))
+    else:
+        _show(found, plan)
+    return 0
+
+
+def link(body: Body, name: str) -> Plan:
+    """The link of this name."""
+    if name not in body.links:
+        raise ValueError(f"link {shown(name)} is not known; there are {', '.join(body.links)}")
+    return body.links[name]
+
+
+def _pressed(board: Board, plan: Plan, number: int, press: Press, wait_s: float) -> Press:
+    if press.pressed_mm is not None:
+        return press
+    x, y, z = (f"{1e3 * value:.1f}" for value in press.point_m)
+    terminal.say(f"press point {number}, ({x}, {y}, {z}) mm, and nothing else")
+    until = board.clock() + wait_s
+    frames = board.subscribe(maxsize=4096)
+
+    def coming():  # type: ignore[no-untyped-def]
+        for zones in frames:
+            if board.clock() > until:
+                raise ValueError(f"point {number} was not pressed within {wait_s:g} s, or not by a single zone")
+            yield zones
+
+    with frames:
+        place = registration.held(coming(), max(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm))
+        terminal.say(f"  zone at x {place[0]:.2f} mm, y {place[1]:.2f} mm; let go", hang=2)
+        for zones in coming():
+            if not len(zones):
+                break
+    return dataclasses.replace(press, pressed_mm=place)
+
+
+def _values(found: Registration) -> dict[str, object]:
+    values = {field.name: getattr(found, field.name) for field in dataclasses.fields(found) if field.name != "pose"}
+    return {
+        "point_m": found.pose.point_m.tolist(),
+        "rpy_rad": list(found.pose.rpy_rad),
+        "rms_mm": found.rms_mm,
+    } | values
+
+
+def _show(found: Registration, plan: Plan) -> None:
+    print(found.to_toml(), end="")
+    terminal.say(
+        f"residual {found.rms_mm:.2f} mm ({found.other_mm:.1f} mm if it were {_other(found)}); known to "
+        f"{found.sigma_mm:.2f} mm and {math.degrees(found.sigma_rad):.2f} degrees",
+        hang=2,
+    )
+    changes = []
+    if found.mirrored != plan.mirrored:
+        changes.append("mirrored" if found.mirrored else "not mirrored")
+    if found.turned_rad > 3 * found.sigma_rad:
+        changes.append(f"turned by {math.degrees(found.turned_rad):.1f} degrees")
+    if changes:
+        terminal.say(f"against robot.toml it is {' and '.join(changes)}", hang=2)
+
+
+def _other(found: Registration) -> str:
+    return "not mirrored" if found.mirrored else "mirrored"

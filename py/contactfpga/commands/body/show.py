@@ -1,0 +1,90 @@
+"""`contactfpga body ROBOT.toml`: every link's state and contacts, in the base frame."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+
+from contactfpga.body import Body, Contact, Snapshot
+from contactfpga.body.snapshot import BASE, LINK
+from contactfpga.console import numbers, terminal
+
+HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
+    frame = "Frame of the contacts: base, or link for each link's own (default: base, or link without a URDF)."
+    parser.add_argument("--frame", choices=(BASE, LINK), help=frame)
+    joint = "Angle of a joint in rad, or m of one that slides; may be repeated (default: 0)."
+    parser.add_argument("--joint", action="append", default=[], type=angle, metavar="NAME=RAD", help=joint)
+    seconds = "Go on for so many seconds, with a picture of the state each second."
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
+    parser.add_argument("--json", action="store_true", help="Print a line with one JSON object each time.")
+    wait = "Seconds to wait for each board (default: 1)."
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
+
+
+def angle(text: str) -> tuple[str, float]:
+    """NAME=RAD."""
+    name, _, value = text.partition("=")
+    try:
+        found = float(value)
+    except ValueError:
+        found = math.nan
+    if not name or not math.isfinite(found):
+        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} is no joint's name, = and a finite number")
+    return name, found
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic; its status is 1 where a link has no data."""
+    body = Body.load(args.robot)
+    angles = _angles(body, dict(args.joint))
+    frame = args.frame or (LINK if body.kinematics is None else BASE)
+    with body.open(lambda _: angles, timeout=args.timeout) as opened:
+        until = time.monotonic() + (args.seconds or 0.0)
+        while True:
+            snapshot = opened.read(args.timeout)
+            _print(snapshot, frame, args.json)
+            left = until - time.monotonic()
+            if left <= 0:
+                return 0 if len(snapshot.answering) == len(snapshot.links) else 1
+            time.sleep(min(left, 1.0))
+
+
+def _angles(body: Body, given: dict[str, float]) -> dict[str, float]:
+    names = () if body.kinematics is None else body.kinematics.joint_names
+    for name in given:
+        if name not in names:
+            raise ValueError(f"--joint {name!r} is no joint of the URDF; it has {', '.join(names) or 'none'}")
+    return dict.fromkeys(names, 0.0) | given
+
+
+def _print(snapshot: Snapshot, frame: str, as_json: bool) -> None:
+    contacts = snapshot.contacts(frame, links=snapshot.answering)
+    if as_json:
+        links = {
+            name: {"status": one.status, "age_s": one.age_s, "reason": one.reason}
+            for name, one in snapshot.links.items()
+        }
+        found = [one.to_dict() for one in contacts]
+        print(json.dumps({"host_time_s": snapshot.host_time_s, "links": links, "contacts": found}), flush=True)
+        return
+    for name, state in snapshot.links.items():
+        mine = [one for one in contacts if one.link == name]
+        what = f"{len(mine)} contact{'' if len(mine) == 1 else 's'}" if state.status == "ok" else "contacts not known"
+        terminal.say(f"{name}: {state}; {what}", hang=2)
+        for one in mine:
+            terminal.say(f"  {_line(one)}", hang=4)
+
+
+def _line(one: Contact) -> str:
+    x, y, z = (f"{1e3 * value:.1f}" for value in one.point_m)
+    nx, ny, nz = (f"{round(value, 2) + 0.0:.2f}" for value in one.normal)
+    push = "" if one.normal_n is None else f", pushes {one.normal_n:.2f} N"
+    marked = f", {', '.join(sorted(one.flags))}" if one.flags else ""
+    return f"{one.frame} ({x}, {y}, {z}) mm, normal ({nx}, {ny}, {nz}), {one.zone.area_mm2:.0f} mm2{push}{marked}"

@@ -1,0 +1,28 @@
+"""`contactfpga export`: a recording as a table for other programs."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.console import outputs, terminal
+
+HELP = "Write a recording as a table: Parquet, NPZ or CSV."
+EXTRA = "analysis"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("recording", metavar="RECORDING.mcap", help="What `contactfpga record` wrote.")
+    parser.add_argument("table", metavar="OUT", help="The table: OUT.parquet, OUT.npz or OUT.csv.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga.recordings.export import export
+    from contactfpga.recordings.recording import Recording
+
+    recording = Recording(args.recording)
+    path = outputs.file(args.table, "OUT")
+    rows = export(recording, path)
+    terminal.say(f"{path}: {rows:,} rows of {recording.duration_s:.1f} s")
+    return 0

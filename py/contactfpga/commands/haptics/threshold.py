@@ -1,0 +1,66 @@
+"""`contactfpga haptics threshold`: from which deviation on units and sums of a board raise `contact`."""
+
+from __future__ import annotations
+
+import argparse
+import re
+
+from contactfpga.console import flags, terminal
+from contactfpga.console.forces import cells_of
+from contactfpga.errors import NoSuchCommand
+from contactfpga.haptics import HapticsError, LoadCells
+from contactfpga.inputs.values import shown
+
+HELP = "Set the deviations from zero at which a board's units and their weighted sums raise contact."
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    flags.connection(parser)
+    unit = "Unit K raises contact from this deviation on, either way; 0: never. May be given again for other units."
+    parser.add_argument("--unit", action="append", default=[], metavar="K=STEPS", help=unit)
+    whole = "Sum K, a row of the Skin's unit_sums, likewise."
+    parser.add_argument("--sum", action="append", default=[], metavar="K=STEPS", help=whole)
+    units = "The units (docs/haptics.md): then --unit takes newtons, as 0=8, and --sum does where all gains are alike."
+    parser.add_argument("--units", metavar="FILE", help=units)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    pairs = [("unit", *_pair("--unit", one)) for one in args.unit] + [("sum", *_pair("--sum", one)) for one in args.sum]
+    if not pairs:
+        raise HapticsError("no threshold is given; add --unit K=STEPS or --sum K=STEPS")
+    with flags.opened(args) as board:
+        facts = board.hello.units
+        if facts is None:
+            raise NoSuchCommand(f"{board.port}: this board has no pressure units; build its Skin with units")
+        cells = None if args.units is None else cells_of(board, args.units)
+        for kind, number, value in pairs:
+            limit = facts.count if kind == "unit" else facts.sums
+            if number >= limit:
+                raise HapticsError(f"--{kind} names {kind} {number}; the board has {limit}, counted from 0")
+            steps = value if cells is None else _steps(cells, kind, number, value)
+            given = round(steps)
+            if given == 0 and value != 0:
+                raise HapticsError(f"--{kind} {number}={value:g} is less than half a step; 0 would mean never")
+            set_one = board.set_threshold if kind == "unit" else board.set_sum_threshold
+            set_one(number, given)
+            said = "never raises contact" if given == 0 else f"raises contact from a deviation of {given} steps on"
+            terminal.say(f"{kind} {number}: {said}; the board took it")
+    return 0
+
+
+def _pair(flag: str, text: str) -> tuple[int, float]:
+    found = re.fullmatch(r"(\d{1,2})=(\d+(?:\.\d*)?)", text)
+    if found is None:
+        raise HapticsError(f"{flag} is {shown(text)}; it must be a number and a deviation, as 0=400")
+    return int(found[1]), float(found[2])
+
+
+def _steps(cells: LoadCells, kind: str, number: int, newtons: float) -> float:
+    gains = {abs(unit.gain_n) for unit in cells.units}
+    if kind == "unit":
+        return newtons / abs(cells.units[number].gain_n)
+    if len(gains) > 1:
+        raise HapticsError("--sum takes steps here: the units have different gains, so a sum has no newtons")
+    return newtons / gains.pop()

@@ -1,0 +1,70 @@
+"""`contactfpga haptics zero`: read what the units of a board read without load, and tell it to the board."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from contactfpga.console import flags, numbers, outputs, terminal
+from contactfpga.console.forces import cells_of
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
+from contactfpga.haptics import HapticsError, WithReadings
+from contactfpga.haptics.answer import Floats
+from contactfpga.haptics.table import write
+
+HELP = "Read the zeros of a board's pressure units while nothing touches, and set them on the board."
+
+LEAST = 10
+"""Readings for a zero."""
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    flags.connection(parser)
+    long = "Seconds of the board's time over which readings are averaged (default: 0.1)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, default=0.1, help=long)
+    units = "The units (docs/haptics.md): refuse readings that are less quiet than they say."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    parser.add_argument("--output", metavar="FILE", help="Write the units with their new zeros to this TOML file.")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    if args.output is not None and args.units is None:
+        raise HapticsError("--output writes units with new zeros; add --units FILE with the old ones")
+    output = None if args.output is None else outputs.file(args.output, "--output")
+    with flags.opened(args) as board:
+        cells = None if args.units is None else cells_of(board, args.units)
+        read = _readings(board, args.seconds)
+        better = None if cells is None else cells.rezeroed(read, 0)
+        for unit, mean in enumerate(read.mean(axis=0)):
+            board.set_zero(unit, round(float(mean)))
+            spread = float(read[:, unit].std(ddof=1))
+            terminal.say(f"unit {unit}: zero {mean:.1f} steps, spread {spread:.2f}; the board took {round(mean)}")
+    if output is not None and better is not None:
+        output.write_text(write(better))
+        terminal.say(f"wrote {output}")
+    return 0
+
+
+def _readings(board: Board, seconds: float) -> Floats:
+    """(m, n): those of frames without a zone; raises :class:`HapticsError` where something touches."""
+    if board.hello.units is None:
+        raise ContactFPGAError(f"{board.port}: this board has no pressure units; build its Skin with units")
+    found: list[tuple[float, ...]] = []
+    first_us: int | None = None
+    for zones in WithReadings(board):
+        first_us = zones.time_us if first_us is None else first_us
+        if len(zones):
+            raise HapticsError(f"pressed zones: {len(zones)}; zeros are read while nothing touches")
+        if zones.units is not None:
+            if any(zones.units.saturated):
+                raise HapticsError("a unit reads 0 or full scale; `contactfpga doctor` says which")
+            found.append(zones.units.readings)
+        if zones.time_us - first_us >= 1e6 * seconds and len(found) >= LEAST:
+            return np.array(found)
+        if zones.time_us - first_us >= 1e6 * (seconds + 1):
+            break
+    raise HapticsError(f"{len(found)} readings came, {LEAST} are needed; does every frame have a sweep beside it?")

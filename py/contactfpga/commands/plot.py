@@ -1,0 +1,35 @@
+"""`contactfpga plot`: a recording in one picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from contactfpga.console import outputs, terminal
+
+HELP = "Draw a recording: where, when and how large it was touched."
+EXTRA = "view"
+
+ENDINGS = (".png", ".svg")
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    what = "File of `contactfpga record` or of `contactfpga zones --record`."
+    parser.add_argument("recording", metavar="RECORDING", help=what)
+    file = "PNG or SVG, by its ending (default: RECORDING.png, in this folder)."
+    parser.add_argument("--output", metavar="FILE", help=file)
+    parser.add_argument("--link", metavar="NAME", help="Of a recording of several boards (default: the first).")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga.view import plot, replayed
+
+    recording = replayed.load(args.recording, args.link)
+    path = Path(args.output or f"{Path(args.recording).stem}.png")
+    if path.suffix not in ENDINGS:
+        raise ValueError(f"--output is {str(path)!r}; it must end in {' or '.join(ENDINGS)}")
+    plot.draw(recording, outputs.file(path))
+    terminal.say(str(path))
+    return 0

@@ -1,0 +1,86 @@
+"""`contactfpga record`: everything a board says, into a file."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+
+from contactfpga.console import flags, numbers, terminal
+
+HELP = "Record a board into an MCAP file."
+EXTRA = "record"
+
+SHOWN_S = 0.5
+"""How often the progress is shown."""
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("file", metavar="FILE.mcap", help="A new file.")
+    flags.connection(parser)
+    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after so many seconds (default: at Ctrl-C).")
+    megabytes = "Begin a new file, FILE_0002.mcap and so on, after so many MB."
+    parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
+    seconds = "Begin a new file after so many seconds."
+    parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
+    bare = "Leave out the messages for other programs: a file of a quarter of the size, from which all can be made."
+    parser.add_argument("--bytes-only", action="store_true", help=bare)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga.recordings.recorder import Split
+    from contactfpga.recordings.session import Session
+
+    split = None
+    if args.split_mb is not None or args.split_s is not None:
+        split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
+    session = Session(args.file, split, args.bytes_only)
+    progress = _Progress(session)
+    try:
+        with session:
+            session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout)
+            with contextlib.suppress(KeyboardInterrupt):  # the usual end
+                session.start(args.seconds)
+                while session.running:
+                    session.wait(0.05)
+                    progress.show()
+    finally:
+        progress.end()
+    return 0
+
+
+class _Progress:
+    """A line that is written over, where the terminal can do so, and the last word."""
+
+    def __init__(self, session) -> None:  # type: ignore[no-untyped-def]
+        self._session = session
+        self._live = terminal.of(sys.stderr).live
+        self._due_s = time.monotonic() + SHOWN_S
+        self._shown = False
+
+    def show(self) -> None:
+        if self._live and time.monotonic() >= self._due_s:
+            self._due_s = time.monotonic() + SHOWN_S
+            self._shown = True
+            print(f"\r{self._line()}, Ctrl-C ends it", end="\033[K", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        if self._shown:
+            print("\r", end="\033[K", file=sys.stderr, flush=True)
+        session = self._session
+        if session.links:
+            terminal.say(f"{', '.join(map(str, session.files))}: {self._line()}")
+        for link in session.links:
+            for note in link.notes:
+                terminal.say(f"contactfpga: {note}", sys.stderr, hang=2)
+
+    def _line(self) -> str:
+        session = self._session
+        hourly = session.size / session.seconds * 3600 / 1e6 if session.seconds else 0.0
+        return (
+            f"{session.seconds:.1f} s, {session.frames:,} frames, {session.size / 1e6:.2f} MB "
+            f"({hourly:,.0f} MB an hour)"
+        )

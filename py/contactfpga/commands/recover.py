@@ -1,0 +1,32 @@
+"""`contactfpga recover`: what is whole of a recording that was not closed."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.console import terminal
+
+HELP = "Make a recording whole that was not closed: its program was killed, or the disk was full."
+EXTRA = "record"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("file", metavar="FILE.mcap", help="The recording; it is not changed.")
+    into = "The new file (default: FILE_recovered.mcap)."
+    parser.add_argument("into", metavar="INTO.mcap", nargs="?", help=into)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga.recordings.recover import recover
+
+    found = recover(args.file, args.into)
+    terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
+    if found.closed and not found.damaged:
+        terminal.say(f"Nothing was missing: {args.file} was closed as it should be.")
+    if found.cut:
+        terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
+    if found.damaged:
+        terminal.say(f"Left out in between: {found.damaged} damaged pieces; frames are missing there.")
+    return 0

@@ -1,0 +1,61 @@
+"""`contactfpga ros`: what the skin says as ROS 2 topics, without an installation of ROS."""
+
+from __future__ import annotations
+
+import argparse
+
+from contactfpga.console import flags, numbers, terminal
+from contactfpga.console.forces import Forces
+from contactfpga.errors import ContactFPGAError
+from contactfpga.haptics import WithReadings
+
+HELP = "Publish the skin as ROS 2 topics, with no ROS installed."
+EXTRA = "ros"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    flags.connection(parser)
+    name = "Namespace of the topics (default: skin, so that zones are in /skin/zones)."
+    parser.add_argument("--namespace", metavar="NAME", default="skin", help=name)
+    frame = "Name of the link's frame (default: the board's name, or skin)."
+    parser.add_argument("--frame", metavar="NAME", default="", help=frame)
+    parent = "Publish where the link's frame lies in this one, on /tf_static."
+    parser.add_argument("--parent", metavar="NAME", default="", help=parent)
+    place = "Where it lies, in m (default: 0 0 0)."
+    parser.add_argument("--place", nargs=3, type=float, metavar=("X", "Y", "Z"), default=(0.0, 0.0, 0.0), help=place)
+    turn = "How it is turned, in rad, about the fixed x, y and z axes in turn (default: 0 0 0)."
+    parser.add_argument("--turn", nargs=3, type=float, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn)
+    rate = "Publish zones, tracks and contacts at most as often (default: 1000)."
+    parser.add_argument("--zones-hz", type=float, metavar="HZ", default=1000.0, help=rate)
+    units = "Publish forces too, from the board's pressure units in this TOML file (docs/haptics.md)."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+    domain = "ROS_DOMAIN_ID (default: 0)."
+    parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
+    network = "Reach nodes on other computers too; without it only those on this one."
+    parser.add_argument("--network", action="store_true", help=network)
+    seconds = "Publish for this long, then end (default: until interrupted)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    from contactfpga.ros.dds import Publisher
+    from contactfpga.ros.feed import Feed
+    from contactfpga.ros.settings import Settings
+
+    if args.friction is not None and args.units is None:
+        raise ContactFPGAError("--friction is of forces; add --units")
+    settings = Settings(
+        frame=args.frame, parent=args.parent, place_m=args.place, turn_rad=args.turn, zones_hz=args.zones_hz
+    )
+    with Publisher(args.namespace, args.domain, args.network) as publisher, flags.opened(args) as board:
+        forces = Forces.of(board, args.units, args.friction)
+        feed = Feed(board, publisher.send, settings, None if forces is None else forces.of_frame)
+        reach = "all computers of the network" if args.network else "this computer"
+        terminal.say(f"publishing {publisher.topic('zones')} and its neighbors to {reach}; stop with Ctrl+C")
+        until = None if args.seconds is None else board.clock() + args.seconds
+        feed.run(WithReadings(board) if forces else board, lambda: until is not None and board.clock() >= until)
+    return 0

@@ -1,0 +1,55 @@
+"""`contactfpga surface`: where the cells of a sheet lie on a link of any shape."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from contactfpga.body.pose import Pose
+from contactfpga.console import numbers, outputs, terminal
+from contactfpga.skin import Skin
+from contactfpga.surfaces.laying import Laid, Triangles
+
+HELP = "Lay a sheet on a mesh: a table of point and normal per cell."
+EXTRA = "surface"
+
+_LENGTH, _ANGLE = numbers.number(-1e5, 1e5, "mm"), numbers.number(-7, 7, "rad")
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
+    parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
+    parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
+    by = "unrolling: around the frame's z axis, not stretched; projection: down along z (default: unrolling)."
+    parser.add_argument("--by", choices=("unrolling", "projection"), default="unrolling", help=by)
+    closed = "With unrolling: the columns go all the way round."
+    parser.add_argument("--closed", action="store_true", help=closed)
+    origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
+    parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
+    rpy = "Its roll, pitch and yaw in rad (default: 0 0 0)."
+    parser.add_argument("--rpy", nargs=3, type=_ANGLE, default=(0, 0, 0), metavar=("R", "P", "Y"), help=rpy)
+    scale = "Millimeters per unit of the mesh (default: 1; 1000 for a mesh in meters)."
+    parser.add_argument("--scale", type=numbers.number(1e-6, 1e6, "mm"), default=1.0, metavar="MM", help=scale)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    if args.closed and args.by != "unrolling":
+        raise ValueError("--closed goes with --by unrolling")
+    skin = Skin() if args.skin is None else Skin.load(args.skin)
+    output = outputs.file(args.output, "TABLE.npz")
+    triangles = Triangles.load(args.mesh, args.scale)
+    pose = Pose.of(args.origin, args.rpy)
+    laid = Laid(skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin, float))
+    table = laid.unrolled(triangles, closed=args.closed) if args.by == "unrolling" else laid.projected(triangles)
+    table.save(output)
+    (x_low, x_high), (y_low, y_high) = table.spacing_mm
+    terminal.say(f"{output}: {skin.rows}x{skin.columns} cells on {len(triangles.corners_mm)} triangles")
+    terminal.say(
+        f"neighbors lie {x_low:.2f} to {x_high:.2f} mm apart along rows (pitch {skin.pitch_x_mm:g}), {y_low:.2f} to "
+        f"{y_high:.2f} along columns (pitch {skin.pitch_y_mm:g})",
+        hang=2,
+    )
+    return 0

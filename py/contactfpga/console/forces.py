@@ -1,0 +1,80 @@
+"""Forces at the zones of a board that has pressure units, for commands that show them."""
+
+from __future__ import annotations
+
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
+from contactfpga.haptics import Contacts, DriftWatch, HapticsError, LoadCells, felt
+from contactfpga.tracking.tracks import Tracks
+from contactfpga.zones.zone import Zones
+
+
+def cells_of(board: Board, path: str) -> LoadCells:
+    """The units in a file, which must be as many as the board has. Raises :class:`HapticsError`, OSError."""
+    cells = LoadCells.load(path)
+    facts = board.hello.units
+    if facts is None:
+        raise ContactFPGAError(f"{board.port}: this board has no pressure units; build its Skin with units")
+    if len(cells.units) != facts.count:
+        raise HapticsError(f"{path}: there are {len(cells.units)} units; the board has {facts.count}")
+    return cells
+
+
+class Forces:
+    """The contacts of the frame that was taken last, and the units whose zeros wander."""
+
+    def __init__(self, cells: LoadCells, friction: float):
+        self._cells, self._friction = cells, friction
+        self._drift = DriftWatch(cells)
+        self.drifted: tuple[int, ...] = ()
+        self.contacts: Contacts | None = None
+        """None: no readings belong to the frame."""
+
+    @classmethod
+    def of(cls, board: Board, path: str | None, friction: float | None) -> Forces | None:
+        """Those that a command asks for; None where it names no file. Raises :class:`HapticsError`, OSError."""
+        return None if path is None else cls(cells_of(board, path), 0.5 if friction is None else friction)
+
+    def take(self, zones: Zones, tracks: Tracks | None) -> None:
+        """The next frame."""
+        self.contacts = felt(self._cells, zones, self._friction, tracks=tracks)
+        if zones.units is not None:
+            drift = self._drift.update(zones.time_us / 1e6, zones.units.readings, len(zones))
+            self.drifted = drift.drifted
+
+    def of_frame(self, zones: Zones, tracks: Tracks | None) -> Contacts | None:
+        """The same, and what it found."""
+        self.take(zones, tracks)
+        return self.contacts
+
+    def to_dict(self) -> dict[str, object]:
+        """In plain Python values, ready for JSON."""
+        found = self.contacts
+        if found is None:
+            return {"contacts": None}
+        rest = found.unexplained
+        return {
+            "contacts": [one.to_dict() for one in found],
+            "model": found.model,
+            "chi2": found.chi2,
+            "alarm": found.alarm,
+            "wrench": {"force_n": list(found.wrench.force_n), "moment_nm": list(found.wrench.moment_nm)},
+            "unexplained": rest and {"force_n": list(rest.force_n), "moment_nm": list(rest.moment_nm)},
+            "saturated": list(found.wrench.saturated),
+            "lifted": list(found.wrench.lifted),
+            "drifted": list(self.drifted),
+        }
+
+    def sentences(self) -> list[str]:
+        """What to mind, for a display."""
+        found = self.contacts
+        if found is None:
+            return ["no readings of the units yet"]
+        of_units = {"saturated": found.wrench.saturated, "lifted": found.wrench.lifted, "drifted": self.drifted}
+        said = [f"unit {unit} {what}" for what, units in of_units.items() for unit in units]
+        if found.beyond_friction:
+            said.append("more friction than given")
+        if found.alarm:
+            x, y, z = found.wrench.force_n if found.unexplained is None else found.unexplained.force_n
+            said.append(f"force that no zone explains: ({x:.2f}, {y:.2f}, {z:.2f}) N")
+        return said

@@ -1,0 +1,148 @@
+"""Which port a board is on: the only one, the one of a Skin, ``name:LEFT``, ``usb:SERIAL``.
+
+A search only listens: boards say hello twice per second without being asked, and whatever else hangs at a port of the
+same USB chip gets no byte. A port that another program reads is passed over before its settings are touched.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from contactfpga.driver import ports
+from contactfpga.driver.conversation import Conversation
+from contactfpga.driver.ports import Candidate
+from contactfpga.driver.transport import connect
+from contactfpga.errors import BoardSilent, ContactFPGAError, OnlyNoise, PortNotFound
+from contactfpga.inputs.values import visible
+from contactfpga.skin import Skin
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.mismatch import describe
+
+NAME, USB = "name:", "usb:"
+"""What the ports begin with that have to be searched."""
+
+LISTEN_S = 1.2
+"""How long a port may take to say hello; boards do so every 0.5 s."""
+PATIENT_S = 8.0
+"""The same where what comes may be frames: a virtual board is slower than its clock on a busy machine."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    """A port that was listened to."""
+
+    candidate: Candidate
+    hello: Hello | None
+    """None: no board said one."""
+    problem: str
+    """Why there is none; "" where there is one."""
+
+    def __str__(self) -> str:
+        said = self.problem if self.hello is None else f"says hello: {describe(self.hello)}"
+        return f"{self.candidate}: {said}"
+
+
+def searched(port: object) -> bool:
+    """Whether a port is one of those that have to be searched."""
+    return port is None or (isinstance(port, str) and port.startswith((NAME, USB)))
+
+
+def find(port: str | None, skin: Skin | None, baud: int) -> str:
+    """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
+    found = ports.candidates()
+    if port is not None and port.startswith(USB):
+        found = _with_number(port.removeprefix(USB), found)
+        if len(found) == 1:
+            return found[0].device
+    if not found:
+        known = ", ".join(f"{usb.vid:04x}:{usb.pid:04x} ({usb.boards})" for usb in ports.SUPPORTED)
+        raise PortNotFound(
+            f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
+        )
+    heard = survey(found, baud)
+    meant = [one for one in heard if one.hello is not None and _is_meant(one.hello, port, skin)]
+    if len(meant) == 1:
+        return meant[0].candidate.device
+    report = "; ".join(map(str, heard))
+    if not meant:
+        raise PortNotFound(f"{_nobody(port, skin, heard)}. Candidates: {report}")
+    raise PortNotFound(f"several boards answer{_of(port, skin)}; name one of them{_hint(meant)}. Candidates: {report}")
+
+
+def survey(candidates: Sequence[Candidate], baud: int) -> list[Found]:
+    """Listen to all of these ports at once."""
+    if not candidates:
+        return []
+    with ThreadPoolExecutor(len(candidates)) as pool:
+        return list(pool.map(lambda one: _heard(one, baud), candidates))
+
+
+def _heard(candidate: Candidate, baud: int) -> Found:
+    try:
+        return Found(candidate, listen(candidate.device, baud), "")
+    except ContactFPGAError as error:
+        return Found(candidate, None, str(error))
+
+
+def listen(device: str, baud: int, seconds: float | None = None) -> Hello:
+    """The hello that a board says by itself at this port within ``seconds``; nothing is sent."""
+    seconds = LISTEN_S if seconds is None else seconds
+    transport = connect(device, baud)
+    try:
+        conversation = Conversation(device)
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            if conversation.stats.before_hello and seconds < PATIENT_S:  # what may be frames
+                until, seconds = until + PATIENT_S - seconds, PATIENT_S
+                continue
+            for event in conversation.receive_runs(transport.read(left), time.monotonic()):
+                if isinstance(event, Hello):
+                    return event
+                if isinstance(event, ContactFPGAError):
+                    raise event
+    finally:
+        transport.close()
+    came = conversation.stats.bytes
+    if came:
+        raise OnlyNoise(f"{came} bytes came, but no hello; is the baud rate the Skin's? Asked for was {baud}")
+    raise BoardSilent(f"not one byte came within {seconds:g} s")
+
+
+def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate]:
+    candidates = list(candidates)
+    found = [one for one in candidates if one.serial_number == number]
+    if not found:
+        there = ", ".join(visible(one.serial_number) for one in candidates if one.serial_number) or "none"
+        raise PortNotFound(f"no board with USB serial number {visible(number)} is plugged in; there is {there}")
+    return found
+
+
+def _is_meant(hello: Hello, port: str | None, skin: Skin | None) -> bool:
+    if port is not None and port.startswith(NAME) and hello.name != port.removeprefix(NAME):
+        return False
+    return skin is None or hello.fingerprint == skin.fingerprint
+
+
+def _of(port: str | None, skin: Skin | None) -> str:
+    """Which boards were looked for."""
+    name = f" named {visible(port.removeprefix(NAME))!r}" if port is not None and port.startswith(NAME) else ""
+    return name + (f" with fingerprint {skin.fingerprint.hex()}" if skin is not None else "")
+
+
+def _nobody(port: str | None, skin: Skin | None, heard: Sequence[Found]) -> str:
+    if not any(one.hello for one in heard):
+        return "no board answers"
+    return f"no board{_of(port, skin)} is here"
+
+
+def _hint(meant: Sequence[Found]) -> str:
+    """How these can be told apart."""
+    names = [one.hello.name for one in meant if one.hello is not None]
+    numbers = [one.candidate.serial_number for one in meant]
+    for scheme, keys in ((NAME, names), (USB, numbers)):
+        if all(keys) and len(set(keys)) == len(keys):
+            return ": " + " or ".join(f"{scheme}{visible(key or '')}" for key in keys)
+    return ""

@@ -1,0 +1,130 @@
+"""Which switches one contact has closed and how hard it pushed then, from frame to frame."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from contactfpga.haptics.answer import HapticsError
+from contactfpga.haptics.evidence import Closing
+from contactfpga.haptics.locate import closed
+from contactfpga.haptics.units import LoadCells
+from contactfpga.zones.zone import Zones
+
+Cell = tuple[int, int]
+
+MOST = 3
+"""Switches that closed at once and are looked for."""
+
+
+class ClosingWatch:
+    """Takes every frame with its readings, and knows the cells and closings of a single contact, for
+    :meth:`~contactfpga.haptics.Locator.locate`.
+
+    A switch closed between the scans of its row in two frames; the push at that moment is halfway between those of the
+    two. From exact sums it finds one switch that opened or closed, and two or three that closed where one choice
+    with these sums is the most compact; else it says so (:attr:`complete`) until the contact ends. With
+    ``report = "cells"`` it finds all.
+    """
+
+    def __init__(self, cells: LoadCells):
+        """Raises :class:`HapticsError` where the cells have no surface."""
+        if cells.surface is None:
+            raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
+        self._cells, self._surface = cells, cells.surface
+        self._before: Zones | None = None
+        self._pushes: dict[Cell, float] = {}
+        self.push_n: float | None = None
+        """Push at the last frame; None: it had no readings, or nothing pushed."""
+        self._push_before: float | None = None
+        self.complete = False
+        """All of the contact's cells are known; False before the first frame without a contact, too."""
+
+    @property
+    def cells(self) -> list[Cell]:
+        """(row, column) of the switches that are closed."""
+        return sorted(self._pushes)
+
+    @property
+    def closings(self) -> list[Closing]:
+        """The same with the push at which each closed."""
+        return [Closing(*cell, push) for cell, push in sorted(self._pushes.items())]
+
+    def take(self, zones: Zones) -> None:
+        """The next frame, with its readings (:class:`~contactfpga.haptics.WithReadings`)."""
+        before, self._before = self._before, zones
+        self._push_before, self.push_n = self.push_n, self._push(zones)
+        if not zones.pressed:
+            self._pushes, self.complete = {}, True
+        elif before is not None and self.complete:
+            self._compare(before, zones)
+
+    def _push(self, zones: Zones) -> float | None:
+        if zones.units is None:
+            return None
+        center = self._surface.center(self._cells.wrench(zones.units.readings))
+        return None if center is None else center.normal_n
+
+    def _compare(self, before: Zones, after: Zones) -> None:
+        if before.cells is not None and after.cells is not None:
+            new = [(int(row), int(column)) for row, column in np.argwhere(after.cells & ~before.cells)]
+            gone = [(int(row), int(column)) for row, column in np.argwhere(before.cells & ~after.cells)]
+        else:
+            new, gone = self._changed(before, after)
+        for cell in gone:
+            self._pushes.pop(cell, None)
+        for cell in new:
+            push = self._at(before, after, cell[0])
+            if push is not None:
+                self._pushes[cell] = push
+        self.complete = len(self._pushes) == after.pressed
+
+    def _changed(self, before: Zones, after: Zones) -> tuple[list[Cell], list[Cell]]:
+        """New and gone cells by exact sums."""
+        count = after.pressed - before.pressed
+        if count == 0:
+            return [], []
+        if count < 0:
+            one = closed(after, before)
+            return [], [one] if one else []
+        if count == 1 or count > MOST:
+            one = closed(before, after)
+            return [one] if one else [], []
+        _, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))
+        fits = sorted(
+            (_spread([*self._pushes, *some]), list(some))
+            for some in itertools.combinations(self._beside(after), count)
+            if sum(row for row, _ in some) == y and sum(column for _, column in some) == x
+        )
+        alone = len(fits) == 1 or (len(fits) > 1 and fits[0][0] < fits[1][0])
+        return fits[0][1] if alone else [], []
+
+    def _beside(self, zones: Zones) -> list[Cell]:
+        """Open switches around the contact, or where its barycenter is if none was known."""
+        rows, columns = zones.sheet.rows, zones.sheet.columns
+        area, x, y = (int(number) for number in zones.records.sum(axis=0))
+        known = list(self._pushes) or [(round(y / area), round(x / area))]
+        around = {
+            (row + down, column + right)
+            for row, column in known
+            for down in (-1, 0, 1)
+            for right in (-1, 0, 1)
+            if 0 <= row + down < rows and 0 <= column + right < columns
+        }
+        return sorted(around - self._pushes.keys())
+
+    def _at(self, before: Zones, after: Zones, row: int) -> float | None:
+        """The push as the row was scanned, between the two frames: rows come one after the other."""
+        if self.push_n is None:
+            return None
+        if self._push_before is None:
+            return self.push_n
+        adjacent = after.overwritten == before.overwritten and (after.sequence - before.sequence) % 256 == 1
+        share = 0.5 + (row / after.sheet.rows if adjacent else 0.0)
+        return max(0.0, self._push_before + share * (self.push_n - self._push_before))
+
+
+def _spread(cells: list[Cell]) -> int:
+    """How far cells lie apart, in whole numbers: squares of all distances."""
+    return sum((r - row) ** 2 + (c - column) ** 2 for r, c in cells for row, column in cells)

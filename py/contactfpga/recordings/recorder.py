@@ -1,0 +1,206 @@
+"""Writes what boards say into an MCAP file, or into several one after the other."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import threading
+import time
+from pathlib import Path
+
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
+from contactfpga.recordings import messages
+from contactfpga.recordings.mcap_file import McapFile
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.hellos import Cutter
+
+METADATA = "contactfpga"
+"""Name of what stands in a file for each link: its hello and its Skin."""
+
+PATIENCE_S = 2.0
+"""How long a new file waits for hellos to begin with; boards say one twice per second."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Split:
+    """When a new file begins: the first of the two, or never."""
+
+    bytes: float | None = None
+    seconds: float | None = None
+
+    def due(self, file: McapFile, seconds: float) -> bool:
+        """Whether this file, which was begun so long ago, is full."""
+        full = self.bytes is not None and file.size >= self.bytes
+        return file.messages > 0 and (full or (self.seconds is not None and seconds >= self.seconds))
+
+
+class Recorder:
+    """The files, and the links that are recorded. Safe for several threads."""
+
+    def __init__(self, path: str | Path, split: Split | None = None):
+        self.path = Path(path)
+        self.lock = threading.RLock()
+        self._split = split
+        self._links: list[LinkFile] = []
+        self._old: McapFile | None = None
+        self._sizes: dict[Path, int] = {}  # of the files that are closed
+        self.files: list[Path] = []
+        """In order."""
+        self.file = self._begin()
+
+    @property
+    def size(self) -> int:
+        """Bytes in all files."""
+        with self.lock:
+            files = [file for file in (self._old, self.file) if file is not None and file.path in self.files]
+            return sum(self._sizes.values()) + sum(file.size for file in files if file.path not in self._sizes)
+
+    def add(self, name: str, board: Board) -> LinkFile:
+        """A link, by its name, whose board is open."""
+        with self.lock:
+            if name in {link.name for link in self._links}:
+                raise ContactFPGAError(f"two links are named {name!r}; give their Skins different names")
+            link = LinkFile(self, name, facts(name, board), _epoch_ns(board))
+            self._links.append(link)
+            self.file.metadata(METADATA, link.facts)
+            return link
+
+    def turn(self) -> None:
+        """Write what waits for long enough, and begin a new file where one is due. Call it often."""
+        now_s = time.monotonic()
+        with self.lock:
+            for file in (self._old, self.file):
+                if file is not None:
+                    file.flush_old(now_s)
+            if self._old is not None:
+                self._end_old(now_s)
+            elif self._split is not None and self._split.due(self.file, now_s - self._begun_s):
+                self._old, self.file = self.file, self._begin()
+                for link in self._links:
+                    self.file.metadata(METADATA, link.facts)
+                    link.wait_for_hello()
+
+    def close(self) -> None:
+        """Close the files; may be called twice."""
+        with self.lock:
+            for link in self._links:
+                link.switch()
+            for file in (self._old, self.file):
+                if file is not None:
+                    self._close(file)
+            self._old = None
+
+    def _end_old(self, now_s: float) -> None:
+        assert self._old is not None
+        if now_s - self._begun_s > PATIENCE_S:
+            for link in self._links:
+                link.switch()
+        if all(link.file is self.file for link in self._links):
+            self._close(self._old)
+            self._old = None
+
+    def _close(self, file: McapFile) -> None:
+        file.close()
+        self._sizes[file.path] = file.size
+        if not file.messages and len(self.files) > 1:  # begun at the very end
+            file.path.unlink()
+            self.files.remove(file.path)
+            del self._sizes[file.path]
+
+    def _begin(self) -> McapFile:
+        self._begun_s = time.monotonic()
+        path = self.path
+        if self._split is not None:
+            path = path.with_name(f"{path.stem}_{len(self.files) + 1:04d}{path.suffix}")
+        file = McapFile(path)
+        self.files.append(path)
+        return file
+
+
+class LinkFile:
+    """What one link writes, into the file that is its own at the moment."""
+
+    def __init__(self, recorder: Recorder, name: str, facts: dict[str, str], epoch_ns: int):
+        self.name = name
+        self.facts = facts
+        self.file = recorder.file
+        self._recorder = recorder
+        self._epoch_ns = epoch_ns
+        self._topic = topic_of(name)
+        self._cutter: Cutter | None = None
+
+    def time_ns(self, clock_s: float) -> int:
+        """Since 1970, of a moment on the board's :meth:`~contactfpga.Board.clock`."""
+        return self._epoch_ns + round(clock_s * 1e9)
+
+    def take_bytes(self, data: bytes, clock_s: float) -> None:
+        """Bytes that came until then."""
+        with self._recorder.lock:
+            before, after = (data, b"") if self._cutter is None else self._cutter.take(data)
+            self._bytes(before, clock_s)
+            if after:
+                self.switch()
+                self._bytes(after, clock_s)
+            self._recorder.turn()
+
+    def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
+        """A message; ``what`` ends its topic, or is all of it if it begins with a slash."""
+        topic = what if what.startswith("/") else f"{self._topic}/{what}"
+        link = "" if what.startswith("/") else self.name
+        with self._recorder.lock:
+            self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
+
+    def turn(self) -> None:
+        """Nothing comes at the moment: write what waits."""
+        self._recorder.turn()
+
+    def wait_for_hello(self) -> None:
+        """Go on in the recorder's newest file with the next hello."""
+        self._cutter = Cutter()
+
+    def switch(self) -> None:
+        """Go on there now."""
+        cutter, self._cutter = self._cutter, None
+        if cutter is not None and cutter.held:
+            self._bytes(cutter.held, self._last_s)
+        self.file = self._recorder.file
+
+    def _bytes(self, data: bytes, clock_s: float) -> None:
+        self._last_s = clock_s
+        if data:
+            time_ns = self.time_ns(clock_s)
+            self.write("bytes", messages.BYTES, messages.of_bytes(data, time_ns, self.name), clock_s)
+
+
+def topic_of(link: str) -> str:
+    """Of a link's messages: what ROS does not allow in a name becomes a low line."""
+    name = re.sub(r"\W", "_", link, flags=re.ASCII)
+    return f"/{name}" if name and not name[0].isdigit() else f"/_{name}"
+
+
+def facts(name: str, board: Board) -> dict[str, str]:
+    """What a reader wants to know before the first byte."""
+    hello = board.hello
+    try:
+        skin = board.skin.to_toml()
+    except ContactFPGAError:
+        skin = ""
+    return {
+        "link": name,
+        "port": board.port,
+        "fingerprint": hello.fingerprint.hex(),
+        "sheet": json.dumps(dataclasses.asdict(hello.sheet)),
+        "skin": skin,
+    }
+
+
+def link_name(hello: Hello) -> str:
+    """What a board is called that no one named otherwise."""
+    return hello.name or "skin"
+
+
+def _epoch_ns(board: Board) -> int:
+    """What the board's clock has to be added to."""
+    return time.time_ns() - round(board.clock() * 1e9)

@@ -1,0 +1,88 @@
+"""A recording as one long table: a row for each zone of each frame, and one for a frame without zones."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+
+import numpy as np
+
+from contactfpga.recordings.recording import Recording
+from contactfpga.ros.convert import FLAGS
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.zones.zone import Zones
+
+COLUMNS = {
+    "t_s": (np.float64, "seconds since the recording began, on the host's clock"),
+    "link": (np.str_, "whose board it is"),
+    "frame": (np.int64, "frames of this link before this one"),
+    "time_us": (np.int64, "when the frame was scanned, in us since its board's power-up"),
+    "zone": (np.int32, "zones of this frame before this one; -1: nothing touches"),
+    "track": (np.int64, "id of the contact, which stays from frame to frame; -1: none"),
+    "area_mm2": (np.float64, "area of the zone's cells in mm2"),
+    "x_mm": (np.float64, "barycenter along the columns in mm, on the sheet laid flat"),
+    "y_mm": (np.float64, "barycenter along the rows in mm"),
+    "area_cells": (np.int32, "pressed cells of the zone"),
+    "ghost": (np.bool_, "other pressed switches may have made it"),
+    "flags": (np.uint8, "of the frame: the bits of contactfpga_msgs/Zones"),
+}
+"""Type and meaning of each column."""
+
+ROWS = 1 << 16
+"""Of a piece."""
+
+_NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False)
+Piece = dict[str, np.ndarray]
+
+
+def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
+    """The table in pieces of about so many rows: an array for each of :data:`COLUMNS`. It has at least one piece."""
+    trackers: dict[str, Tracker] = {}
+    counts: dict[str, int] = {}
+    found: list[tuple[object, ...]] = []
+    for t_s, link, zones in recording.frames():
+        tracker = trackers.setdefault(link, Tracker())
+        number = counts[link] = counts.get(link, -1) + 1
+        flags = sum(FLAGS[flag] for flag in zones.flags)
+        head = t_s, link, number, zones.time_us
+        found += [(*head, *values, flags) for values in _zones(zones, tracker)]
+        if len(found) >= rows:
+            yield _arrays(found)
+            found = []
+    yield _arrays(found)
+
+
+def _zones(zones: Zones, tracker: Tracker) -> list[tuple[object, ...]]:
+    ids = {id(track.zone): track.id for track in tracker.update(zones).active if not track.held}
+    return [
+        (
+            number,
+            ids.get(id(zone), -1),
+            zone.area_mm2,
+            np.nan if zone.x_mm is None else zone.x_mm,
+            np.nan if zone.y_mm is None else zone.y_mm,
+            zone.area_cells,
+            zone.ghost,
+        )
+        for number, zone in enumerate(zones)
+    ] or [_NOTHING]
+
+
+def _arrays(rows: list[tuple[object, ...]]) -> Piece:
+    columns = zip(*rows, strict=True) if rows else [()] * len(COLUMNS)
+    return {name: np.array(values, kind) for (name, (kind, _)), values in zip(COLUMNS.items(), columns, strict=True)}
+
+
+def facts(recording: Recording) -> str:
+    """What belongs to the table, as JSON: when it began, and each link's sheet and Skin."""
+    links = {
+        link: {
+            "name": hello.name,
+            "fingerprint": hello.fingerprint.hex(),
+            "sheet": dataclasses.asdict(hello.sheet),
+            "skin": None if (skin := recording.skins[link]) is None else skin.to_toml(),
+        }
+        for link, hello in recording.links.items()
+    }
+    return json.dumps({"start_s": recording.start_s, "duration_s": recording.duration_s, "links": links})

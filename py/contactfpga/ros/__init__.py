@@ -1,0 +1,7 @@
+"""ROS 2: what a board says as messages of ``contactfpga_msgs``, and a way to publish them without ROS (docs/ros.md)."""
+
+from __future__ import annotations
+
+from contactfpga.ros.types import PACKAGE, messages
+
+__all__ = ["PACKAGE", "messages"]

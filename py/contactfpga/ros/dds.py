@@ -1,0 +1,110 @@
+"""Publish to ROS 2 nodes without ROS: Cyclone DDS, on this computer alone unless the network is asked for."""
+
+from __future__ import annotations
+
+import functools
+import re
+from typing import Any
+
+from contactfpga.errors import MissingExtra
+from contactfpga.inputs.values import shown
+from contactfpga.ros.hashes import type_hash
+from contactfpga.ros.loopback import kept_inside
+from contactfpga.ros.settings import TOPICS, Topic
+from contactfpga.ros.types import Field, message_type
+
+LOCALHOST = """<CycloneDDS><Domain Id="any">
+<General><AllowMulticast>false</AllowMulticast>
+<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+{compatibility}</Domain></CycloneDDS>"""
+NETWORK = '<CycloneDDS><Domain Id="any">{compatibility}</Domain></CycloneDDS>'
+_NO_TYPE_INFORMATION = "<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></Compatibility>"
+"""Fast DDS of Kilted describes types in another way than Cyclone; the hash in the user data tells them apart."""
+
+
+class Publisher:
+    """A participant with a writer for each topic; a context manager."""
+
+    def __init__(self, namespace: str = "skin", domain: int = 0, network: bool = False):
+        """``namespace`` is that of the topics; ``domain`` is ROS_DOMAIN_ID. On this computer alone, unless ``network``.
+        Raises :class:`~contactfpga.MissingExtra`."""
+        try:
+            from cyclonedds.domain import Domain, DomainParticipant
+        except ModuleNotFoundError as error:
+            raise MissingExtra(f"publishing to ROS 2 ({error})", "ros") from None
+        if not re.fullmatch(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", namespace):
+            raise ValueError(f"namespace is {shown(namespace)}; it has letters, digits and _, and / between parts")
+        form = NETWORK if network else LOCALHOST
+        self._namespace = namespace
+        config = form.format(compatibility=_NO_TYPE_INFORMATION)
+
+        def join() -> tuple[Any, Any]:
+            return Domain(domain, config), DomainParticipant(domain)
+
+        self._domain, self._participant = join() if network else kept_inside(join)
+        self._writers: dict[str, Any] = {}
+
+    def topic(self, name: str) -> str:
+        """The whole name of a topic."""
+        return TOPICS[name].resolved(self._namespace)
+
+    def send(self, topic: str, data: bytes) -> None:
+        """Publish a message by the name of its topic, a key of :data:`TOPICS`."""
+        if topic not in self._writers:
+            self._writers[topic] = self._writer(TOPICS[topic])
+        writer, kind = self._writers[topic]
+        sample = object.__new__(kind)
+        sample.serialize = lambda **_: data  # it is written by us already, forty times as fast
+        writer.write(sample)
+
+    def _writer(self, topic: Topic) -> tuple[Any, type]:
+        from cyclonedds.core import Policy, Qos
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.topic import Topic as DdsTopic
+        from cyclonedds.util import duration
+
+        kind = idl_type(topic.type)
+        qos = Qos(
+            Policy.Reliability.Reliable(duration(milliseconds=100)),
+            Policy.Durability.TransientLocal if topic.latched else Policy.Durability.Volatile,
+            Policy.History.KeepLast(topic.depth),
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+            Policy.Userdata(f"typehash={type_hash(topic.type)};".encode()),
+        )
+        return DataWriter(
+            self._participant, DdsTopic(self._participant, f"rt{self.topic(topic.name)}", kind), qos=qos
+        ), kind
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._writers.clear()
+        del self._participant, self._domain
+
+    def __enter__(self) -> Publisher:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+@functools.cache
+def idl_type(name: str) -> Any:
+    """The type as cyclonedds describes it, under the name that ROS 2 gives it on the wire."""
+    from cyclonedds.idl import make_idl_struct
+
+    package, _, short = name.partition("/")
+    fields = {field.name: _idl_field(field) for field in message_type(name).fields}
+    return make_idl_struct(short, f"{package}.msg.dds_.{short}_", fields)
+
+
+def _idl_field(field: Field) -> Any:
+    from cyclonedds.idl import types
+
+    plain: dict[str, Any] = {"string": str, "bool": bool, "byte": types.uint8}
+    kind = idl_type(field.type) if field.nested else plain.get(field.type) or getattr(types, field.type)
+    if field.count is None:
+        return kind
+    many: Any = types.array if field.count else types.sequence
+    return many[kind, field.count] if field.count else many[kind]

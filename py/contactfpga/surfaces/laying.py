@@ -1,0 +1,182 @@
+"""A sheet laid on a triangle mesh: where each of its cells comes to lie."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga.errors import MissingExtra
+from contactfpga.surfaces.answer import SurfaceError
+from contactfpga.surfaces.mesh import Mesh
+from contactfpga.surfaces.shapes import Floats
+
+FINE = 8
+"""Rays per pitch where arc lengths are measured."""
+CHUNK = 2_000_000
+"""Pairs of ray and triangle at a time."""
+EDGE = 0.8
+"""Cosine of the angle from which on two triangles meet at an edge and not on a round surface."""
+SUFFIXES = (".stl", ".obj", ".ply", ".off")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Triangles:
+    """A triangle mesh in mm."""
+
+    corners_mm: Floats
+    """(n, 3, 3)."""
+    normals: Floats
+    """(n, 3, 3): at each corner."""
+
+    @classmethod
+    def load(cls, path: str | Path, scale: float = 1.0) -> Triangles:
+        """From an STL or OBJ file, whose lengths are times ``scale`` mm. Raises :class:`SurfaceError`, OSError."""
+        path = Path(path)
+        if path.suffix.lower() not in SUFFIXES:
+            raise SurfaceError(f"{path}: a mesh is a file of {', '.join(SUFFIXES)}")
+        try:
+            import trimesh
+        except ModuleNotFoundError as error:
+            raise MissingExtra(f"reading a mesh ({error})", "surface") from None
+        with open(path, "rb") as file:
+            try:
+                mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower())
+            except Exception as error:  # whatever a parser of many formats stumbles over
+                raise SurfaceError(f"{path}: not a mesh: {str(error) or type(error).__name__}") from None
+        if not len(getattr(mesh, "faces", ())):
+            raise SurfaceError(f"{path}: no triangles in it")
+        return cls(scale * np.asarray(mesh.triangles, float), _corner_normals(mesh))
+
+    def hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
+        """(n, 3) points that rays meet first, and outward normals there; NaN where they meet nothing."""
+        points, normals = np.full(starts.shape, np.nan), np.full(starts.shape, np.nan)
+        step = max(1, CHUNK // len(self.corners_mm))
+        for first in range(0, len(starts), step):
+            part = slice(first, first + step)
+            points[part], normals[part] = self._hit(starts[part], ways[part])
+        return points, normals
+
+    def _hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
+        """By Moeller and Trumbore, each ray with each triangle."""
+        corner = self.corners_mm[:, 0]
+        first, second = self.corners_mm[:, 1] - corner, self.corners_mm[:, 2] - corner
+        aside = np.cross(ways[:, None], second[None])
+        volume = (aside * first).sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = starts[:, None] - corner[None]
+            u = (away * aside).sum(-1) / volume
+            turned = np.cross(away, first[None])
+            v = (turned * ways[:, None]).sum(-1) / volume
+            distance = (turned * second).sum(-1) / volume
+            inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (distance > 0)
+        distance = np.where(inside, distance, np.inf)
+        which = distance.argmin(axis=1)
+        rays = np.arange(len(starts))
+        met = np.isfinite(distance[rays, which])
+        u, v = u[rays, which], v[rays, which]
+        weights = np.stack([1 - u - v, u, v], axis=1)
+        normals = (weights[:, :, None] * self.normals[which]).sum(axis=1)
+        normals *= np.where((normals * ways).sum(axis=1) > 0, -1.0, 1.0)[:, None]
+        points = starts + np.where(met, distance[rays, which], np.nan)[:, None] * ways
+        return points, np.where(met[:, None], normals, np.nan)
+
+    @property
+    def size_mm(self) -> float:
+        """More than the distance of any two corners."""
+        spread = self.corners_mm.reshape(-1, 3)
+        return float(np.linalg.norm(spread.max(axis=0) - spread.min(axis=0))) + 1.0
+
+
+def _corner_normals(mesh: Any) -> Floats:
+    """(n, 3, 3): at each corner the mean of the triangles around it, by area, but for those beyond an edge."""
+    faces, around = np.asarray(mesh.faces), np.asarray(mesh.vertex_faces)
+    sized = np.asarray(mesh.face_normals, float) * np.asarray(mesh.area_faces, float)[:, None]
+    found = np.empty((len(faces), 3, 3))
+    for corner in range(3):
+        near = around[faces[:, corner]]
+        smooth = np.einsum("fkx,fx->fk", mesh.face_normals[near], mesh.face_normals) > EDGE
+        found[:, corner] = np.einsum("fkx,fk->fx", sized[near], smooth & (near >= 0))
+    sizes = np.linalg.norm(found, axis=2)[..., None]
+    return np.where(sizes > 0, found / np.where(sizes > 0, sizes, 1), np.asarray(mesh.face_normals)[:, None])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Laid:
+    """The sheet and where its own frame lies in the mesh's."""
+
+    rows: int
+    columns: int
+    pitch_x_mm: float
+    pitch_y_mm: float
+    rotation: Floats
+    """(3, 3)."""
+    origin_mm: Floats
+
+    def projected(self, mesh: Triangles) -> Mesh:
+        """Each cell of the flat sheet goes straight down, against z, to the mesh; distances grow where it is steep."""
+        x, y = np.meshgrid(np.arange(self.columns) * self.pitch_x_mm, np.arange(self.rows) * self.pitch_y_mm)
+        flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+        down = -self.rotation[:, 2]
+        starts = self._placed(flat) - down * mesh.size_mm * 2
+        points, normals = mesh.hit(starts, np.broadcast_to(down, starts.shape))
+        return self._table(points.reshape(self.rows, self.columns, 3), normals.reshape(self.rows, self.columns, 3))
+
+    def unrolled(self, mesh: Triangles, *, closed: bool = False) -> Mesh:
+        """Column 0 goes up along z at the side where x is, row 0 around z from there. Along both, cells lie a pitch
+        apart on the mesh; a closed sheet's columns share the way around evenly."""
+        heights = self._heights(mesh)
+        points, normals = np.empty((2, self.rows, self.columns, 3))
+        # An arc is found between rays: fine enough that its chord is no shorter by more than a few parts in 10,000.
+        angles = np.linspace(0, 2 * np.pi, max(360, FINE * self.columns) + 1)
+        for row, height in enumerate(heights):
+            curve, _ = self._seen(mesh, angles, np.full(len(angles), height))
+            ways = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+            if np.isnan(curve).any():
+                raise SurfaceError(
+                    f"row {row}, {height:.1f} mm along the axis, does not meet the mesh all the way round"
+                )
+            pitch = ways[-1] / self.columns if closed else self.pitch_x_mm
+            if pitch * (self.columns - 1) >= ways[-1]:
+                raise SurfaceError(f"row {row}: {self.columns} columns are longer than the {ways[-1]:.1f} mm around it")
+            at = np.interp(np.arange(self.columns) * pitch, ways, angles)
+            points[row], normals[row] = self._seen(mesh, at, np.full(self.columns, height))
+        return self._table(points, normals, closed=closed)
+
+    def _heights(self, mesh: Triangles) -> Floats:
+        """Along z, of each row: a pitch apart on the mesh along column 0."""
+        far = (self.rows - 1) * self.pitch_y_mm
+        fine = np.linspace(0, far, FINE * self.rows)
+        line, _ = self._seen(mesh, np.zeros(len(fine)), fine)
+        known = np.isfinite(line.sum(axis=1))
+        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        if not known[0]:
+            raise SurfaceError("column 0 does not meet the mesh at row 0; move the sheet's frame")
+        end = len(fine) if known.all() else int(np.argmin(known))
+        ways = np.concatenate([[0], np.cumsum(steps[: end - 1])])
+        if ways[-1] < far - 1e-6:
+            raise SurfaceError(f"column 0 is {far:g} mm long; the mesh ends after {ways[-1]:.1f} mm")
+        return np.asarray(np.interp(np.arange(self.rows) * self.pitch_y_mm, ways, fine[:end]))
+
+    def _seen(self, mesh: Triangles, angles: Floats, heights: Floats) -> tuple[Floats, Floats]:
+        """What is met from outside toward the axis."""
+        out = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
+        far = 2 * mesh.size_mm
+        starts = self._placed(far * out + heights[:, None] * np.array([0.0, 0.0, 1.0]))
+        points, normals = mesh.hit(starts, -out @ self.rotation.T)
+        beyond = np.linalg.norm(points - starts, axis=1) > far  # met behind the axis alone
+        points[beyond] = normals[beyond] = np.nan
+        return points, normals
+
+    def _placed(self, points_mm: Floats) -> Floats:
+        return np.asarray(points_mm @ self.rotation.T + self.origin_mm)
+
+    def _table(self, points: Floats, normals: Floats, closed: bool = False) -> Mesh:
+        missed = np.isnan(points).any(axis=2)
+        if missed.any():
+            row, column = np.argwhere(missed)[0]
+            which = f"{missed.sum()} cells do not meet the mesh, among them row {row}, column {column}"
+            raise SurfaceError(f"{which}; move the sheet's frame")
+        return Mesh(points, normals, self.pitch_x_mm, self.pitch_y_mm, closed)

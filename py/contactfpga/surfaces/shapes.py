@@ -1,0 +1,45 @@
+"""Plane and cylinder as plain functions: all lengths are in one unit, whichever it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
+UP: Vector = (0.0, 0.0, 1.0)
+
+
+def on_plane(x: float, y: float, height: float) -> tuple[Vector, Vector]:
+    """Point and outward normal of a place on the plane z = ``height``."""
+    return (x, y, height), UP
+
+
+def on_cylinder(x: float, y: float, radius: float) -> tuple[Vector, Vector]:
+    """The same on a cylinder about z: ``x`` is the arc length from the x axis toward the y axis, ``y`` runs along z."""
+    angle = x / radius
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return (radius * cosine, radius * sine, y), (cosine, sine, 0.0)
+
+
+def off_cylinder(point: Vector, radius: float) -> tuple[float, float]:
+    """The place of the cylinder's point nearest to this one, with the arc from half a turn back to half a turn on."""
+    return radius * math.atan2(point[1], point[0]), point[2]
+
+
+def angles_of(x: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Cosines and sines of arc lengths, by the same functions as for one: numpy's may differ in the last bit."""
+    return _each(math.cos, x / radius), _each(math.sin, x / radius)
+
+
+def _each(function: Callable[[float], float], values: Floats) -> Floats:
+    return np.array([function(value) for value in values.ravel().tolist()], float).reshape(values.shape)
+
+
+def is_one(*values: Any) -> bool:
+    """Whether these are plain numbers and no arrays."""
+    return all(isinstance(value, (float, int)) for value in values)

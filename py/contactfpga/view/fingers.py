@@ -1,0 +1,120 @@
+"""Fingers that the mouse puts on a virtual board."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Finger:
+    """A round contact."""
+
+    x_mm: float
+    """Along the columns, on the sheet laid flat."""
+    y_mm: float
+    """Along the rows."""
+    radius_mm: float
+    force_n: float
+
+    def covers(self, x_mm: float, y_mm: float) -> bool:
+        """Whether this place lies under it."""
+        return (self.x_mm - x_mm) ** 2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
+
+
+class Touchable(Protocol):
+    """A virtual board; :class:`contactfpga_sim.board.virtual.VirtualBoard` is one."""
+
+    def touch(self, fingers: Sequence[Finger]) -> None:
+        """From now on these touch the sheet, besides its scene, until the next call; from any thread."""
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """(rows, columns) bool: the switches that are closed."""
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+
+
+class Hand:
+    """What the mouse does, as fingers. A click puts one down where none is and lifts the one that is there; a drag
+    moves the one where it begins, or else one that is lifted at its end. Safe for several threads.
+
+    :attr:`radius_mm` and :attr:`force_n` are those of the next finger.
+    """
+
+    def __init__(self, board: Touchable, radius_mm: float, force_n: float = 5.0):
+        self.radius_mm, self.force_n = radius_mm, force_n
+        self.board = board
+        self._lock = threading.Lock()
+        self._down: list[Finger] = []
+        self._dragged: dict[object, Finger] = {}
+        self._stays: set[object] = set()
+
+    @property
+    def fingers(self) -> list[Finger]:
+        """All that touch the sheet."""
+        with self._lock:
+            return self._all()
+
+    def click(self, x_mm: float, y_mm: float) -> None:
+        """Put a finger down, or lift those that are there."""
+        with self._lock:
+            left = [finger for finger in self._down if not finger.covers(x_mm, y_mm)]
+            if len(left) == len(self._down):
+                left.append(self._finger(x_mm, y_mm))
+            self._down = left
+            self._tell()
+
+    def drag(self, who: object, x_mm: float, y_mm: float) -> None:
+        """Begin or go on; ``who``: whose mouse it is."""
+        with self._lock:
+            before = self._dragged.get(who) or self._taken(who, x_mm, y_mm)
+            self._dragged[who] = dataclasses.replace(before, x_mm=x_mm, y_mm=y_mm)
+            self._tell()
+
+    def drop(self, who: object) -> None:
+        """End of a drag."""
+        with self._lock:
+            finger = self._dragged.pop(who, None)
+            if finger is not None and who in self._stays:
+                self._down.append(finger)
+            self._stays.discard(who)
+            self._tell()
+
+    def resize(self, radius_mm: float | None = None, force_n: float | None = None) -> None:
+        """Also of those that are down."""
+        self.radius_mm = self.radius_mm if radius_mm is None else radius_mm
+        self.force_n = self.force_n if force_n is None else force_n
+        with self._lock:
+            sized = {"radius_mm": self.radius_mm, "force_n": self.force_n}
+            self._down = [dataclasses.replace(finger, **sized) for finger in self._down]
+            self._tell()
+
+    def lift(self) -> None:
+        """Lift all."""
+        with self._lock:
+            self._down, self._dragged, self._stays = [], {}, set()
+            self._tell()
+
+    def _taken(self, who: object, x_mm: float, y_mm: float) -> Finger:
+        """The finger with which a drag begins."""
+        for finger in self._down:
+            if finger.covers(x_mm, y_mm):
+                self._down.remove(finger)
+                self._stays.add(who)
+                return finger
+        return self._finger(x_mm, y_mm)
+
+    def _finger(self, x_mm: float, y_mm: float) -> Finger:
+        return Finger(x_mm, y_mm, self.radius_mm, self.force_n)
+
+    def _all(self) -> list[Finger]:
+        return [*self._down, *self._dragged.values()]
+
+    def _tell(self) -> None:
+        self.board.touch(self._all())

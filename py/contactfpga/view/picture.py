@@ -1,0 +1,116 @@
+"""What is drawn of a frame, as plain arrays: colors of the cells, circles, barycenters, trails."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+
+from contactfpga import picture_style
+from contactfpga.surfaces import Surface
+from contactfpga.tracking.tracks import Tracks
+from contactfpga.view.tiles import MM
+from contactfpga.zones.zone import Zone, Zones
+
+SIDES = 48
+"""Of a circle."""
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Of ``#rrggbb``."""
+    value = int(color[1:], 16)
+    return value >> 16, value >> 8 & 0xFF, value & 0xFF
+
+
+OPEN, TRUE, REPORTED, GHOST = (
+    rgb(color) for color in (picture_style.SHEET, picture_style.SKY, picture_style.BLUE, picture_style.ORANGE)
+)
+"""Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;
+perhaps made by other closed ones."""
+
+CIRCLE, TRAIL, PUSH = (rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE))
+
+
+def tile_colors(zones: Zones, truth: np.ndarray | None = None) -> np.ndarray:
+    """(n, 3) uint8, row by row. ``truth``: the cells that are closed on a virtual board."""
+    shape = (zones.sheet.rows, zones.sheet.columns)
+    colors = np.empty((*shape, 3), np.uint8)
+    colors[:] = OPEN
+    if truth is not None:
+        colors[truth] = TRUE
+    if zones.cells is not None:
+        colors[zones.cells] = REPORTED
+        ghosts = zones.ghost_cells
+        if ghosts is not None:
+            colors[ghosts & zones.cells] = GHOST
+    return colors.reshape(-1, 3)
+
+
+@dataclasses.dataclass(frozen=True)
+class Spots:
+    """Barycenters and circles of a frame's zones, in m, lifted off the sheet."""
+
+    points: np.ndarray
+    """(n, 3)"""
+    circles: np.ndarray
+    """(m, 2, 3) lines around them: each circle has its zone's area."""
+
+
+def spots(zones: Zones, surface: Surface, lift_mm: float) -> Spots:
+    """Of all zones that lie somewhere."""
+    placed = [zone for zone in zones if zone.x_mm is not None]
+    if not placed:
+        return Spots(np.zeros((0, 3)), np.zeros((0, 2, 3)))
+    x_mm, y_mm = np.array([(zone.x_mm, zone.y_mm) for zone in placed], float).T
+    points = _lifted(surface, x_mm, y_mm, lift_mm)
+    return Spots(points, np.concatenate([_circle(zone, surface, lift_mm) for zone in placed]))
+
+
+def radius_mm(zone: Zone) -> float:
+    """Of the circle that has the zone's area."""
+    return math.sqrt(zone.area_mm2 / math.pi)
+
+
+def _circle(zone: Zone, surface: Surface, lift_mm: float) -> np.ndarray:
+    angles = np.linspace(0, 2 * math.pi, SIDES + 1)
+    radius = radius_mm(zone)
+    assert zone.x_mm is not None
+    assert zone.y_mm is not None
+    rim = _lifted(surface, zone.x_mm + radius * np.cos(angles), zone.y_mm + radius * np.sin(angles), lift_mm)
+    return np.stack([rim[:-1], rim[1:]], axis=1)
+
+
+def _lifted(surface: Surface, x_mm: np.ndarray, y_mm: np.ndarray, lift_mm: float) -> np.ndarray:
+    points, normals = surface.place(x_mm, y_mm)
+    return (points + lift_mm * normals) * MM
+
+
+class Trails:
+    """The ways of the contacts over the last moments, in m."""
+
+    def __init__(self, surface: Surface, lift_mm: float, seconds: float = 1.0):
+        self._surface, self._lift_mm, self._us = surface, lift_mm, seconds * 1e6
+        self._ways: dict[int, list[tuple[int, np.ndarray]]] = {}
+
+    def add(self, tracks: Tracks) -> None:
+        """The contacts of the next frame."""
+        if tracks.restarted:
+            self._ways.clear()
+        for track in tracks.active:
+            zone = track.zone
+            if zone.x_mm is None or zone.y_mm is None or track.held:
+                continue
+            place = _lifted(self._surface, np.array([zone.x_mm]), np.array([zone.y_mm]), self._lift_mm)[0]
+            self._ways.setdefault(track.id, []).append((tracks.time_us, place))
+        for number, way in list(self._ways.items()):
+            self._ways[number] = kept = [step for step in way if tracks.time_us - step[0] <= self._us]
+            if not kept:
+                del self._ways[number]
+
+    @property
+    def lines(self) -> np.ndarray:
+        """(n, 2, 3)"""
+        found = [[one[1], other[1]] for way in self._ways.values() for one, other in itertools.pairwise(way)]
+        return np.array(found) if found else np.zeros((0, 2, 3))

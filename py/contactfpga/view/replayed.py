@@ -1,0 +1,184 @@
+"""Recordings of one board, which can be played from any moment on: files of its bytes, and MCAP files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from contactfpga.driver import driver, recording
+from contactfpga.driver.board import Board
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.mcap_bytes import MAGIC
+from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.inputs.files import open_regular
+from contactfpga.skin.sheet import Sheet
+from contactfpga.zones.run import Run
+from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.recordings import Recording
+
+
+class Recorded(Protocol):
+    """A recording of one board."""
+
+    title: str
+    sheet: Sheet
+
+    @property
+    def duration_s(self) -> float:
+        """How long it is."""
+
+    def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
+        """Time from its beginning in s and frame, in order, from ``start_s`` on and at most up to ``end_s``."""
+
+    def lateness(self) -> Iterator[tuple[float, float]]:
+        """Time from its beginning in s, and how much later than the earliest, in s, bytes came that ended a frame.
+        Nothing where times of arrival are not in the file."""
+
+
+def is_recording(name: str) -> bool:
+    """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
+    return name.startswith(recording.SCHEME) or Path(name).is_file()
+
+
+def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
+    """A recording by its path, or by ``replay://FILE``; ``link``: of several in the file.
+
+    Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file where
+    ``[record]`` is absent.
+    """
+    port = name if name.startswith(recording.SCHEME) else f"{recording.SCHEME}{name}"
+    asked = recording.parse(port)
+    if not _is_mcap(asked.path):
+        return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout)
+    from contactfpga.recordings import Recording
+
+    return LinkRecording(Recording(asked.path), link or asked.link)
+
+
+def _is_mcap(path: Path) -> bool:
+    try:
+        with open_regular(path) as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except (OSError, RuntimeError, ValueError):  # which is said where it is opened
+        return False
+
+
+class Clock:
+    """Device times in us as seconds since the first one. They go on where a board was started again."""
+
+    def __init__(self) -> None:
+        self._before_us: int | None = None
+        self._passed_us = 0
+
+    def take(self, time_us: int) -> float:
+        """The next frame's."""
+        if self._before_us is not None:
+            self._passed_us += max(0, time_us - self._before_us)
+        self._before_us = time_us
+        return self._passed_us / 1e6
+
+
+@dataclasses.dataclass(frozen=True)
+class _Piece:
+    """What one read of the file gives."""
+
+    frames: int
+    last_s: float
+
+
+class ByteRecording:
+    """What ``contactfpga zones --record FILE`` writes: ``replay://FILE``."""
+
+    def __init__(self, port: str, timeout: float = 1.0):
+        self.title = self.port = port
+        self._timeout = timeout
+        with self._opened() as board:
+            self.sheet: Sheet = board.sheet
+            self._pieces = list(_pieces(board))
+        if not self._pieces:
+            raise ContactFPGAError(f"{port} holds no frame that can be shown")
+
+    def _opened(self) -> Board:
+        return driver.open(self.port, timeout=self._timeout)
+
+    @property
+    def duration_s(self) -> float:
+        return self._pieces[-1].last_s
+
+    @property
+    def count(self) -> int:
+        """Frames in all."""
+        return sum(piece.frames for piece in self._pieces)
+
+    def lateness(self) -> Iterator[tuple[float, float]]:
+        return iter(())
+
+    def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
+        """As :meth:`Recorded.frames`. Frames before ``start_s`` are skipped at once."""
+        clock = Clock()
+        with self._opened() as board:
+            for piece in self._pieces:
+                if piece.last_s >= start_s:
+                    break
+                for time_us in board.batch(timeout=self._timeout).frames["time_us"].tolist():
+                    clock.take(time_us)
+            for zones in board:
+                seconds = clock.take(zones.time_us)
+                if end_s is not None and seconds > end_s:
+                    return
+                if seconds >= start_s:
+                    yield seconds, zones
+
+
+class LinkRecording:
+    """A board in what ``contactfpga record`` writes."""
+
+    def __init__(self, recording: Recording, link: str | None = None):
+        links = recording.links
+        if link is None:
+            link = next(iter(links))
+        if link not in links:
+            raise ContactFPGAError(f"{recording.path} has no link {link!r}; it has {', '.join(links)}")
+        self._recording, self._link = recording, link
+        self.title = f"{recording.path.name}, {link}"
+        self.sheet = links[link].sheet
+
+    @property
+    def duration_s(self) -> float:
+        return self._recording.duration_s
+
+    def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
+        """As :meth:`Recorded.frames`."""
+        return ((seconds, zones) for seconds, _, zones in self._recording.frames(start_s, end_s, self._link))
+
+    def lateness(self) -> Iterator[tuple[float, float]]:
+        """As :meth:`Recorded.lateness`."""
+        conversation = Conversation(self.title, live=False)
+        found = []
+        for seconds, data in self._recording.raw_bytes(self._link):
+            times_us = [_last_us(event) for event in conversation.receive_runs(data, 0.0)]
+            if known := [time_us for time_us in times_us if time_us is not None]:
+                found.append((seconds, seconds - known[-1] / 1e6))
+        least = min((late for _, late in found), default=0.0)
+        return ((seconds, late - least) for seconds, late in found)
+
+
+def _last_us(event: object) -> int | None:
+    if isinstance(event, Run):
+        return int(event.times_us[-1])
+    return event.zones.time_us if isinstance(event, Arrival) else None
+
+
+def _pieces(board: Board) -> Iterator[_Piece]:
+    clock = Clock()
+    while True:
+        try:
+            times_us = board.batch().frames["time_us"].tolist()
+        except ReplayEnded:
+            return
+        seconds = [clock.take(time_us) for time_us in times_us]
+        yield _Piece(len(seconds), seconds[-1])

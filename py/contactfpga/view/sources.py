@@ -1,0 +1,120 @@
+"""What is shown: a board, a virtual one, or a recording of one, one moment after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import time
+from typing import Protocol
+
+import numpy as np
+
+from contactfpga.driver.board import Board
+from contactfpga.errors import ReadTimeout
+from contactfpga.skin.sheet import Sheet
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
+from contactfpga.view.fingers import Touchable
+from contactfpga.view.meter import Meter
+from contactfpga.view.pace import Pace
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zones
+
+TURN_S = 0.02
+"""A moment is shown for so long."""
+
+KEEPS_UP = 0.97
+"""A board that reaches this share of real time is said to keep up."""
+
+WAITING = 65_536
+"""Frames that may wait for a moment's end."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Moment:
+    """What there is to draw."""
+
+    zones: Zones
+    """The newest frame."""
+    tracks: Tracks
+    truth: np.ndarray | None = None
+    """(rows, columns) bool: what is closed on a virtual board."""
+
+
+class Source(Protocol):
+    """Where moments come from."""
+
+    title: str
+    sheet: Sheet
+    meter: Meter
+
+    def turn(self) -> Moment | None:
+        """Wait for a while, and return what is new; None: nothing is. Raises what a board does."""
+
+    def told(self) -> list[tuple[str, str]]:
+        """Further facts to show, as name and value."""
+
+    def close(self) -> None:
+        """Give the port back."""
+
+
+class BoardSource:
+    """A board, or with ``virtual`` one in simulated time, which passes here as real time does."""
+
+    def __init__(self, board: Board, title: str, virtual: Touchable | None = None):
+        self.title, self.sheet = title, board.sheet
+        self.meter = Meter()
+        self._board, self._virtual = board, virtual
+        self._frames = board.subscribe(WAITING)
+        self._pace = Pace(board.clock()) if virtual is not None else None
+        # One frame in many is followed, so a contact may be gone from view for longer than from the board's.
+        self._tracker = Tracker(gate_mm=40.0, hold_ms=60.0)
+
+    def turn(self) -> Moment | None:
+        if not self._wait():
+            return None
+        zones = self._board.latest()
+        truth = None if self._virtual is None else self._virtual.pressed
+        return Moment(zones, self._tracker.update(zones), truth)
+
+    def _wait(self) -> bool:
+        """Whether frames came."""
+        seconds = TURN_S
+        if self._pace is not None:
+            due = self._pace.due(self._board.clock())
+            if due < TURN_S:
+                time.sleep(TURN_S - due)
+            seconds = max(due, TURN_S)
+        with contextlib.suppress(ReadTimeout):
+            batch = self.frames(seconds)
+            self.meter.take(batch, self._board.stats, self._frames.dropped)
+            if self._virtual is not None:  # whose clock is that of its arrivals
+                self.meter.take_latency(batch)
+            return True
+        return False
+
+    def frames(self, seconds: float) -> Batch:
+        """All that come meanwhile. Raises :class:`~contactfpga.ReadTimeout` where none does."""
+        return self._frames.batch(seconds, seconds)
+
+    def told(self) -> list[tuple[str, str]]:
+        stats = self.meter.stats
+        rows = [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
+        if self.meter.dropped:
+            rows.append(("not shown", f"{self.meter.dropped} frames, which came faster than they were read"))
+        late = self.meter.late_s
+        if late is not None:
+            rows.append(("latency", f"{late * 1e6:,.0f} us from the sample of the first row to the last byte"))
+        if self._pace is not None:
+            rows.append(("board time", paced(self._pace)))
+        return rows
+
+    def close(self) -> None:
+        self._board.close()
+
+
+def paced(pace: Pace) -> str:
+    """How the virtual board's time goes."""
+    if pace.share > KEEPS_UP:
+        return "real time"
+    return f"{pace.share:.0%} of real time, as fast as this machine simulates it; {pace.slip_s:.1f} s slipped"

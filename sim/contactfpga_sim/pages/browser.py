@@ -1,0 +1,172 @@
+"""The view in a browser without a window: what a user sees of it, and when."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactfpga.errors import MissingExtra, MissingTool
+from contactfpga.view.opening import Shown
+from contactfpga.view.tiles import MM
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+# Without a graphics card all is drawn by the processor.
+SOFTWARE = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+PATIENCE_S = 60.0
+
+WATCH = """
+() => {
+    const canvas = [...document.querySelectorAll('canvas')].sort((a, b) => b.width - a.width)[0];
+    const probe = document.createElement('canvas');
+    probe.width = probe.height = 9;
+    const context = probe.getContext('2d', {willReadFrequently: true});
+    const now = () => performance.timeOrigin + performance.now();
+    document.addEventListener('pointerup', () => { window.clicked_ms = now(); }, true);
+    window.pixels = (x, y) => {
+        context.clearRect(0, 0, 9, 9);
+        context.drawImage(canvas, x * canvas.width - 4, y * canvas.height - 4, 9, 9, 0, 0, 9, 9);
+        return context.getImageData(0, 0, 9, 9).data;
+    };
+    window.watch = (x, y) => {
+        window.drawn_ms = window.clicked_ms = null;
+        const look = () => {
+            const data = window.pixels(x, y);
+            for (let i = 0; i < data.length; i += 4) {
+                if (data[i] > data[i + 1] + 60 && data[i] > data[i + 2] + 60) {
+                    window.drawn_ms = now();
+                    return;
+                }
+            }
+            requestAnimationFrame(look);
+        };
+        requestAnimationFrame(look);
+    };
+}
+"""
+"""``watch(x, y)``: from then on each drawn frame is looked at until a zone's barycenter is at that share of the canvas,
+to whose color nothing else that is drawn comes near."""
+
+
+def program() -> str | None:
+    """The browser that is installed; None: there is none."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+class Visitor:
+    """A page that shows a view."""
+
+    def __init__(self, page: Any, shown: Shown):
+        self.page, self._shown = page, shown
+        page.goto(shown.url)
+        until = time.monotonic() + PATIENCE_S
+        while not shown.web.get_clients():
+            if time.monotonic() > until:
+                raise TimeoutError("the page never said where its camera is")
+            page.wait_for_timeout(50)
+        page.evaluate(WATCH)
+        page.wait_for_timeout(500)
+
+    def place(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        """Where a place of the sheet is on the canvas, as shares of its width and height."""
+        camera = next(iter(self._shown.web.get_clients().values())).camera
+        point, _ = self._shown.view.stage.tiles.surface.place(x_mm, y_mm)
+        x, y, z = turned(camera.wxyz, np.array(point) * MM - camera.position)
+        scale = 0.5 / np.tan(camera.fov / 2) / z
+        return 0.5 + x * scale / camera.aspect, 0.5 + y * scale
+
+    def click(self, x_mm: float, y_mm: float) -> None:
+        """With the mouse, as a user does."""
+        x, y = self._pixel(x_mm, y_mm)
+        self.page.mouse.move(x, y)
+        self.page.wait_for_timeout(100)
+        self.page.mouse.down()
+        self.page.mouse.up()
+
+    def drag(self, *places: tuple[float, float], hold_ms: int = 300) -> None:
+        """From the first to the last, which is held for a while; the button stays down."""
+        self.page.mouse.move(*self._pixel(*places[0]))
+        self.page.mouse.down()
+        for place in places[1:]:
+            self.page.mouse.move(*self._pixel(*place), steps=8)
+            self.page.wait_for_timeout(hold_ms)
+
+    def watch(self, x_mm: float, y_mm: float) -> None:
+        """Wait from now on, in the page, until a barycenter is drawn there."""
+        self.page.evaluate("([x, y]) => window.watch(x, y)", list(self.place(x_mm, y_mm)))
+
+    def drawn_s(self, seconds: float = PATIENCE_S) -> tuple[float, float]:
+        """When the mouse was released and when the barycenter was drawn, as in ``time.time()``."""
+        self.page.wait_for_function("() => window.drawn_ms", timeout=seconds * 1e3)
+        clicked, drawn = self.page.evaluate("[window.clicked_ms, window.drawn_ms]")
+        return clicked / 1e3, drawn / 1e3
+
+    def _pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        x, y = self.place(x_mm, y_mm)
+        size = self.page.viewport_size
+        return x * size["width"], y * size["height"]
+
+
+def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """A vector of the world as the camera sees it: x to the right, y down, z ahead."""
+    w, axis = wxyz[0], -np.asarray(wxyz[1:])
+    found: np.ndarray = vector + 2 * np.cross(axis, np.cross(axis, vector) + w * vector)
+    return found
+
+
+@contextlib.contextmanager
+def visit(shown: Shown, width: int = 1100, height: int = 680) -> Iterator[Visitor]:
+    """Open a view in a browser while a thread keeps it going."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"a browser ({error})", "test") from None
+    path = program()
+    if path is None:
+        raise MissingTool("a picture of the view", NAMES[0], "sudo apt install chromium")
+    with running(shown), sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(SOFTWARE))
+        try:
+            yield Visitor(browser.new_page(viewport={"width": width, "height": height}), shown)
+        finally:
+            browser.close()
+
+
+@contextlib.contextmanager
+def running(shown: Shown) -> Iterator[None]:
+    """Draw moments in a thread."""
+    ending = threading.Event()
+    failed: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            while not ending.is_set():
+                shown.view.turn()
+        except BaseException as error:  # raised where it is waited for
+            failed.append(error)
+
+    thread = threading.Thread(target=run, name="view", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        thread.join()
+    if failed:
+        raise failed[0]
+
+
+def screenshot(visitor: Visitor, path: Path, before: Callable[[], None] = lambda: None) -> Path:
+    """What the page shows, without the notice that it is drawn by the processor; ``before``: done just before it."""
+    if visitor.page.locator("text=Software WebGL rendering detected").count():
+        visitor.page.locator("button.mantine-Notification-closeButton").first.click()
+        visitor.page.wait_for_timeout(500)
+    before()
+    visitor.page.screenshot(path=str(path))
+    return path

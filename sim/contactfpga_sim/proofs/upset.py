@@ -1,0 +1,44 @@
+"""What looks for registers that turned by themselves finds none while none does."""
+
+from functools import partial
+
+from contactfpga.choices import scans
+from contactfpga.skin import Skin
+from contactfpga_hdl.scan.pins import DirectRows
+from contactfpga_hdl.scan.raster import Scanner
+from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+SKINS = {
+    "raster": Skin(rows=4, columns=2, settle_us=1, zone_capacity=1),
+    "adaptive": Skin(rows=4, columns=2, scan="adaptive", zone_capacity=1),
+    "reversal": Skin(rows=4, columns=2, scan="reversal", precharge_us=0.5, zone_capacity=1),
+}
+
+
+def none_is_found(proof: Proof, scan: str) -> None:
+    """Free: all inputs of a scan. Claimed: it never asks for a restart."""
+    dut = scans.find(scan).load_gateware()(SKINS[scan])
+    inside = proof.put(dut)
+    for path, member, port in dut.signature.flatten(dut):
+        if member.flow.name == "In":
+            proof.m.d.comb += port.eq(proof.free(len(port), "_".join(map(str, path))))
+    proof.claim(~dut.upset)
+    if scan == "raster":
+        following = inside["following"]
+        proof.lemma((following != 0) & (following & (following - 1) == 0))
+
+
+_BUGS = {
+    "raster": Bug("a bit of the time turns", Scanner, "time", lambda time, inside: time ^ inside.component.request),
+    "adaptive": Bug("a row turns", DirectRows, "selected",
+        lambda rows, inside: rows ^ ~(inside.component.drive | inside.component.release)),
+    "reversal": Bug("a bit of the time turns", ReversalScanner, "time",
+        lambda time, inside: time ^ inside.component.request),
+}  # fmt: skip
+CASES = tuple(
+    Case("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, (bug,))
+    for scan, bug in _BUGS.items()
+)

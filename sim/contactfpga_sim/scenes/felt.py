@@ -1,0 +1,72 @@
+"""What pressure units under a bumper read while a scene touches it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from contactfpga.choices import converters
+from contactfpga.haptics import Cylinder, LoadCells
+from contactfpga.haptics.answer import Floats
+from contactfpga.skin import Skin
+from contactfpga_sim.scenes.contacts import Contact, at
+from contactfpga_sim.scenes.scene import Scene
+
+
+class Felt:
+    """Readings of all units as a function of the time in s, with their noise, in whole steps of the converter.
+
+    Units share a load by least squares where there are more of them than the load needs; one that nothing presses any
+    more reads what it reads without preload.
+    """
+
+    def __init__(self, scene: Scene, cells: LoadCells, skin: Skin, seed: int = 0, noise: bool = True):
+        """Raises ValueError where the cells have no surface."""
+        if cells.surface is None:
+            raise ValueError("the units have no surface; give units.toml a table [surface] with the bumper's outside")
+        self._scene, self._cells, self._surface = scene, cells, cells.surface
+        outside = cells.surface.radius_m if isinstance(cells.surface, Cylinder) else None
+        # A sheet around a cylinder lies under the foam, on whose outside things push.
+        self._wider = 1e3 * outside / skin.radius_mm if outside and skin.radius_mm else 1.0
+        self._full = (1 << converters.find(skin.converter).bits) - 1
+        self._steps = np.linalg.pinv(cells.matrix)
+        self._rng = np.random.default_rng(seed)
+        gains = np.abs([unit.gain_n for unit in cells.units])
+        self._sigma = np.array([unit.sigma_n for unit in cells.units]) / gains * noise
+        preloads = np.array([np.inf if unit.preload_n is None else unit.preload_n for unit in cells.units])
+        self._least = -preloads / gains
+
+    def wrench(self, seconds: float) -> Floats:
+        """(6,): what all contacts exert on the link."""
+        return sum((self._of(one, seconds) for one in self._scene.contacts), np.zeros(6))
+
+    def _of(self, contact: Contact, seconds: float) -> Floats:
+        """Each of its parts pushes along the normal at its middle."""
+        total, load = np.zeros(6), contact.load(seconds)
+        if load is None:
+            return total
+        drag = [at(value, seconds) for value in contact.drag_n]
+        turn = at(contact.torsion_nm, seconds)
+        for part, push in load.shares():
+            point, normal, along, across = self._at(part.x_m, part.y_m)
+            share = push / load.force_n
+            force = -push * normal + share * (drag[0] * along + drag[1] * across)
+            total += np.concatenate([force, np.cross(point, force) + share * turn * normal])
+        return total
+
+    def _at(self, x_m: float, y_m: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Point, normal, and the directions of columns and rows, of a place on the sheet laid flat."""
+        x, y = x_m * self._wider + self._cells.sheet_m[0], y_m + self._cells.sheet_m[1]
+        point, normal = (np.array(each) for each in self._surface.place(x, y))
+        across = np.array(self._surface.place(x, y + 1.0)[0]) - point
+        return point, normal, np.cross(across, normal), across
+
+    def exact(self, seconds: float) -> Floats:
+        """(n,): readings without noise, rounding and ends."""
+        return np.asarray(np.maximum(self._steps @ self.wrench(seconds), self._least) + self._cells.zeros)
+
+    def __call__(self, seconds: float) -> Sequence[int]:
+        noisy = self.exact(seconds) + self._sigma * self._rng.standard_normal(len(self._sigma))
+        found: list[int] = np.clip(np.rint(noisy), 0, self._full).astype(int).tolist()
+        return found

@@ -1,0 +1,244 @@
+"""Where force joined to location fails: one thing that is not as assumed is turned up until what is stated is wrong.
+
+Each value of a knob is tried with many contacts. It is right while the stated 95 % hold for 90 % of them at least. The
+system says so where it does for more than half of those for which they do not hold.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from contactfpga.cover.hertz import Ball
+from contactfpga.haptics import Contacts, Cylinder, LoadCells, Touch, contacts
+from contactfpga.haptics.answer import Floats
+from contactfpga.haptics.layouts import hexapod
+from contactfpga.haptics.posterior import radius_95
+from contactfpga_sim.studies.failures.knob import Outcome, Study
+from contactfpga_sim.studies.haptics import coverage
+from contactfpga_sim.studies.haptics.coverage import PATCH, Case
+
+CONTACTS = 300
+"""At each value."""
+
+HOLDS = 0.9
+PUSH_N, LEVER_M = 12.0, 0.05
+SURFACE = Cylinder(0.038)
+SIGMA_N = 0.05
+REACH_M = 0.0036
+"""How far 12 N close switches, which is as unsure as a zone's place is: half of it along each axis."""
+
+CHI2_3 = 7.815
+"""Three degrees of freedom stay below it in 95 of 100 cases."""
+
+Random = np.random.Generator
+
+
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """What is done to a link with units, and what is not as assumed."""
+
+    unseen_n: float = 0.0
+    """Push of a second contact that the sheet does not show."""
+    drift_n: float = 0.0
+    torsion_nm: float = 0.0
+    ends_n: float = math.inf
+    """What a unit can read at most, either way."""
+    elsewhere_m: float = 0.0
+    """How far the zone is from the contact."""
+    preload_n: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """One contact: whether what was stated holds, what said that it does not, and how far it is off."""
+
+    holds: bool
+    told: tuple[str, ...]
+    off: float
+
+
+def outcome(trials: list[Trial], unit: str) -> Outcome:
+    """Of all contacts at a value."""
+    off = math.sqrt(sum(trial.off**2 for trial in trials) / len(trials))
+    share = sum(trial.holds for trial in trials) / len(trials)
+    judged = trials if share >= HOLDS else [trial for trial in trials if not trial.holds]
+    words = sorted({word for trial in judged for word in trial.told})
+    told = tuple(word for word in words if sum(word in trial.told for trial in judged) > len(judged) / 2)
+    return Outcome(share >= HOLDS, told, f"{off:.3g} {unit} off, {100 * share:.0f} % as stated", 100 * (1 - share))
+
+
+def cells(load: Load) -> LoadCells:
+    """A hexapod at mid-length, tilted by 60 degrees."""
+    ends = None if math.isinf(load.ends_n) else (-load.ends_n, load.ends_n)
+    units = [
+        dataclasses.replace(unit, sigma_n=SIGMA_N, range=ends, preload_n=load.preload_n)
+        for unit in hexapod(0.03, math.radians(60)).units
+    ]
+    return LoadCells(units)
+
+
+def pressed(load: Load, made: LoadCells, rng: Random) -> tuple[Floats, Floats, Contacts]:
+    """Place and force of one contact, and what is found of it."""
+    x, y = rng.uniform(0, 2 * math.pi * SURFACE.radius_m), rng.uniform(-LEVER_M, LEVER_M)
+    point, normal = (np.array(each) for each in SURFACE.place(x, y))
+    across = np.array([0.0, 0.0, 1.0])
+    turn = rng.uniform(0, 2 * math.pi)
+    drag = rng.uniform(0, 0.4) * (math.cos(turn) * across + math.sin(turn) * np.cross(across, normal))
+    force = PUSH_N * (drag - normal)
+    exerted = np.concatenate([force, np.cross(point, force) + load.torsion_nm * normal])
+    if load.unseen_n:
+        other, out = (np.array(each) for each in SURFACE.place(rng.uniform(0, 0.24), rng.uniform(-LEVER_M, LEVER_M)))
+        exerted += np.concatenate([-load.unseen_n * out, np.cross(other, -load.unseen_n * out)])
+    readings = np.linalg.lstsq(made.matrix, exerted, rcond=None)[0] + SIGMA_N * rng.standard_normal(len(made.units))
+    readings[rng.integers(len(readings))] += load.drift_n
+    if load.preload_n is not None:
+        readings = np.maximum(readings, -load.preload_n)
+    wrench = made.wrench(np.clip(readings, -load.ends_n, load.ends_n))
+    sigma = REACH_M / 2
+    shifted = SURFACE.place(
+        x + sigma * rng.standard_normal() + load.elsewhere_m, y + sigma * rng.standard_normal() + load.elsewhere_m / 2
+    )
+    found = contacts(wrench, [Touch(*shifted, 0.5, sigma)])
+    return np.array([x, y]), force, found
+
+
+def _told(found: Contacts, alarm: bool) -> tuple[str, ...]:
+    marks = {"saturated": found.wrench.saturated, "lifted": found.wrench.lifted, "alarm": alarm and found.alarm}
+    return tuple(name for name, mark in marks.items() if mark)
+
+
+def _force(load: Load) -> list[Trial]:
+    """The force at the zone, by the zone's place."""
+    rng, made, trials = np.random.default_rng(1), cells(load), []
+    for _ in range(CONTACTS):
+        _, force, found = pressed(load, made, rng)
+        assert found.covariance_n2 is not None
+        off = np.array(found[0].force_n) - force
+        within = bool(off @ np.linalg.solve(found.covariance_n2, off) < CHI2_3)
+        trials.append(Trial(within, _told(found, True), float(np.linalg.norm(off))))
+    return trials
+
+
+def _center(load: Load) -> list[Trial]:
+    """The center of pressure, by the units alone."""
+    rng, made, trials = np.random.default_rng(1), cells(load), []
+    around = 2 * math.pi * SURFACE.radius_m
+    for _ in range(CONTACTS):
+        place, _, found = pressed(load, made, rng)
+        center = SURFACE.center(found.wrench)
+        if center is None or center.covariance_m2 is None:
+            trials.append(Trial(False, ("no center",), 0.0))
+            continue
+        away = np.array(center.sheet_m) - place
+        away[0] -= around * round(away[0] / around)
+        off = float(np.hypot(*away))
+        trials.append(Trial(off <= radius_95(center.covariance_m2), _told(found, False), 1e3 * off))
+    return trials
+
+
+def _friction(kind: str, drag: float) -> list[Trial]:
+    """Two fingers that push and drag: whether the stated intervals hold the true pushes."""
+    rng, made, trials = np.random.default_rng(1), cells(Load()), []
+    assert made.noise is not None
+    for _ in range(CONTACTS):
+        places = [SURFACE.place(rng.uniform(0, 0.09), at) for at in (-0.03, 0.03)]
+        exerted, pushes = np.zeros(6), rng.uniform(4, 12, 2)
+        for (point, normal), push in zip(places, pushes):
+            turn, across = rng.uniform(0, 2 * math.pi), np.array([0.0, 0.0, 1.0])
+            side = math.cos(turn) * across + math.sin(turn) * np.cross(across, normal)
+            force = push * (drag * side - np.array(normal))
+            exerted += np.concatenate([force, np.cross(point, force)])
+        readings = np.linalg.lstsq(made.matrix, exerted, rcond=None)[0] + SIGMA_N * rng.standard_normal(6)
+        found = contacts(made.wrench(readings), [Touch(*place, 0.5) for place in places])
+        told = ("beyond friction",) if found.beyond_friction else ()
+        stated, off = [], 0.0
+        for one, push in zip(found, pushes):
+            low, high = one.interval_n or (0.0, None)
+            slack = 4 * SIGMA_N * 2
+            stated.append(low - slack <= push <= (math.inf if high is None else high) + slack)
+            off = max(off, abs((one.normal_n or 0.0) - push))
+        trials.append(Trial(all(stated) if kind == "interval" else off <= 1.0, told, off))
+    return trials
+
+
+def _located(case: Case) -> list[Trial]:
+    """Places on a flat sheet."""
+    rng, finder, trials = np.random.default_rng(1), coverage.locator(case), []
+    for _ in range(CONTACTS):
+        one = coverage.press(case, rng)
+        if not one.cells:
+            continue
+        place, _ = coverage.METHODS[case.method](case, finder, rng, one)
+        off = math.hypot(place.x_m - one.x_m, place.y_m - one.y_m)
+        trials.append(Trial(off <= place.radius_m, () if place.agrees else ("agrees = False",), 1e3 * off))
+    return trials
+
+
+def _both(change: Callable[[float], Load]) -> dict[str, Callable[[float], Outcome]]:
+    """The force at a zone, and the center of pressure."""
+    return {
+        "force at the zone": lambda value: outcome(_force(change(value)), "N"),
+        "center of pressure": lambda value: outcome(_center(change(value)), "mm"),
+    }
+
+
+def _places(*methods: tuple[str, Case], **knob: Callable[[float], object]) -> dict[str, Callable[[float], Outcome]]:
+    def run(case: Case, value: float) -> Outcome:
+        turned = dataclasses.replace(case, **{name: change(value) for name, change in knob.items()})  # type: ignore[arg-type]
+        return outcome(_located(turned), "mm")
+
+    return {name: functools.partial(run, case) for name, case in methods}
+
+
+RAMP = (30.0, 30.0)
+CLOSINGS = Case("closings", 5.0, RAMP)
+SHARE = "stated 95 % that do not hold, %"
+
+STUDIES = {
+    study.name: study
+    for study in (
+        Study("unseen", "A second contact that the sheet does not show", "its push, N", SHARE,
+              (0, 0.1, 0.2, 0.5, 1, 2, 4, 8), _both(lambda value: Load(unseen_n=value)),
+              "look at `alarm`; trust neither force nor place where it is set"),
+        Study("drift", "A unit whose zero has drifted", "drift, N", SHARE, (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
+              _both(lambda value: Load(drift_n=value)), "`haptics zero` while nothing touches; `DriftWatch`"),
+        Study("torsion", "A contact that turns about its normal", "torsion, Nm", SHARE,
+              (0, 0.002, 0.005, 0.01, 0.02, 0.05), _both(lambda value: Load(torsion_nm=value)),
+              "the center of pressure, which measures the torsion"),
+        Study("clipping", "A unit that reads no more than this", "end of its range, N", SHARE,
+              (20, 14, 12, 10, 8, 6, 4), _both(lambda value: Load(ends_n=value)),
+              "units for the loads that `haptics place` names; `saturated`"),
+        Study("lifted", "Units that only push, on springs", "preload, N", SHARE, (20, 14, 12, 10, 8, 6, 4),
+              _both(lambda value: Load(preload_n=value)), "more preload; `lifted`"),
+        Study("elsewhere", "A stuck switch: the zone is not where the contact is", "distance, mm", SHARE,
+              (0, 2, 5, 10, 20, 40), _both(lambda value: Load(elsewhere_m=1e-3 * value)),
+              "`contactfpga doctor --watch` names the switch; `mask`"),
+        Study("shape", "A ball that is taken for a point", "its radius, mm", SHARE, (1, 2, 3, 5, 8, 12, 19),
+              _places(("set, 5 mm", Case("set", 5.0, true=PATCH)),
+                      ("closings, 5 mm", dataclasses.replace(CLOSINGS, true=PATCH)),
+                      ball=lambda value: Ball(1e-3 * value, 4.6e5)),
+              "the right `Model`; with several, the one that agrees"),
+        Study("friction", "Two fingers that drag more than friction 0.5 allows", "drag over push", SHARE,
+              (0.1, 0.3, 0.45, 0.55, 0.7, 0.9, 1.2),
+              {"interval": lambda value: outcome(_friction("interval", value), "N"),
+               "estimate, 1 N": lambda value: outcome(_friction("estimate", value), "N")},
+              "a larger `friction`: intervals grow, but hold"),
+        Study("skew", "Force and switches by two clocks; the push rises by 1.6 N per ms", "force is late by, ms", SHARE,
+              (0, 0.05, 0.1, 0.2, 0.5, 1, 2),
+              _places(("closings, 0.5 N of noise", CLOSINGS),
+                      ("closings, 0.1 N, no spread", Case("closings", 5.0, RAMP, 0.0, 0.1)),
+                      late_n=lambda value: 1.6 * value),
+              "units on the board, which has one clock"),
+        Study("edge", "A contact on the edge of the sheet", "inside of the outermost switch, mm", SHARE,
+              (12, 8, 5, 2, 0, -1, -2, -3),
+              _places(("barycenter, 5 mm", Case("barycenter", 5.0, RAMP, 0.0, 0.0)), ("set, 5 mm", Case("set", 5.0)),
+                      ("closings, 5 mm", CLOSINGS), inside_mm=float),
+              "`Locator.locate`, which knows where the sheet ends; switches beyond what may be touched"),
+    )
+}  # fmt: skip
+"""Every study by its name, in the order of the page."""

@@ -1,0 +1,224 @@
+"""End to end: contacts press a sheet on three units, the compiled gateware sends, driver and haptics answer.
+
+A push rises as the arm's does, 1.6 N per ms. After the first switch has closed the place is asked again and again, by
+each method, from what the host has by then.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import numpy as np
+
+import contactfpga
+from contactfpga.haptics import ClosingWatch, LoadCells, Locator, Plane, felt
+from contactfpga.haptics.answer import Floats
+from contactfpga.haptics.layouts import tripod
+from contactfpga.skin import Skin
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
+
+RATE_N_S = 1600.0
+MOST_N = 30.0
+BEGIN_S = 1e-3
+LOOK_S = 20e-6
+RING_M = 0.075
+GAIN_N = 0.02
+ZERO = 300.0
+
+TIMES_S = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 15e-3)
+"""After the first switch has closed."""
+
+METHODS = ("barycenter", "center of pressure", "closings", "closings + center of pressure")
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """A sheet, and how good its parts are."""
+
+    name: str
+    pitch_mm: float
+    unit_sigma_n: float = 0.05
+    spread: float = 0.0
+    """Of the switches' thresholds, as a share of them."""
+    lines: int = 16
+
+    @property
+    def skin(self) -> Skin:
+        return Skin(
+            rows=self.lines, columns=self.lines, pitch_x_mm=self.pitch_mm, pitch_y_mm=self.pitch_mm,
+            units=3, unit_sums=((1, 1, 1),), baud=6_000_000,
+        )  # fmt: skip
+
+    @property
+    def cells(self) -> LoadCells:
+        """Three units on a ring around the sheet's middle."""
+        middle = -0.5e-3 * self.pitch_mm * (self.lines - 1)
+        units = [
+            dataclasses.replace(unit, gain_n=GAIN_N, zero=ZERO, sigma_n=self.unit_sigma_n)
+            for unit in tripod(RING_M).units
+        ]
+        return LoadCells(units, surface=Plane(), sheet_m=(middle, middle))
+
+
+SETTINGS = (
+    Setting("10 mm", 10.0),
+    Setting("5 mm", 5.0),
+    Setting("5 mm, 0.5 N of noise, thresholds spread by 10 %", 5.0, 0.5 / math.sqrt(3), 0.1),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Touching:
+    """Point forces on the sheet, each with its push over time."""
+
+    setting: Setting
+    places_m: Floats
+    """(n, 2)"""
+    pushes_n: tuple[float, ...]
+    rate_n_s: float | None
+    """None: all of the push at once."""
+    seed: int
+
+    @functools.cached_property
+    def per_push(self) -> Floats:
+        """(n, rows, columns): the share of what closes a switch that a newton of each contact brings."""
+        along = 1e-3 * self.setting.pitch_mm * np.arange(self.setting.lines)
+        x, y = np.meshgrid(along, along)
+        spread = 1 + self.setting.spread * np.random.default_rng([self.seed, 7]).standard_normal(x.shape)
+        each = [1 / reach_of(POINT).closing_n(np.hypot(x - px, y - py)) for px, py in self.places_m]
+        return np.asarray(np.array(each) / np.maximum(spread, 0.1))
+
+    def forces(self, seconds: float) -> Floats:
+        """(n,) in N."""
+        since = max(0.0, seconds - BEGIN_S)
+        risen = np.inf if self.rate_n_s is None and since > 0 else since * (self.rate_n_s or 0.0)
+        return np.minimum(self.pushes_n, risen)
+
+    def pressed(self, seconds: float) -> np.ndarray:
+        """Stress under a half-space is in proportion to force, and that of several contacts adds up."""
+        found: np.ndarray = np.tensordot(self.forces(seconds), self.per_push, 1) >= 1
+        return found
+
+    @property
+    def first_s(self) -> float:
+        """When the first switch closes, for a single contact."""
+        return BEGIN_S + 1 / float(self.per_push.max()) / (self.rate_n_s or math.inf)
+
+    def board(self) -> VirtualBoard:
+        """That feels it."""
+        cells, rng = self.setting.cells, np.random.default_rng([self.seed, 8])
+        turn = np.linalg.pinv(cells.matrix)
+        sigma = self.setting.unit_sigma_n / GAIN_N
+
+        def readings(seconds: float) -> list[int]:
+            exerted = np.zeros(6)
+            for (x, y), push in zip(self.places_m + np.array(cells.sheet_m), self.forces(seconds)):
+                exerted += np.array([0, 0, -push, -push * y, push * x, 0])
+            noisy = turn @ exerted + ZERO + sigma * rng.standard_normal(3)
+            steps: list[int] = np.clip(np.rint(noisy), 0, 4095).astype(int).tolist()
+            return steps
+
+        return VirtualBoard(self.setting.skin, self.pressed, units=readings, look_s=LOOK_S)
+
+
+@dataclasses.dataclass
+class Heard:
+    """A frame, and when the host had it and its readings."""
+
+    zones: Zones
+    came_s: float
+    known_s: float = math.inf
+
+
+def heard(touching: Touching, until_s: float) -> list[Heard]:
+    """All frames until then."""
+    found: list[Heard] = []
+    open_ones: list[Heard] = []
+    with contactfpga.open(touching.board(), touching.setting.skin) as board:
+        while board.clock() < until_s:
+            one = Heard(board.next(), board.clock())
+            found.append(one)
+            open_ones.append(one)
+            for each in [each for each in open_ones if each.zones.units is not None]:
+                each.known_s = one.came_s
+                open_ones.remove(each)
+    return found
+
+
+def ramp(setting: Setting, seed: int) -> Touching:
+    """One contact anywhere in a cell in the middle."""
+    place = (MIDDLE + np.random.default_rng(seed).random((1, 2))) * 1e-3 * setting.pitch_mm
+    return Touching(setting, place, (MOST_N,), RATE_N_S, seed)
+
+
+def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
+    """Of one contact, in m: for each method at each of :data:`TIMES_S`; NaN while it has no answer."""
+    touching, cells = ramp(setting, seed), setting.cells
+    frames = heard(touching, touching.first_s + TIMES_S[-1] + 0.2e-3)
+    assert cells.noise.covariance is not None
+    push_sigma = math.sqrt(float(cells.noise.covariance[2, 2]) + (RATE_N_S * 0.15e-3) ** 2 / 12)
+    finder = Locator(setting.skin.sheet, reach_of(POINT), setting.spread, push_sigma)
+    truth = touching.places_m[0]
+    found: dict[str, list[float]] = {method: [] for method in METHODS}
+    watch, taken = ClosingWatch(cells), 0
+    for time_s in TIMES_S:
+        now = touching.first_s + time_s
+        came = [one.zones for one in frames if one.came_s <= now]
+        known = [one.zones for one in frames if one.known_s <= now]
+        for zones in known[taken:]:
+            watch.take(zones)
+        taken = len(known)
+        for method, place in _places(finder, cells, watch, came, known).items():
+            found[method].append(math.nan if place is None else float(np.hypot(*(np.array(place) - truth))))
+    return found
+
+
+def _places(
+    finder: Locator, cells: LoadCells, watch: ClosingWatch, came: list[Zones], known: list[Zones]
+) -> dict[str, tuple[float, float] | None]:
+    """By each method, on the sheet in m."""
+    zone = came[-1][0] if came and len(came[-1]) else None
+    coarse = None if zone is None or zone.x_mm is None else (1e-3 * zone.x_mm, 1e-3 * (zone.y_mm or 0.0))
+    center = None
+    if known and known[-1].units is not None and cells.surface is not None:
+        pressure = cells.surface.center(cells.wrench(known[-1].units.readings))
+        center = None if pressure is None else finder.center(pressure, cells.sheet_m)
+    middle = None if center is None else (center.x_m, center.y_m)
+    found = {"barycenter": coarse, "center of pressure": middle}
+    for method, also in (("closings", None), ("closings + center of pressure", center)):
+        if watch.complete and watch.cells and watch.push_n is not None:
+            place = finder.locate(watch.cells, watch.push_n, watch.closings, also)
+            found[method] = (place.x_m, place.y_m)
+        else:
+            found[method] = coarse if also is None else middle
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class Forces:
+    """What is found of two contacts."""
+
+    zones: int
+    off_n: tuple[float, ...]
+    """Of each push, where there are two zones."""
+
+
+def two(apart_mm: float, seed: int, push_n: float = 12.0) -> Forces:
+    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found."""
+    setting, rng = SETTINGS[0], np.random.default_rng([seed, 9])
+    turn = rng.uniform(0, 2 * math.pi)
+    half = 0.5e-3 * apart_mm * np.array([math.cos(turn), math.sin(turn)])
+    middle = (MIDDLE + rng.random(2)) * 1e-3 * setting.pitch_mm
+    touching = Touching(setting, np.array([middle - half, middle + half]), (push_n, push_n), None, seed)
+    frames = [one.zones for one in heard(touching, BEGIN_S + 1.2e-3) if one.zones.units is not None]
+    zones = frames[-1]
+    found = felt(setting.cells, zones, friction=0.0)
+    if found is None or len(zones) != 2:
+        return Forces(len(zones), ())
+    places = touching.places_m + np.array(setting.cells.sheet_m)
+    pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in places]
+    return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))

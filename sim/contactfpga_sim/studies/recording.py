@@ -1,0 +1,158 @@
+"""What recordings cost, and what is left of one after kill -9: the figures of docs/recordings.md."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+import contactfpga
+from contactfpga.recordings import Recording, link_recorder
+from contactfpga.recordings.export import export
+from contactfpga.recordings.recover import recover
+from contactfpga.recordings.session import Session
+from contactfpga.skin import Skin
+from contactfpga_sim.board.virtual import VirtualBoard
+
+SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
+"""Boards by about how many frames they send per second."""
+
+_PIECE = struct.Struct("<dQ")
+"""When bytes came, and how many by then."""
+
+
+def finger(seconds: float) -> np.ndarray:
+    """A fingertip that goes around, once per second."""
+    rows, columns = np.mgrid[:16, :16]
+    row, column = 7.5 + 5 * np.sin(6.28 * seconds), 7.5 + 5 * np.cos(6.28 * seconds)
+    return (rows - row) ** 2 + (columns - column) ** 2 <= 2.5
+
+
+@contextlib.contextmanager
+def folder() -> Iterator[Path]:
+    """A folder that goes away."""
+    with tempfile.TemporaryDirectory() as name:
+        yield Path(name)
+
+
+def bytes_of(skin: Skin, seconds: float, path: Path) -> int:
+    """Write what a board says while a finger goes around; returns the number of frames."""
+    with contactfpga.open(VirtualBoard(skin, finger), record=path) as board:
+        count = 1
+        while board.clock() < seconds:
+            board.next()
+            count += 1
+    return count
+
+
+@dataclasses.dataclass(frozen=True)
+class Cost:
+    """Of one rate and one way to record."""
+
+    frames_per_s: float
+    bytes_per_frame: float
+    frames_per_cpu_s: float
+    """Taken and written, with all that the driver does."""
+
+    @property
+    def mb_an_hour(self) -> float:
+        """At that rate."""
+        return self.frames_per_s * self.bytes_per_frame * 3600 / 1e6
+
+
+def cost(source: Path, seconds: float, into: Path, bytes_only: bool) -> Cost:
+    """Record bytes once more, as fast as they are read."""
+    before = time.process_time()
+    with Session(into, bytes_only=bytes_only) as session:
+        session.add(f"replay://{source}", name="skin")
+        session.start()
+        while session.running:
+            session.wait(1.0)
+    cpu_s = time.process_time() - before
+    return Cost(session.frames / seconds, session.size / session.frames, session.frames / cpu_s)
+
+
+@dataclasses.dataclass(frozen=True)
+class Reading:
+    """Frames per second of the processor."""
+
+    frames: float
+    rows: float
+    """Of a table, with tracks."""
+    parquet_bytes: float
+    """Per frame."""
+
+
+def reading(path: Path, into: Path) -> Reading:
+    """Read a recording, and export it."""
+    recording = Recording(path)
+    before = time.process_time()
+    count = sum(1 for _ in recording.frames())
+    read_s, before = time.process_time() - before, time.process_time()
+    rows = export(recording, into)
+    return Reading(count / read_s, rows / (time.process_time() - before), into.stat().st_size / rows)
+
+
+@dataclasses.dataclass(frozen=True)
+class Loss:
+    """After one kill -9."""
+
+    came: int
+    """Bytes that had come over the port."""
+    lost: int
+    """Of which so many are not in the recovered file."""
+    lost_s: float
+    """From the last byte that is there to the last one that came."""
+
+
+def loss(source: Path, seconds: float, place: Path) -> Loss:
+    """Record a board in its own time, kill the program after so long, and recover what it left."""
+    place.mkdir()
+    file, log = place / "killed.mcap", place / "log"
+    child = subprocess.Popen([sys.executable, "-m", __name__, f"replay://{source}?pace=1", str(file), str(log)])
+    try:
+        while not (log.exists() and log.stat().st_size):
+            time.sleep(0.01)
+        time.sleep(seconds)
+    finally:
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+    data = log.read_bytes()
+    came = list(_PIECE.iter_unpack(data[: len(data) // _PIECE.size * _PIECE.size]))
+    kept = sum(len(piece) for _, piece in Recording(recover(file).path).raw_bytes())
+    last_s = max((moment for moment, count in came if count <= kept), default=came[0][0])
+    return Loss(came[-1][1], came[-1][1] - kept, came[-1][0] - last_s)
+
+
+def _record(port: str, file: str, log: str) -> None:
+    """What is killed: it writes a log of its own of what came."""
+    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT)
+    count = 0
+
+    class Logged(link_recorder.Buffer):
+        def take(self, data: bytes, clock_s: float) -> None:
+            nonlocal count
+            super().take(data, clock_s)
+            count += len(data)
+            os.write(descriptor, _PIECE.pack(time.monotonic(), count))
+
+    session = Session(file, buffer=Logged)
+    with session:
+        session.add(port, name="skin")
+        session.start()
+        while session.running:
+            session.wait(1.0)
+
+
+if __name__ == "__main__":
+    _record(*sys.argv[1:])

@@ -1,0 +1,265 @@
+"""What is left of a recording after kill -9, on a full disk, and after damage."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from fake_board import FakeBoard, wait_until
+from model_board import ModelBoard
+
+import contactfpga
+from contactfpga import Skin, cli
+from contactfpga.recordings import Recording
+from contactfpga.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
+from contactfpga.recordings.recover import recover
+from contactfpga.recordings.whole_file import RecordingFailed
+
+SKIN = Skin()
+LONG = 60.0
+LOST_BYTES, LOST_S = 1 << 16, 0.2  # what the issue allows
+KIND = "contactfpga_msgs/Bytes"
+
+
+def record(file, port, **options):
+    command = [sys.executable, "-m", "contactfpga", "record", str(file), port, "--timeout", str(LONG)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+class Sender:
+    """Sends frames through a fake board, fast or slowly, and knows what it sent and when."""
+
+    def __init__(self, board, pause_s):
+        self.sent, self.when = bytearray(), []
+        self._board, self._pause_s, self._stop = board, pause_s, threading.Event()
+        made = ModelBoard(SKIN)
+        made.sent, made.time_us, made.heard = board.sent, board.time_us, board.heard
+        self._pieces = [b"".join(made.frame() for _ in range(20)) for _ in range(60)]
+        self._thread = threading.Thread(target=self._run)
+
+    def _run(self):
+        while not self._stop.is_set() and self._pieces:
+            piece = self._pieces.pop(0)
+            self._board.send(piece)
+            self.sent += piece
+            self.when.append((time.monotonic(), len(self.sent)))
+            time.sleep(self._pause_s)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._stop.set()
+        self._thread.join()
+
+
+def test_after_kill_9_hardly_anything_is_lost(tmp_path, capsys):
+    file = tmp_path / "touches.mcap"
+    with FakeBoard(SKIN) as board:
+        process = record(file, board.path)
+        try:
+            wait_until(lambda: file.exists() and file.stat().st_size > 0)
+            with Sender(board, 0.01) as sender:
+                wait_until(lambda: len(sender.sent) > 12_000)
+                waiting = board.waiting()
+                killed_s = time.monotonic()
+                process.send_signal(signal.SIGKILL)
+        finally:
+            process.kill()
+            process.communicate()
+    with pytest.raises(contactfpga.ContactFPGAError, match=f"contactfpga recover {file}"):
+        Recording(file)
+    assert cli.main(["recover", str(file)]) == 0
+    assert "touches_recovered.mcap" in capsys.readouterr().out
+    kept = b"".join(data for _, data in Recording(tmp_path / "touches_recovered.mcap").raw_bytes())
+    begun = kept.find(bytes(sender.sent[:100]))
+    assert begun >= 0
+    kept = kept[begun:]
+    assert bytes(sender.sent[: len(kept)]) == kept  # from the first byte on, with none missing in between
+    came = max(count for when, count in sender.when if when <= killed_s) - waiting
+    assert came - len(kept) < LOST_BYTES
+    early = max((count for when, count in sender.when if when <= killed_s - 10 * LOST_S), default=0)
+    assert len(kept) >= early - waiting  # ten times as long, as others use this computer as well
+
+
+def test_no_more_waits_than_what_may_be_lost(tmp_path):
+    """The same with a clock that we turn."""
+    assert CHUNK_BYTES <= LOST_BYTES
+    assert FLUSH_S <= LOST_S / 2
+    file = McapFile(tmp_path / "x.mcap")
+    written = lambda: (tmp_path / "x.mcap").stat().st_size  # noqa: E731
+    before = written()
+    file.write("/a", KIND, "a", 0, bytes(100), 10.0)
+    file.flush_old(10.0 + 0.99 * FLUSH_S)
+    assert written() == before
+    file.flush_old(10.0 + 1.01 * FLUSH_S)
+    assert written() > before
+    for size in (30_000, 30_000, 30_000, 70_000, 10):
+        before, data = written(), os.urandom(size)
+        file.write("/a", KIND, "a", 0, data, 20.0)
+        assert file.size - written() <= max(LOST_BYTES, size + 100)
+    file.close()
+
+
+def test_a_message_that_is_written_in_time_waits_for_no_other(tmp_path):
+    """A board that falls silent: what it said last is in the file all the same."""
+    with FakeBoard(SKIN) as board:
+        file = tmp_path / "x.mcap"
+        process = record(file, board.path)
+        try:
+            wait_until(lambda: file.exists() and file.stat().st_size > 0)
+            board.send(b"".join(board.frame() for _ in range(3)))
+            wait_until(lambda: recovered_frames(file, tmp_path) >= 4)
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def recovered_frames(file, folder):
+    into = folder / f"try_{time.monotonic_ns()}.mcap"
+    try:
+        recover(file, into)
+    except contactfpga.ContactFPGAError:
+        return 0
+    return len(list(Recording(into).frames()))
+
+
+def test_ctrl_c_closes_the_file(tmp_path):
+    with FakeBoard(SKIN) as board:
+        file = tmp_path / "x.mcap"
+        process = record(file, board.path)
+        wait_until(lambda: file.exists() and file.stat().st_size > 0)
+        process.send_signal(signal.SIGINT)
+        out, errors = process.communicate(timeout=LONG)
+    assert process.returncode == 0
+    assert errors == ""
+    assert f"{file}: " in out
+    assert len(list(Recording(file).frames())) >= 1
+
+
+def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
+    """A limit on the size of files stands for it."""
+    limit = 20_000
+
+    def limited():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    with FakeBoard(SKIN) as board:
+        file = tmp_path / "x.mcap"
+        process = record(file, board.path, preexec_fn=limited)
+        wait_until(lambda: file.exists() and file.stat().st_size > 0)
+        with Sender(board, 0.002):
+            _, errors = process.communicate(timeout=LONG)
+    assert process.returncode == 1
+    assert f"{file}: there is no room for more (File too large); the 0.0 MB that are there are whole" in errors
+    assert f"contactfpga recover {file}" in errors
+    assert "Traceback" not in errors
+    assert 1000 < file.stat().st_size <= limit
+    found = recover(file)
+    assert (found.cut, found.damaged, found.closed) == (0, 0, False)
+    assert len(list(Recording(found.path).frames())) > 10
+
+
+def test_a_piece_that_does_not_fit_leaves_no_part(tmp_path, monkeypatch):
+    file = McapFile(tmp_path / "x.mcap")
+    file.write("/a", KIND, "a", 0, os.urandom(1000), 0.0)
+    file.flush()
+    whole = (tmp_path / "x.mcap").read_bytes()
+    write = os.write
+
+    def full(descriptor, data):
+        if len(data) < 50_000:
+            raise OSError(28, "No space left on device")
+        return write(descriptor, bytes(data[:20_000]))
+
+    file.write("/a", KIND, "a", 0, os.urandom(60_000), 0.0)
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(RecordingFailed, match="there is no room for more"):
+        file.flush()
+    file.close()
+    assert (tmp_path / "x.mcap").read_bytes() == whole
+
+
+# ---- damage
+
+
+@pytest.fixture
+def closed(tmp_path):
+    """A closed file, the eight messages in its four chunks, and where these end."""
+    file, messages, ends = McapFile(tmp_path / "closed.mcap"), [os.urandom(500) for _ in range(8)], []
+    file.metadata("contactfpga", {"link": "a", "skin": ""})
+    for number, data in enumerate(messages):
+        file.write("/a", KIND, "a", number, data, 0.0)
+        if number % 2:
+            file.flush()
+            ends.append(file.size)
+    file.close()
+    return tmp_path / "closed.mcap", messages, ends
+
+
+def read(path):
+    from mcap.reader import make_reader
+
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        texts = [one.metadata for one in reader.iter_metadata()]
+        return [message.data for _, _, message in reader.iter_messages()], texts
+
+
+def test_a_closed_file_is_copied(closed):
+    path, messages, _ = closed
+    found = recover(path)
+    assert (found.closed, found.messages, found.damaged, found.cut) == (True, 8, 0, 0)
+    assert read(found.path) == (messages, [{"link": "a", "skin": ""}]) == read(path)
+
+
+@pytest.mark.parametrize("share", [0.35, 0.5, 0.66, 0.85, 0.99])
+def test_a_file_that_ends_anywhere_gives_all_whole_pieces(closed, tmp_path, share):
+    path, messages, ends = closed
+    data = path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: int(share * len(data))])
+    kept, _ = read(recover(cut).path)
+    assert kept == messages[: len(kept)]
+    whole = sum(end <= cut.stat().st_size for end in ends)
+    assert len(kept) in (2 * whole, 2 * whole + 2)  # what is cut off may be an index alone
+
+
+def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys):
+    path, messages, ends = closed
+    data = bytearray(path.read_bytes())
+    data[ends[0] + 600] ^= 1
+    path.write_bytes(data)
+    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    assert "1 damaged pieces" in capsys.readouterr().out
+    assert read(tmp_path / "new.mcap")[0] == messages[:2] + messages[4:]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is no MCAP file"),
+        (b"\x89MCAP0\r\n", "not one whole message"),
+        (b"\x89MCAP0\r\n\x06" + b"\xff" * 40, "not one whole message"),
+    ],
+)
+def test_what_is_no_recording(tmp_path, content, said, capsys):
+    path = tmp_path / "x.mcap"
+    path.write_bytes(content)
+    assert cli.main(["recover", str(path)]) == 1
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(contactfpga.ContactFPGAError):
+        Recording(path)
+
+
+def test_no_file_is_written_over(closed, capsys):
+    path, *_ = closed
+    assert cli.main(["recover", str(path), str(path)]) == 1
+    assert "is there already" in capsys.readouterr().err

@@ -1,0 +1,54 @@
+"""A board that sends a stream, and a recording of it."""
+
+from fake_board import wait_until
+from model_board import ModelBoard
+
+from contactfpga import Skin
+from contactfpga.recordings.session import Session
+
+SKIN = Skin()
+
+
+class StreamPort:
+    """A board in simulated time that sends ``hello_every`` frames, a hello, and so on; ``sent``: all of it."""
+
+    def __init__(self, skin=SKIN, frames=600, hello_every=40, gap_us=904):
+        self.model, self.left, self.every, self.gap_us = ModelBoard(skin), frames, hello_every, gap_us
+        self.sent, self.seconds, self.out = b"", 0.0, b""
+        self.empty_every = 1 << 30
+
+    def write(self, data):
+        for _, hello in self.model.hear(data):
+            self.out += (self.model.hello() if hello else b"") + self.model.frame()
+
+    def read(self, seconds):
+        if self.left and not self.out:
+            self.left -= 1
+            self.out += self.model.hello() if self.model.sent % self.every == 0 else b""
+            empty = self.model.sent % self.empty_every == self.empty_every - 1
+            self.model.moments = [] if empty else [(4, 4 * (self.model.sent % 15), 6)]
+            self.out += self.model.frame()
+            self.model.time_us += self.gap_us
+            self.seconds = self.model.time_us / 1e6
+        elif not self.out:
+            self.seconds += seconds
+        data, self.out = self.out, b""
+        self.sent += data
+        return data
+
+    def clock(self):
+        return self.seconds
+
+    def close(self):
+        pass
+
+
+def recorded(tmp_path, port=None, seconds=None, name="touches.mcap", **options):
+    """The session, once all of the port has been taken."""
+    port = port or StreamPort()
+    session = Session(tmp_path / name, **options)
+    with session:
+        session.add(port, name="left hand")
+        session.start(seconds)
+        wait_until(lambda: session.wait(0.005) or not session.running or not port.left)
+    return session

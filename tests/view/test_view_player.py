@@ -1,0 +1,109 @@
+"""Recordings in the view: a file of bytes is played, led to any moment, paused, and counted."""
+
+import pytest
+
+import contactfpga
+from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.view import player as playing
+from contactfpga.view.player import Player
+from contactfpga.view.replayed import ByteRecording, Clock
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    pytest.importorskip("amaranth")
+    path = tmp_path_factory.mktemp("view") / "moving.bin"
+    with contactfpga.open("sim://?scene=moving", record=path) as board:
+        while board.clock() < 0.5:
+            board.next()
+    return f"replay://{path}"
+
+
+@pytest.fixture(scope="module")
+def frames(file):
+    """Every frame, read as the driver reads it."""
+    with contactfpga.open(file) as board:
+        return list(board)
+
+
+@pytest.fixture
+def player(file, monkeypatch):
+    now = [10.0]
+    monkeypatch.setattr(playing.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    return Player(ByteRecording(file), clock=lambda: now[0])
+
+
+def test_a_recording_begins_anywhere(file, frames):
+    recording = ByteRecording(file)
+    times = [(zones.time_us - frames[0].time_us) / 1e6 for zones in frames]
+    assert recording.count == len(frames)
+    assert recording.duration_s == pytest.approx(times[-1])
+    for start_s, end_s in ((0.0, None), (0.2, None), (0.2503, 0.3), (times[-1], None)):
+        found = [(seconds, zones.sequence) for seconds, zones in recording.frames(start_s, end_s)]
+        wanted = [
+            (pytest.approx(seconds), zones.sequence)
+            for seconds, zones in zip(times, frames)
+            if seconds >= start_s and (end_s is None or seconds <= end_s)
+        ]
+        assert found == wanted
+
+
+def test_time_goes_on_where_a_board_was_started_again():
+    clock = Clock()
+    assert [clock.take(time_us) for time_us in (5_000_000, 6_000_000, 100, 500_100)] == [0, 1, 1, 1.5]
+
+
+def test_it_plays_in_its_own_time(player):
+    while player.position_s < 0.3:
+        player.turn()
+    moment = player.turn()
+    assert moment.zones.time_us / 1e6 == pytest.approx(player.position_s, abs=0.002)
+    assert player.meter.frames_per_s == pytest.approx(10_400, rel=0.02)
+
+
+def test_it_is_as_fast_as_asked(player):
+    player.turn()
+    began = player.position_s
+    player.speed = 0.01
+    for _ in range(10):
+        player.turn()
+    assert player.position_s - began == pytest.approx(10 * 0.02 * 0.01, rel=0.2)
+
+
+def test_it_can_be_led_to_any_moment(player):
+    player.turn()
+    player.pause()
+    for seconds in (0.4, 0.1, 0.11, -5.0):
+        player.seek(seconds)
+        moment = player.turn()
+        assert player.position_s == max(0.0, seconds)
+        assert moment.zones.time_us / 1e6 == pytest.approx(max(0.0, seconds), abs=0.001)
+        assert player.turn() is None
+    player.play()
+    player.turn()
+    assert player.position_s == pytest.approx(0.02, abs=0.001)
+
+
+def test_at_its_end_it_stops_and_begins_again_when_asked(player):
+    player.seek(1e9)
+    moment = player.turn()
+    assert player.position_s == player.duration_s
+    assert moment.zones.time_us / 1e6 == pytest.approx(player.duration_s, abs=0.001)
+    player.turn()
+    assert not player.playing
+    player.play()
+    player.turn()
+    assert player.position_s < 0.1
+
+
+def test_a_contact_keeps_its_id_from_frame_to_frame(player):
+    ids = {track.id for _ in range(10) if (moment := player.turn()) for track in moment.tracks.active}
+    assert ids == {1}
+
+
+def test_what_cannot_be_played_is_named(tmp_path):
+    with pytest.raises(PortNotFound, match="cannot be opened"):
+        ByteRecording(f"replay://{tmp_path}/none.bin")
+    (tmp_path / "noise.bin").write_bytes(b"\x00\x01\x02" * 100)
+    with pytest.raises(ContactFPGAError, match="holds no hello"):
+        ByteRecording(f"replay://{tmp_path}/noise.bin")
