@@ -8,7 +8,7 @@ from sample import sample
 
 from contactfpga import Batch, Skin, cli
 from contactfpga.skin.derived import Derived
-from contactfpga.tracking import Tracker
+from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.many import decode
 from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, unseal
 from contactfpga.zones import around
