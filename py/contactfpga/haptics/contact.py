@@ -196,7 +196,8 @@ class Contacts(Sequence[Contact]):
         self.beyond_friction = solution.beyond_friction
         """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
         Intervals then hold for pushes with any friction."""
-        seen = seen if seen.link else dataclasses.replace(seen, link=wrench.frame)
+        if wrench.frame and not seen.link:
+            seen = Seen(wrench.frame, seen.time_us, seen.tracks)
         made = []
         for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
             nx, ny, nz = touch.normal
