@@ -165,6 +165,11 @@ def test_encoders_agree_with_an_independent_one():
         assert Wire(skin).seal(faults.encode_slot(300, 5, 32)) == Wire(skin).slot(300, 5, 0)
 
 
+def said(zones):
+    """What the board said: how sure the host is of its clock depends on the pieces."""
+    return {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
+
+
 def test_frames_in_runs_have_the_faults_of_those_one_by_one():
     """Whatever the pieces; reports between them, lost ones, frames that a report overtook."""
     rng = random.Random("runs")
@@ -186,7 +191,7 @@ def test_frames_in_runs_have_the_faults_of_those_one_by_one():
             if isinstance(event, (Run, Arrival)):
                 items.append(event if isinstance(event, Run) else event.zones)
     spread = [zones for item in items for zones in (item if isinstance(item, Run) else [item])]
-    assert [zones.to_dict() for zones in spread] == [zones.to_dict() for zones in singles]
+    assert [said(zones) for zones in spread] == [said(zones) for zones in singles]
     assert Batch.of(items).faults == tuple(zones.faults for zones in singles)
     assert {zones.faults for zones in singles} == {(), ("row 3 open",), ("column 2 stuck",), ("unnamed fault",)}
     assert runs > 10

@@ -212,7 +212,7 @@ def test_a_recording_has_no_deadline(tmp_path):
 
 
 def test_a_display_shows_silence_in_the_place_of_a_table_that_stands_still(board, port):
-    shown = live._paced(board, 1.0, lambda zones: None, tell_silence=True)
+    shown = live._paced(board, board.subscribe(), 1.0, lambda zones: None, tell_silence=True)
     assert isinstance(next(shown), contactfpga.Zones)
     port.dead = True
     silence = next(one for one in shown if isinstance(one, contactfpga.Silence))

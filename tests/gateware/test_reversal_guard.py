@@ -222,12 +222,13 @@ def test_a_guard_column_that_is_stuck_is_told_alone_and_driven_no_more_until_the
     assert life.words[-1] == column_1
 
 
-def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng):
+@pytest.mark.parametrize(("project_us", "clocks"), [(1.0, 43), (0.7, 36)])
+def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng, project_us, clocks):
     """A check keeps an untouched sheet from being looked at. At worst ``contact`` is settle and projection time and 7
     clocks after the touch, in place of 3 clocks."""
     monkeypatch.setattr(reversal, "CHECK_BIT", 4)
     monkeypatch.setattr(reversal_guard, "CHECK_BIT", 4)
-    skin = small(rows=2, columns=2, settle_us=0.5, project_us=1.0, precharge_us=0.25, guard=True)
+    skin = small(rows=2, columns=2, settle_us=0.5, project_us=project_us, precharge_us=0.25, guard=True)
     turn, pieces = 24 * 16, []
     touch = [number * turn + rng.choice([0, 1, rng.randrange(-6, 50)]) for number in range(3, 40)]
     for start in touch:
@@ -236,7 +237,7 @@ def test_a_touch_is_seen_when_the_check_is_over(bench, monkeypatch, rng):
     late = [contact.index(1, start) - start for start in touch]
     settle, project = facts(skin).settle, facts(skin).project
     assert min(late) == 3
-    assert settle + project + 3 <= max(late) <= settle + project + 7 == 43
+    assert settle + project + 3 <= max(late) <= settle + project + 7 == clocks
 
 
 def test_a_row_that_is_empty_when_it_is_driven_is_told_as_motion(bench):

@@ -20,6 +20,7 @@ class Sample:
     """Mutants of one Skin, and those that the short stimuli leave."""
 
     skin: Skin
+    all: list
     mutants: list
     left: list
 
@@ -27,8 +28,9 @@ class Sample:
 @pytest.fixture(scope="module")
 def sample():
     skin = SKINS["8x8"]
-    mutants = netlist.draw(netlist.candidates(skin), SAMPLE, seed=3)
-    return Sample(skin, mutants, campaign.left_by(skin, mutants, stimuli.quick(skin)))
+    candidates = netlist.candidates(skin)
+    mutants = netlist.draw(candidates, SAMPLE, seed=3)
+    return Sample(skin, candidates, mutants, campaign.left_by(skin, mutants, stimuli.quick(skin)))
 
 
 def test_short_stimuli_kill_most_mutants(sample, record_property):
@@ -41,6 +43,10 @@ def test_every_stage_of_the_design_has_mutants(sample):
     assert {mutant.stage for mutant in sample.mutants} == set(netlist.STAGES.values()) - {"debounce"}
     assert {mutant.stage for mutant in netlist.candidates(SKINS["4x4, debounced"])} == set(netlist.STAGES.values())
     assert all(mutant.place.partition(":")[2] for mutant in sample.mutants)
+
+
+def test_what_only_a_flip_can_reach_has_no_mutants(sample):
+    assert not any("upset" in mutant.place for mutant in sample.all)
 
 
 def test_without_a_stimulus_every_mutant_survives(sample):

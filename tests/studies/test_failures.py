@@ -57,15 +57,23 @@ BREAKS = {
     ("broken", "column"): (0, 1),
     ("broken", "row, with guard lines"): (0, 1),
     ("broken", "column, with guard lines"): (0, 1),
+    ("broken_reversal", "row"): (0, 1),
+    ("broken_reversal", "column"): (0, 1),
+    ("broken_reversal", "row, with guard lines"): (0, 1),
+    ("broken_reversal", "column, with guard lines"): (0, 1),
     ("stuck", "no mask"): (0, 1),
     ("stuck", "three in the mask"): (3, 4),
     ("stuck", "columns shorted to the rows' level"): (0, 1),
+    ("stuck_reversal", "no mask"): (0, 1),
+    ("stuck_reversal", "columns shorted to the rows' level"): (0, 1),
     ("baud", "host faster, frames"): (5.5, 5.75),
     ("baud", "host slower, frames"): (4.25, 4.5),
     ("baud", "host faster, requests"): (3.75, 4.0),
     ("baud", "host slower, requests"): (6.25, 6.5),
     ("noise", "half a bit to two bits long"): (10, 30),
     ("host", "every frame of `contactfpga.open()`"): (16, 20),
+    ("silence", "`latest()`"): (4, 6),
+    ("silence", "`latest(max_age_s=0.005)`"): (4, 6),
     ("clock", "board with `clock_hz` off"): (0.1, 0.3),
 }
 
@@ -78,6 +86,10 @@ TOLD = {
     ("settle", "the same with guard lines"): {"row N open", "guard row open", "guard column open"},
     ("broken", "row, with guard lines"): {"row N open"},
     ("broken", "column, with guard lines"): {"column N open"},
+    ("broken_reversal", "row, with guard lines"): {"row N open"},
+    ("broken_reversal", "column, with guard lines"): {"column N open"},
+    ("stuck_reversal", "columns shorted to the rows' level"): {"stuck"},
+    ("silence", "`latest(max_age_s=0.005)`"): {"NoData"},
     ("ghost", "zones"): {"ghost"},
     ("ghosts", "cells, random places"): {"ghost"},
     ("stuck", "columns shorted to the rows' level"): {"stuck"},
@@ -91,6 +103,7 @@ TOLD = {
 """What is wrong here is reported at every value, by nothing but these; N is any line."""
 
 NOT_NOTICED = {
+    ("silence", "`latest()`"): (6, 1000),
     ("diodes", "the same with guard lines"): (1, 2),
     ("ghosts", "zones, random places"): (8, 8),
     ("clock", "board with `clock_hz` off"): (0.3, 1),
@@ -106,6 +119,7 @@ QUICK = [
     and name not in ("capacity", "moving", "bounce", "ghost", "ghosts")
     and method not in ("40 kΩ, lines of 2 kΩ, `release_us = 40`", "three in the mask")
     and (name, method) != ("settle", "the same with guard lines")
+    and not name.endswith("_reversal")
 ]
 """What `make test` turns: it needs few boards beside the reference Skin's, as each has to be compiled."""
 
@@ -153,13 +167,27 @@ def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turn, name, method):
         assert found.outcomes[found.broken].verdict == "silent"
 
 
+def test_what_passes_unnoticed_has_its_reason_on_the_page():
+    text = PAGE.read_text()
+
+    def figures(name):
+        return text.partition(f"<!-- figures: {name} -->")[2].partition("<!-- end -->")[0]
+
+    reasons = figures("unnoticed")
+    name, silent = "", set()
+    for row in figures("failures").splitlines():
+        name = found[1] if (found := re.search(r"\]\(#(\w+)\)", row)) else name
+        silent |= {name} if "**not noticed**" in row else set()
+    assert set(re.findall(r"\]\(#(\w+)\)", reasons)) == silent
+    for name in silent:
+        assert STUDIES[name].unnoticed
+        assert f"| {STUDIES[name].unnoticed} |" in reasons
+
+
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
     text = PAGE.read_text()
-    assert (
-        writer.update(text, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
-        == text
-    )
+    assert writer.update(text, failures_page.tables(turned)) == text
     for name, methods in turned.items():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(STUDIES[name], methods) == drawn

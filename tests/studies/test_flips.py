@@ -12,6 +12,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native, state
 from contactfpga_sim.board.state import Bit
 from contactfpga_sim.pages import flips_page, writer
+from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.flips import campaign, designs, flip, reference, summary, touches
 from contactfpga_sim.studies.flips.campaign import Row
 from contactfpga_sim.studies.flips.designs import DESIGNS
@@ -223,6 +224,19 @@ def test_numbers_are_read_back_as_they_were_written(tmp_path):
     assert campaign.read(tmp_path / "flips.csv") == rows
     assert str(summary.share(rows)) == "50.0 % (9.5 to 90.5)"
     assert summary.wrong_ms(rows) == (250.0, 250.0)
+
+
+def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_missing(monkeypatch):
+    monkeypatch.setattr(campaign.native, "skin_key", lambda skin: f"{skin.send} {skin.dual}")
+    masked = ["link.store", False, "masked", "", 0, 0.0, 0.5]
+    for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
+        kept.kept("flips", campaign._key("run", memory, block), lambda: [masked, masked])
+    try:
+        rows = campaign.finished(["run, dual", "run"])
+        assert rows == 6 * [Row("run", Found(*masked))]
+    finally:
+        for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
+            kept._path("flips", campaign._key("run", memory, block)).unlink()
 
 
 def test_bad_choices_are_refused_in_a_sentence(capsys):

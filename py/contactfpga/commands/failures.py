@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
     if path:
-        writer.write(path, {"failures": lambda: failures_page.table(turned), "pictures": failures_page.pictures})
+        writer.write(path, failures_page.tables(turned))
     else:
         path = _write(turned, folder / "failures.md")
     print(path, flush=True)
@@ -53,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
 def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
     from contactfpga_sim.pages import failures_page
 
-    path.write_text(failures_page.table(turned) + "\n", encoding="utf-8")
+    both = failures_page.table(turned), failures_page.unnoticed(turned)
+    path.write_text("\n\n".join(both) + "\n", encoding="utf-8")
     return path
 
 

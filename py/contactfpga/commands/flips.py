@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 
 from contactfpga.console import flags, numbers, outputs
 from contactfpga.console.interrupt import Interrupted
@@ -19,6 +20,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--registers", type=count, default=400, metavar="N", help=registers)
     memories = "Flips of memory bits per design (default: 100)."
     parser.add_argument("--memories", type=count, default=100, metavar="N", help=memories)
+    only = "Follow no more flips: take all that were followed before, as many as there are of each design."
+    parser.add_argument("--kept", action="store_true", help=only)
     flags.workers(parser)
     page = "Rewrite the tables in this page, with the picture in images and all numbers in flips beside it."
     parser.add_argument("--page", metavar="FILE", help=page)
@@ -37,16 +40,25 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError("--page takes all designs; leave --design out")
     page = writer.page(args.page, "--page") if args.page else None
     folder = outputs.folder(page.parent / "flips" if page else args.output, "--page" if page else "--output")
-    try:
-        with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-            rows = campaign.run(names, args.registers, args.memories, executor, lambda of: step("blocks of flips", of))
-    except KeyboardInterrupt:
-        raise Interrupted("interrupted; the blocks that were finished are kept, and the same command goes on") from None
+    if args.kept:
+        rows = campaign.finished(names)
+    else:
+        try:
+            with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
+                rows = campaign.run(
+                    names, args.registers, args.memories, executor, functools.partial(step, "blocks of flips")
+                )
+        except KeyboardInterrupt:
+            what = "interrupted; the blocks that were finished are kept, and the same command goes on"
+            raise Interrupted(what) from None
     campaign.write(rows, folder / "flips.csv")
     print(folder / "flips.csv", flush=True)
     for name in names:
         for memory, what in ((False, "registers"), (True, "memories")):
             some = summary.of(rows, name, memory)
+            if not some:
+                print(f"{name}: {what}: none was followed")
+                continue
             print(f"{name}: {what}: {summary.share(some)} silently wrong, {summary.share(some, 'told')} told")
     if page:
         found = summary.measured(names)

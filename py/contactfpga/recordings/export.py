@@ -74,8 +74,9 @@ def _parquet(path: Path, pieces: Iterable[Piece], facts: str) -> None:
 def _npz(path: Path, pieces: Iterable[Piece], facts: str) -> None:
     every = list(pieces)
     columns: dict[str, Any] = {name: np.concatenate([piece[name] for piece in every]) for name in COLUMNS}
+    columns[KEY] = np.array(facts)
     with open(path, "wb") as file:  # which gets no second suffix
-        np.savez_compressed(file, **columns, **{KEY: np.array(facts)})
+        np.savez_compressed(file, **columns)
 
 
 def _csv(path: Path, pieces: Iterable[Piece], facts: str) -> None:

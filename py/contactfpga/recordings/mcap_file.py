@@ -70,9 +70,9 @@ class McapFile:
         self._make_room(data)
         number = self._channels.get(channel.topic)
         if number is None:
-            facts = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
+            name, encoding, text = ("", "", b"") if of is None else (of.name, of.encoding, of.data)
             number = self._register(
-                channel.topic, channel.message_encoding, channel.metadata, *facts[:2], lambda: facts[2]
+                channel.topic, channel.message_encoding, channel.metadata, name, encoding, lambda: text
             )
         self._add(number, time_ns, data)
 

@@ -23,7 +23,7 @@ class View:
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
         self._source = source
-        self.stage = Stage(server, Tiles(source.sheet))
+        self.stage = Stage(server, Tiles(source.sheet), source.cells)
         self.panel = Panel(server, source, hand)
         self._told_s = 0.0
         self.drawn = 0

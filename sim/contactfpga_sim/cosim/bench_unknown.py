@@ -30,11 +30,11 @@ from contactfpga_hdl.link.link import hello_words
 RESET_CLOCKS = 4
 """Clocks of reset after power-up. The iCE40 boards give 181, an ECP5 as many as its global reset takes."""
 
-INITIALIZED = (r"link\.odometer\.digits\[", r"debounce\.state\[")
-"""Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the odometer's
-digits and the states of debounce. They are put there after the first clock: until then unknown registers may write
-anywhere. In an FPGA they hold zero or their initial value, and the reset keeps them there. With the labeller `serial`
-there are more zeros: :func:`initialized`."""
+INITIALIZED = (r"debounce\.state\[",)
+"""Memory words that the design needs at power-up and the bitstream brings, beside the hello's bytes: the states of
+debounce. They are put there after the first clock: until then unknown registers may write anywhere. In an FPGA they
+hold zero or their initial value, and the reset keeps them there. With the labeller `serial` there are more zeros:
+:func:`initialized`."""
 
 _GATES = (
     f"read_rtlil model.il; delete w:$verilog_initial_trigger; {NO_COLLISIONS}; proc; pmuxtree; flatten; memory -nomap; "

@@ -28,10 +28,12 @@ STAGES = {
 }
 """Modules of the design, as Top names them, and the stage they count for."""
 
-# No test drives the reset: registers start from their initial values. What does nothing is dropped, as a mutant of it
-# would be none. Memories stay whole: what is in them is no logic.
+# No test drives the reset: registers start from their initial values. Nor is there a restart without a flip: that none
+# is asked for is proved. What does nothing is dropped, as a mutant of it would be none. Memories stay whole: what is in
+# them is no logic.
 PREPARE = (
-    "delete -port w:rst; setundef -undriven -zero; opt -full; wreduce; peepopt; opt -full; memory -nomap; opt -full"
+    "delete -port w:rst; delete w:restarts; setundef -undriven -zero; opt -full; wreduce; peepopt; opt -full; "
+    "memory -nomap; opt -full"
 )
 # A fault at Q is one at D a clock later, one at a clock no change of the logic; no memory here has a reset.
 _LEFT_OUT = ("Q", "CLK", "RD_CLK", "WR_CLK", "RD_ARST", "RD_SRST")

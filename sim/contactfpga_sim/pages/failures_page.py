@@ -52,6 +52,25 @@ def says(study: Study, turned: Turned) -> str:
     return "; ".join(parts)
 
 
+UNNOTICED = ("knob", "where", "why nothing tells")
+
+
+def unnoticed(turned: Mapping[str, Mapping[str, Turned]]) -> str:
+    """A row for each study in which something wrong passes unnoticed, with the reason."""
+    lines = []
+    for name, methods in turned.items():
+        where = [method for method, found in methods.items() if found.silent_at is not None]
+        if where:
+            study = STUDIES[name]
+            lines.append(writer.line((f"[{study.title}](#{name})", ", ".join(where), study.unnoticed)))
+    return writer.table(UNNOTICED, lines)
+
+
+def tables(turned: Mapping[str, Mapping[str, Turned]]) -> writer.Tables:
+    """All of the page, by name."""
+    return {"failures": lambda: table(turned), "unnoticed": lambda: unnoticed(turned), "pictures": pictures}
+
+
 def pictures() -> str:
     """A heading and a picture for each study."""
     return "\n".join(

@@ -41,11 +41,21 @@ def _own() -> str:
     return digest.hexdigest()
 
 
+def found(kind: str, key: str) -> Any:
+    """What is kept for a key, None if nothing is."""
+    path = _path(kind, key)
+    return json.loads(path.read_text()) if trusted(path) else None
+
+
+def _path(kind: str, key: str) -> Path:
+    return ready(cache_folder()) / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
+
+
 def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
     """What ``new()`` gives, or what it gave before for the same key; it must be plain JSON."""
-    path = ready(cache_folder()) / f"kept-{kind}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
-    if trusted(path):
-        return json.loads(path.read_text())
+    if (before := found(kind, key)) is not None:
+        return before
+    path = _path(kind, key)
     value = json.loads(json.dumps(new()))
     # Whole or not at all, whoever else writes it at the same time.
     with scratch(path.parent, "unkept") as work:

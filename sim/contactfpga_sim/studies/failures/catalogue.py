@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.studies.failures import electric, line, shapes, touch
+from contactfpga_sim.studies.failures import electric, line, lines, shapes, touch
 
 STUDIES = {
     study.name: study
@@ -17,11 +17,14 @@ STUDIES = {
         electric.DIODES,
         electric.GHOST,
         electric.GHOSTS,
-        electric.BROKEN,
-        electric.STUCK,
+        lines.BROKEN,
+        lines.BROKEN_REVERSAL,
+        lines.STUCK,
+        lines.STUCK_REVERSAL,
         line.BAUD,
         line.NOISE,
         line.HOST,
+        line.SILENCE,
         line.CLOCK,
     )
 }

@@ -53,6 +53,8 @@ class Study:
     """What to do about it."""
     format: str = "{:,g}"
     """How a value is written."""
+    unnoticed: str = ""
+    """Why nothing tells where :func:`Outcome.verdict` is ``silent``."""
 
     def turn(
         self, step: Callable[[], None] = lambda: None, so_far: dict[str, Turned] | None = None

@@ -9,6 +9,7 @@ import numpy as np
 
 from contactfpga.driver import health
 from contactfpga.driver.board import Board as Driver
+from contactfpga.errors import ReadTimeout
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga_sim.board.virtual import VirtualBoard
@@ -130,6 +131,7 @@ CLOCK = Study(
     values=(0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 10.0, 30.0, 100.0),
     runs={"board with `clock_hz` off": _clock},
     helps="a crystal: 0.01 % at worst; on-chip oscillators cannot be chosen",
+    unnoticed="over USB the host knows a frame's instant to a millisecond only, so a small difference shows late",
 )
 
 
@@ -197,6 +199,58 @@ def _slow_host(milliseconds: float) -> Outcome:
     what += f", {stats.unexplained} whose time was not known" if stats.unexplained else ""
     return Outcome(missing <= 0 and not stats.damaged, told, what, missing)
 
+
+class DyingBoard(SlowHost):
+    """A board that stops."""
+
+    name = "the board that stops"
+    runs = True
+
+    def _keep(self, data: bytes) -> None:
+        if self.runs:
+            super()._keep(data)
+
+
+MAX_AGE_S = 0.005
+"""What a robot may act on."""
+
+
+@functools.cache
+def _silence(max_age_s: float | None) -> tuple[str, float]:
+    """A program reads the newest frame again and again, and the board stops: the error that it gets, and seconds until
+    then."""
+    transport = DyingBoard()
+    with Driver(transport) as board:
+        board.greet(1.0)
+        board.latest()
+        transport.runs = False
+        begun = transport.clock()
+        try:
+            while True:
+                board.latest(max_age_s=max_age_s)
+        except ReadTimeout as error:
+            return type(error).__name__, transport.clock() - begun
+
+
+def _told_late(max_age_s: float | None, milliseconds: float) -> Outcome:
+    error, after_s = _silence(max_age_s)
+    told = (error,) if milliseconds >= 1000 * after_s else ()
+    return Outcome(milliseconds <= 1000 * MAX_AGE_S, told, f"no frame for {milliseconds:g} ms", milliseconds)
+
+
+SILENCE = Study(
+    name="silence",
+    title="A board without supply, clock or configuration, or a broken cable",
+    knob="ms since its last byte",
+    amount="ms without a frame",
+    values=(1, 2, 4, 6, 10, 20, 50, 100, 200, 500, 1000, 2000),
+    runs={
+        "`latest()`": functools.partial(_told_late, None),
+        "`latest(max_age_s=0.005)`": functools.partial(_told_late, MAX_AGE_S),
+    },
+    helps="`max_age_s`, or `deadline_s` of `subscribe` and `events`; a watchdog at the pin `alive`",
+    unnoticed="a read waits for a frame until its timeout; how old one may be, only your program knows",
+)
 
 HOST = Study(
     name="host",

@@ -18,9 +18,14 @@ from contactfpga_sim.studies.failures.knob import Place
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)
 """The same sheet with guard lines, and the pins that go with them."""
+REVERSAL = REFERENCE.replace(scan="reversal", precharge_us=0.25, settle_us=0.5, release_us=0.05)
+REVERSAL_GUARDED = REVERSAL.replace(guard=True)
 
 HELLO_BYTES = len(protocol.encode_hello(REFERENCE.replace(surface="cylinder", radius_mm=100.0, name=32 * "n")))
 """The most that a hello takes on the wire."""
+
+FRAME_BYTES = 28
+"""Of a frame of few zones on the wire; a scan that waits for the wire may be shorter than that."""
 
 HELD_SCANS = 5
 """Scans for which a frame is held, so that one of it reaches the host even if a hello comes between."""
@@ -65,7 +70,7 @@ def seen(skin: Skin, frames: np.ndarray, cuts: Cuts | None = None) -> list[Zones
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
         start = hello_clocks(skin)
-        held = rig.scan * HELD_SCANS
+        held = HELD_SCANS * max(rig.scan, 10 * FRAME_BYTES * Derived(skin).bit_clocks)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)
         rig.board.hold(frames, held)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), held)

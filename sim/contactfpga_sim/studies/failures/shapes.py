@@ -55,6 +55,7 @@ WINDING = Study(
     values=tuple(range(12)),
     runs={f"`{name}`": functools.partial(_winding, skin) for name, skin in SKINS.items()},
     helps="an exact labeller: `run` or `serial`",
+    unnoticed="`projection` and `single` keep the shadows of what is pressed, and both shapes have the same ones",
 )
 
 
@@ -76,6 +77,7 @@ CROSSING = Study(
     values=tuple(range(70, 24, -1)),
     runs={f"`{name}`": functools.partial(_crossing, SKINS[name]) for name in ("run", "projection", "single")},
     helps="an exact labeller; a sheet turned so that shadows part",
+    unnoticed="pressed cells that touch are one zone by definition; `projection` and `single` see shadows only",
 )
 
 

@@ -61,6 +61,7 @@ CLOSING = Study(
         "4-connectivity, 5 mm": functools.partial(_closing, REFERENCE.replace(connectivity=4), 5.0),
     },
     helps="a finer pitch; 4-connectivity",
+    unnoticed="the same switches are pressed as by one contact of that shape",
 )
 
 WAYS = ((1, 0), (-1, 0), (0, 1), (0, -1))
@@ -165,4 +166,5 @@ BOUNCE = Study(
         for method in ("none", "sym_defer_pk", "asym_eager_defer_pk")
     },
     helps="longer debounce times than the switch bounces; nobody can tell a long bounce from a second touch",
+    unnoticed="a switch that opens and closes once more is what a second touch is",
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import hashlib
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, as_completed
@@ -53,9 +54,23 @@ def _block(design: str, memory: bool, block: int) -> list[Found]:
         reference = _reference(design)
         return [flip.follow(reference, each) for each in flip.drawn(reference, memory, BLOCK, block)]
 
-    rows: list[Found] = kept.kept(
-        "flips", repr((_sources(), native.skin_key(designs.skin(design)), memory, block)), new
-    )
+    rows: list[Found] = kept.kept("flips", _key(design, memory, block), new)
+    return rows
+
+
+def _key(design: str, memory: bool, block: int) -> str:
+    return repr((_sources(), native.skin_key(designs.skin(design)), memory, block))
+
+
+def finished(names: Iterable[str]) -> list[Row]:
+    """All flips of these designs that were followed before: of each the blocks up to the first one that was not."""
+    rows = []
+    for memory in (False, True):
+        for name in names:
+            for block in itertools.count():
+                if (found := kept.found("flips", _key(name, memory, block))) is None:
+                    break
+                rows += [Row(name, Found(*one)) for one in found]
     return rows
 
 
