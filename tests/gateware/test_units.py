@@ -179,7 +179,7 @@ def test_pins_keep_the_times_of_the_data_sheet(bench, clock_hz, supply_v):
     skin = Skin(clock_hz=clock_hz, baud=clock_hz // 12, units=3, converter_v=supply_v, settle_us=100)
     dut = Mcp3208(skin)
     sim = bench(dut)
-    clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.PINS)
+    clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.Mcp3208.reads)
     sim.run(4 * Derived(skin).units.spacing_clocks)
     s, most_hz = 1 / clock_hz, LIMITS[supply_v][0]
     edges = changes(clock.values)
