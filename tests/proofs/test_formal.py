@@ -28,7 +28,7 @@ LONG = {
     "an end mark a frame, 8 columns, 4-connected",
     "serial: stalls change nothing, 8 columns, 4 rows, 4-connected",
     "zones are divided, 2x2, 1 fraction bit",
-    "backlog keeps each item, 18 items",
+    "backlog keeps each item, 16 items",
     "pins never meet, 2x1, shortest times",
     "pins never meet, 2x1, guard lines, row2col, shortest times",
     "whole lines are not told, 3x2",
