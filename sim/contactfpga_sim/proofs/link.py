@@ -181,13 +181,14 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
-    """Carries of the odometer are over before the first digit is fetched, and the digit on offer stands."""
+    """The odometer has cleared its digits and carried before the first one is fetched, and the digit on offer stands."""
     m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
-    carries = state != 0
-    proof.lemma((state <= 2) & (~carries | (at >= LIVE_DIGITS) & (at <= 10)))
+    carries, clears = (state == 1) | (state == 2), state == 3
+    proof.lemma(~carries | (at >= LIVE_DIGITS) & (at <= 10))
     with m.If((fetch | byte) & wire.is_hello):
         passed = Cat(byte, wire.index)  # at least this many clocks since it was taken
         proof.lemma(~carries | (Cat(state == 2, at) >= passed + 2 * LIVE_DIGITS))
+        proof.lemma(~clears | (at > passed))
         with m.If(byte & (wire.index >= protocol.STATE_OFFSET)):
             place = inside["link.offset"][: len(at)]
             proof.lemma(inside.part("link.odometer").digit == inside.word("link.odometer.digits", place))
