@@ -181,7 +181,7 @@ def _lemmas(proof: Proof, inside: Inside, place, frames: _Frames, wire: _Wire) -
 
 
 def _lemmas_on_state(proof: Proof, inside: Inside, wire: _Wire, fetch, byte) -> None:
-    """The odometer has cleared its digits and carried before the first one is fetched, and the digit on offer stands."""
+    """The odometer has cleared its digits and carried before the first is fetched, and the digit on offer stands."""
     m, state, at = proof.m, inside["link.odometer.carry_state"], inside["link.odometer.at"]
     carries, clears = (state == 1) | (state == 2), state == 3
     proof.lemma(~carries | (at >= LIVE_DIGITS) & (at <= 10))
