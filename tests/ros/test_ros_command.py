@@ -18,7 +18,7 @@ def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
     pytest.importorskip("cyclonedds")
     board.stream = board.frame
     assert cli.main(["ros", board.path, "--domain", "88", "--namespace", "arm", "--seconds", "0.3"]) == 0
-    assert "publishing /arm/zones and its neighbors to this computer; stop with Ctrl+C" in capsys.readouterr().out
+    assert "publishing /arm/zones and the other topics to this computer; Ctrl-C ends it" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
         (["--frame", "a b"], "frame is 'a b'; a frame's name has letters, digits"),
         (["--place", "0", "0", "nan"], "place_m is [0.0, 0.0, nan]; it must be three finite numbers"),
         (["--zones-hz", "0"], "zones_hz is 0.0; it must be above 0 and at most 100000"),
-        (["--friction", "0.5"], "--friction is of forces; add --units"),
+        (["--friction", "0.5"], "--friction needs --units: it is used for forces only"),
         (["--seconds", "1", "nowhere"], "nowhere cannot be opened"),
     ],
 )
