@@ -60,7 +60,7 @@ class Plan:
             )
         least = longest_pause_s(self.skin, self.skin)
         if self.late_s < least:
-            raise BodyError(f"late_s is {self.late_s:g}; a board of this Skin may be silent for {least:.3g} s; give more")
+            raise BodyError(f"late_s is {self.late_s:g}; a board of this Skin may be silent for {least:.3g} s")
 
 
 def read(values: Any, folder: Path) -> Plan:

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 def _look(args: argparse.Namespace) -> tuple[Hello, str]:
     """What the board says of itself, and the device it is on."""
     if args.port is not None and args.port.startswith(("replay:", address.SCHEME)):
-        raise ContactFPGAError(f"port is {args.port!r}; give a board: neither a recording nor what is published already")
+        raise ContactFPGAError(f"port is {args.port!r}; give a board, no recording and nothing that is published")
     with driver.open(args.port, args.skin, baud=args.baud, timeout=args.timeout) as board:
         return board.hello, board.port
 
