@@ -295,7 +295,7 @@ def test_link_whose_code_fails_is_lost_and_says_why(patient):
         ("mirrored = true", "mirrored = 1", "link 'chest': mirrored is 1; it must be true or false"),
         ("mirrored = true", "mirored = true", "link 'chest': unknown key 'mirored'; known are name"),
         ("mirrored = true", "late_s = 0.001", "link 'chest': late_s is 0.001; a board of this Skin may be silent for"),
-        ("mirrored = true", "late_s = 1\nsilent_s = 0.5", "link 'chest': late_s is 1 and silent_s 0.5; a link is late"),
+        ("mirrored = true", "late_s = 1\nsilent_s = 0.5", "link 'chest': late_s is 1 and silent_s 0.5; late_s must be"),
         ("mirrored = true", 'surface = "none.npz"', "none.npz"),
         ("mirrored = true", "surface = {radius_mm = 3}", "link 'chest': surface is {'radius_mm': 3}; a cone is"),
         ("[0.1, 0.0, 0.0]", "[0.1, 0.0]", "link 'arm': point_m is [0.1, 0.0]; it must be a list of three numbers"),

@@ -127,7 +127,7 @@ def test_a_mask_that_is_not_known_is_said(run):
 
 
 def test_a_time_without_a_watch_is_refused(run):
-    assert run("doctor", "--stuck-s", 3)[2] == "contactfpga: --stuck-s is of a watch; add --watch\n"
+    assert run("doctor", "--stuck-s", 3)[2] == "contactfpga: --stuck-s needs --watch\n"
 
 
 # ---- bounce

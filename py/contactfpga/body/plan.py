@@ -55,8 +55,8 @@ class Plan:
     def __post_init__(self) -> None:
         if not 0 < self.late_s <= self.silent_s:
             raise BodyError(
-                f"late_s is {self.late_s:g} and silent_s {self.silent_s:g}; a link is late above 0 s, and silent no "
-                "earlier than late"
+                f"late_s is {self.late_s:g} and silent_s {self.silent_s:g}; late_s must be above 0 s and at most "
+                "silent_s"
             )
         least = longest_pause_s(self.skin, self.skin)
         if self.late_s < least:

@@ -39,11 +39,11 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         return _list(args)
     if args.watch and args.self_test:
-        raise ContactFPGAError("--watch and --self-test are two commands; give one of them")
+        raise ContactFPGAError("give --watch or --self-test, not both")
     if args.watch:
         return watching.run(args)
     if args.stuck_s is not None:
-        raise ContactFPGAError("--stuck-s is of a watch; add --watch")
+        raise ContactFPGAError("--stuck-s needs --watch")
     if args.self_test:
         return self_testing.run(args)
     report = _Report(silent=args.json)

@@ -20,24 +20,24 @@ EXTRA = "net"
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
-    key = "What it is called on the network (default: contactfpga/ and the board's name, or its fingerprint)."
+    key = "Name of the board on the network (default: contactfpga/ and its name, or its fingerprint)."
     parser.add_argument("--key", help=key)
-    listen = f"Listen here; anything but this machine must be named (default: {address.ENDPOINT})."
+    listen = f"Listen there, such as tcp/0.0.0.0:7447 for all (default: {address.ENDPOINT}, this machine only)."
     parser.add_argument("--listen", metavar="ENDPOINT", help=listen)
-    parser.add_argument("--connect", metavar="ENDPOINT", help="Listen nowhere; connect to the router there.")
+    parser.add_argument("--connect", metavar="ENDPOINT", help="Do not listen; connect to the router there.")
     parser.add_argument("--config", metavar="FILE", help="Zenoh's own configuration (JSON5): TLS, users, access.")
     batch = "Collect bytes for so long before they are sent (default: 2; 0: send at once)."
     parser.add_argument("--batch-ms", type=numbers.number(0, 1000, "ms"), default=2.0, metavar="T", help=batch)
     slow = "Where the network is too slow: block until it takes more, or drop (default: block)."
     parser.add_argument("--congestion", choices=("block", "drop"), default="block", help=slow)
-    allow = "Pass commands on to the board, not requests for frames alone."
+    allow = "Pass commands on to the board, too, not only requests for frames."
     parser.add_argument("--allow-commands", action="store_true", help=allow)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command until Ctrl-C."""
     if args.listen and args.connect:
-        raise ContactFPGAError("--listen and --connect are two ways to one network; give one of them")
+        raise ContactFPGAError("give --listen or --connect, not both")
     from contactfpga.net import session
     from contactfpga.net.publisher import Publisher
 
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 def _look(args: argparse.Namespace) -> tuple[Hello, str]:
     """What the board says of itself, and the device it is on."""
     if args.port is not None and args.port.startswith(("replay:", address.SCHEME)):
-        raise ContactFPGAError(f"port is {args.port!r}; a board is published, no recording and nothing published")
+        raise ContactFPGAError(f"port is {args.port!r}; give a board, no recording and nothing that is published")
     with driver.open(args.port, args.skin, baud=args.baud, timeout=args.timeout) as board:
         return board.hello, board.port
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from contactfpga.recordings.link_messages import Felt
     from contactfpga.recordings.session import Session
 
-HELP = "Record a board, or all of a robot (ROBOT.toml in place of PORT), into an MCAP file."
+HELP = "Record a board, or all boards of a robot (ROBOT.toml instead of PORT), into an MCAP file."
 EXTRA = "record"
 
 SHOWN_S = 0.5
@@ -32,18 +32,18 @@ SHOWN_S = 0.5
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("file", metavar="FILE.mcap", help="A new file.")
+    parser.add_argument("file", metavar="FILE.mcap", help="File to write; it must not exist yet.")
     flags.connection(parser)
     parser.add_argument("--seconds", type=numbers.SECONDS, help="End after so many seconds (default: at Ctrl-C).")
-    megabytes = "Begin a new file, FILE_0002.mcap and so on, after so many MB."
+    megabytes = "Write FILE_0001.mcap, FILE_0002.mcap and so on, with about so many MB each."
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
-    seconds = "Begin a new file after so many seconds."
+    seconds = "The same, with so many seconds each."
     parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
     units = "Add forces, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
     parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
-    bare = "Leave out the messages for other programs: a file of a quarter of the size, from which all can be made."
+    bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."
     parser.add_argument("--bytes-only", action="store_true", help=bare)
 
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.recordings.session import Session
 
     if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction is of forces; add --units")
+        raise ContactFPGAError("--friction needs --units: it is used for forces only")
     body = _body(args)
     split = None
     if args.split_mb is not None or args.split_s is not None:
@@ -95,7 +95,7 @@ def _body(args: argparse.Namespace) -> Body | None:
 
     for name in ("skin", "baud", "units", "friction"):
         if getattr(args, name) is not None:
-            raise ContactFPGAError(f"--{name} is of a board; {args.port} says it of each link")
+            raise ContactFPGAError(f"--{name} is for a single board; {args.port} sets it for each link")
     return Body.load(args.port)
 
 

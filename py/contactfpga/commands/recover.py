@@ -6,7 +6,7 @@ import argparse
 
 from contactfpga.console import terminal
 
-HELP = "Make a recording whole that was not closed: its program was killed, or the disk was full."
+HELP = "Repair a recording whose program was killed or whose disk was full."
 EXTRA = "record"
 
 

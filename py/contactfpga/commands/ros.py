@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", metavar="NAME", default="", help=frame)
     parent = "Publish where the link's frame lies in this one, on /tf_static."
     parser.add_argument("--parent", metavar="NAME", default="", help=parent)
-    place = "Where it lies, in m (default: 0 0 0)."
+    place = "Where the link's frame lies there, in m (default: 0 0 0)."
     parser.add_argument(
         "--place",
         nargs=3,
@@ -35,13 +35,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--turn", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
     )
-    rate = "Publish zones, tracks and contacts at most as often (default: 1000)."
+    rate = "Publish zones, tracks and contacts at most so many times per second (default: 1000)."
     parser.add_argument(
         "--zones-hz", type=numbers.number(0, 1e5, "Hz", above=True), metavar="HZ", default=1000.0, help=rate
     )
     units = "Publish forces too, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
     parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
     domain = "ROS_DOMAIN_ID (default: 0)."
     parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.ros.settings import Settings
 
     if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction is of forces; add --units")
+        raise ContactFPGAError("--friction needs --units: it is used for forces only")
     settings = Settings(
         frame=args.frame, parent=args.parent, place_m=args.place, turn_rad=args.turn, zones_hz=args.zones_hz
     )
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         forces = Forces.of(board, args.units, args.friction)
         feed = Feed(board, publisher.send, settings, None if forces is None else forces.of_frame)
         reach = "all computers of the network" if args.network else "this computer"
-        terminal.say(f"publishing {publisher.topic('zones')} and its neighbors to {reach}; stop with Ctrl+C")
+        terminal.say(f"publishing {publisher.topic('zones')} and the other topics to {reach}; Ctrl-C ends it")
         until = None if args.seconds is None else board.clock() + args.seconds
         feed.run(WithReadings(board) if forces else board, lambda: until is not None and board.clock() >= until)
     return 0

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         return _measure(args)
     for name in ("seconds", "json"):
         if getattr(args, name):
-            raise ContactFPGAError(f"--{name} is of a measurement; add --bounce or --settle")
+            raise ContactFPGAError(f"--{name} needs a measurement; add --bounce or --settle")
     return _show(args)
 
 

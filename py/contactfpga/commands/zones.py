@@ -28,7 +28,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     units = "Show the force at each zone too, from the board's pressure units in this TOML file (docs/haptics.md)."
     parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
     parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
     record = "Write every byte received to this file; replay://FILE plays it back."
     parser.add_argument("--record", metavar="FILE", help=record)
@@ -37,7 +37,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction is of forces; add --units")
+        raise ContactFPGAError("--friction needs --units: it is used for forces only")
     if args.json:
         return _json(args)
     from contactfpga.console import live, views  # rich, which scripts do without

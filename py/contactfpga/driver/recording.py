@@ -120,7 +120,7 @@ def open_recorded(name: str) -> Recorded:
     if asked.start_s or asked.link is not None:
         file.close()
         raise PortNotFound(
-            f"{name}: this file holds bytes alone; start and link are of what `contactfpga record` makes"
+            f"{name}: this file holds bytes alone; only files of `contactfpga record` take start and link"
         )
     return file
 

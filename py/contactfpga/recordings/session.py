@@ -38,7 +38,7 @@ class Session:
     """Records boards into ``path``: :meth:`add` each of them, then :meth:`start`; a context manager that ends it.
 
     ``split``: when a new file begins; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only``
-    leaves messages out: a quarter of the size, and nothing is lost, as they can be made of the bytes. The file must
+    leaves messages out: about a fifth of the size, and nothing is lost, as they can be made of the bytes. The file must
     not be there yet. ``about``: texts that are kept in it by name, beside those of each link.
     Raises :class:`ContactFPGAError`.
     """

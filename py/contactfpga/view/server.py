@@ -38,7 +38,8 @@ def serve(host: str = LOCAL, port: int | None = None, guard: Guard | None = None
         server = viser.ViserServer(host=host, port=port, label="contactfpga", verbose=False)
     if not is_guarded():
         server.stop()
-        raise ContactFPGAError(f"viser {viser.__version__} lets no guard in; install the version that [view] asks for")
+        right = "install the right version with pip install '.[view]'"
+        raise ContactFPGAError(f"viser {viser.__version__} lets no guard in; {right}")
     _forget_tunnel(server)
     return server, guard
 

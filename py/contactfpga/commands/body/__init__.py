@@ -6,7 +6,7 @@ import argparse
 
 from contactfpga.commands.body import learn, register, show
 
-HELP = "Show contacts of all links of a robot in one frame."
+HELP = "Show the contacts on all links of a robot in one coordinate frame."
 EXTRA = None
 
 TOPICS = {"show": show, "register": register, "learn": learn}

@@ -36,7 +36,7 @@ def angle(text: str) -> tuple[str, float]:
     except ValueError:
         found = math.nan
     if not name or not math.isfinite(found):
-        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} is no joint's name, = and a finite number")
+        raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} must be NAME=RAD, with a finite number")
     return name, found
 
 

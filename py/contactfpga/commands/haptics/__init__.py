@@ -9,7 +9,7 @@ from contactfpga.console import interrupt
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.inputs import files
 
-HELP = "Compute forces at contacts from pressure units."
+HELP = "Compute forces at contacts from pressure units; set their zeros and thresholds."
 EXTRA = "haptics"
 
 BAD_INPUT = 2
