@@ -5,7 +5,6 @@ python -m contactfpga_sim.pages.body_page docs/body.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 import sys
@@ -21,7 +20,7 @@ from contactfpga.body import Body, LinkState
 from contactfpga.body.contact import on_link, placed
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga.driver import sim_address
 from contactfpga_sim.pages import writer
 from contactfpga_sim.scenes.scene import scene
@@ -125,15 +124,10 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
 
 def main() -> int:
     """Write the tables into the page named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on bodies.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    page = writer.page(args.page)
-    outputs.folder(args.folder, "folder")
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on bodies.")
     writer.write(page, TABLES)
     print(f"wrote {page}")
-    print(f"drew {draw(args.folder)}")
+    print(f"drew {draw(folder)}")
     return 0
 
 
