@@ -6,21 +6,23 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.body import Body
+from contactfpga.body import Body, BodyError
+from contactfpga.body import urdf as urdf_file
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
-from contactfpga.body.urdf import located
+from contactfpga.inputs.values import shown
 from contactfpga.surfaces import Surface
 from contactfpga.view.picture import rgb
 from contactfpga.view.stage import AMBIENT, SIDE, Stage
 from contactfpga.view.tiles import MM, Tiles, quaternions
 
 if TYPE_CHECKING:
+    from xml.etree import ElementTree
+
     import viser
 
 ROOT = "/robot"
@@ -57,35 +59,38 @@ def surface_of(plan: Plan) -> Any:
 
 
 def visuals(urdf: Path) -> list[Visual]:
-    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out."""
-    found = []
-    for link in ElementTree.parse(urdf).getroot().findall("link"):
-        for visual in link.findall("visual"):
-            mesh = visual.find("geometry/mesh")
-            if mesh is None:
-                continue
-            name = mesh.get("filename", "")
-            path = located(name.removeprefix("file://"), urdf.parent) if name else None
-            if path is None or not path.is_file():
-                continue
-            origin = visual.find("origin")
-            shift, turn = (_numbers(origin, each, (0.0, 0.0, 0.0)) for each in ("xyz", "rpy"))
-            found.append(Visual(link.get("name", ""), Pose.of(shift, turn), path, _numbers(mesh, "scale", (1, 1, 1))))
-    return found
+    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
+    :class:`BodyError`, OSError."""
+    try:
+        links = urdf_file.tree(urdf).findall("link")
+        found = [_visual(visual, link.get("name", ""), urdf.parent) for link in links for visual in link.findall("visual")]
+    except BodyError as error:
+        raise BodyError(f"{urdf}: {error}") from None
+    return [visual for visual in found if visual is not None]
 
 
-def _numbers(element: Any, name: str, usual: tuple[float, float, float]) -> tuple[float, float, float]:
-    text = None if element is None else element.get(name)
-    if not text:
-        return usual
-    x, y, z = map(float, text.split())
-    return x, y, z
+def _visual(element: ElementTree.Element, link: str, folder: Path) -> Visual | None:
+    mesh = element.find("geometry/mesh")
+    path = None if mesh is None else _path(mesh.get("filename", ""), folder)
+    if path is None:
+        return None
+    where, origin = f"a mesh of link {shown(link)}", element.find("origin")
+    shift, turn = (urdf_file.vector(origin, key, where) for key in ("xyz", "rpy"))
+    return Visual(link, Pose.of(shift, turn), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
+
+
+def _path(name: str, folder: Path) -> Path | None:
+    try:
+        path = urdf_file.located(name.removeprefix("file://"), folder)
+    except BodyError:  # of a package that is not installed: the sheets can be shown all the same
+        return None
+    return path if path.is_file() else None
 
 
 class RobotStage:
     """Links as meshes where these can be read, else as lines between joints; and a stage for each sheet."""
 
-    def __init__(self, server: viser.ViserServer, body: Body, urdf: Path | None):
+    def __init__(self, server: viser.ViserServer, body: Body):
         self._server, self._body = server, body
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
@@ -100,7 +105,7 @@ class RobotStage:
             names = list(body.kinematics.robot.links)
         for name in dict.fromkeys(names):
             self._frames[name] = scene.add_frame(f"{ROOT}/{name}", show_axes=False)
-        for visual in visuals(urdf) if urdf is not None else ():
+        for visual in visuals(body.urdf) if body.urdf is not None else ():
             self._add_mesh(visual)
         self.stages = {name: self._add_sheet(plan) for name, plan in body.links.items()}
         self._bones: Any = None
