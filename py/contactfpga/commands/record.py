@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import signal
 import sys
 import threading
@@ -110,10 +109,8 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
         session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout, felt=felt)
         return
-    from contactfpga.body.contact import placed
-
     for plan in body.links.values():
-        mount = Mount(plan.frame, functools.partial(placed, plan))
+        mount = Mount(plan.frame, plan.place)
         session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount)
 
 

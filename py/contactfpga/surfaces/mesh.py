@@ -13,7 +13,7 @@ import numpy as np
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.surfaces.answer import SurfaceError, length
-from contactfpga.surfaces.shapes import Floats, Vector, is_one
+from contactfpga.surfaces.shapes import Floats, Vector, is_one, vector
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 4_000_000
@@ -105,8 +105,7 @@ class Mesh:
         normals = normals / np.linalg.norm(normals, axis=-1)[..., None]
         points[nowhere] = normals[nowhere] = math.nan
         if is_one(x_mm, y_mm):
-            (px, py, pz), (nx, ny, nz) = points.tolist(), normals.tolist()
-            return (px, py, pz), (nx, ny, nz)
+            return vector(points), vector(normals)
         return points, normals
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:

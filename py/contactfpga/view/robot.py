@@ -15,7 +15,6 @@ from contactfpga.body import urdf as urdf_file
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
 from contactfpga.inputs.values import shown
-from contactfpga.surfaces import Surface
 from contactfpga.view.picture import rgb
 from contactfpga.view.stage import AMBIENT, SIDE, Stage
 from contactfpga.view.tiles import MM, Tiles, quaternions
@@ -39,31 +38,13 @@ class Visual:
     scale: tuple[float, float, float]
 
 
-@dataclasses.dataclass(frozen=True)
-class Mirrored:
-    """A surface on which columns count from the other end."""
-
-    surface: Surface
-    width_mm: float
-    """From the first to the last column."""
-
-    def place(self, x_mm: Any, y_mm: Any) -> Any:
-        """As of the surface."""
-        return self.surface.place(self.width_mm - x_mm, y_mm)
-
-
-def surface_of(plan: Plan) -> Any:
-    """Where the cells of a link's sheet lie, in the sheet's own frame."""
-    width_mm = (plan.skin.columns - 1) * plan.skin.pitch_x_mm
-    return Mirrored(plan.surface, width_mm) if plan.mirrored else plan.surface
-
-
 def visuals(urdf: Path) -> list[Visual]:
     """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
     :class:`BodyError`, OSError."""
+    found = []
     try:
-        links = urdf_file.tree(urdf).findall("link")
-        found = [_visual(visual, link.get("name", ""), urdf.parent) for link in links for visual in link.findall("visual")]
+        for link in urdf_file.tree(urdf).findall("link"):
+            found += [_visual(one, link.get("name", ""), urdf.parent) for one in link.findall("visual")]
     except BodyError as error:
         raise BodyError(f"{urdf}: {error}") from None
     return [visual for visual in found if visual is not None]
@@ -137,7 +118,7 @@ class RobotStage:
         node = f"{ROOT}/{plan.frame}/{plan.name}"
         wxyz = quaternions(plan.pose.rotation[None])[0]
         self._server.scene.add_frame(node, show_axes=False, wxyz=wxyz, position=plan.pose.point_m)
-        return Stage(self._server, Tiles(plan.skin.sheet, surface_of(plan)), node=node)
+        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node)
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Draw all links at these angles."""

@@ -17,7 +17,7 @@ import numpy as np
 from contactfpga import examples
 from contactfpga import picture_style as style
 from contactfpga.body import Body, LinkState
-from contactfpga.body.contact import on_link, placed
+from contactfpga.body.contact import on_link
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
 from contactfpga.console import interrupt
@@ -107,7 +107,7 @@ def draw(folder: Path) -> Path:
 def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
-    cells = np.array([pose.apply(np.array(placed(plan, *place)[0])) for place in zip(x.ravel(), y.ravel())])
+    cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])
     axes.plot(cells[:, across], cells[:, 2], ".", ms=1.2, color=style.SKY)
     axes.plot([], [], "s", ms=5, color=style.SKY, label="cells of the sheets")
     asked = sim_address.parse(plan.port or "sim://").scene
