@@ -38,10 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
     seconds = "Begin a new file after so many seconds."
     parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
-    units = "Add forces, from the board's pressure units in this TOML file (docs/haptics.md)."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
-    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+    flags.forces(parser, "Add forces")
     bare = "Leave out the messages for other programs: a file of a quarter of the size, from which all can be made."
     parser.add_argument("--bytes-only", action="store_true", help=bare)
 
@@ -51,8 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.recordings.recorder import Split
     from contactfpga.recordings.session import Session
 
-    if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction is of forces; add --units")
+    flags.check_forces(args)
     body = _body(args)
     split = None
     if args.split_mb is not None or args.split_s is not None:
