@@ -23,7 +23,6 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
 
-STATUSES = ("ok", "late", "silent", "lost", "mismatch")
 BASE, LINK = "base", "link"
 LINK_PX = 200
 

@@ -13,7 +13,7 @@ import numpy as np
 from contactfpga.body.answer import BodyError
 from contactfpga.body.pose import Pose
 from contactfpga.inputs.files import open_regular
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.values import number_in, shown
 from contactfpga.surfaces.shapes import Floats, Vector
 
 MAX_BYTES = 20_000_000
@@ -165,10 +165,7 @@ def vector(element: ElementTree.Element | None, key: str, where: str, usual: str
 
 
 def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not math.isfinite(value):
         raise BodyError(f"{where} says {shown(text)} where a finite number is due")
     return value

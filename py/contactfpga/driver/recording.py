@@ -13,6 +13,7 @@ from urllib.parse import unquote
 from contactfpga.driver.mcap_bytes import MAGIC, McapStream
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.values import number_in
 
 SCHEME = "replay://"
 _OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
@@ -94,10 +95,7 @@ def parse(name: str) -> ReplayAddress:
 def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
     if text is None:
         return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not 0 <= value < math.inf:
         raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
     return value
