@@ -12,7 +12,7 @@ import numpy as np
 
 from contactfpga.body.answer import BodyError
 from contactfpga.body.pose import Pose
-from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import number_in, shown
 from contactfpga.surfaces.shapes import Floats, Vector
 
@@ -68,24 +68,22 @@ def located(urdf: str, folder: Path) -> Path:
 
 def load(path: Path) -> Robot:
     """Read a URDF file. Raises :class:`BodyError`, OSError."""
+    root = tree(path)
     try:
-        return _robot(tree(path))
+        return _robot(root)
     except BodyError as error:
         raise BodyError(f"{path}: {error}") from None
 
 
 def tree(path: Path) -> ElementTree.Element:
-    """The outermost element of a URDF file. Raises :class:`BodyError`, without the path; OSError."""
-    with open_regular(path) as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise BodyError(f"longer than {MAX_BYTES:,} bytes; is it a URDF file?")
+    """The outermost element of a URDF file. Raises :class:`BodyError`, OSError."""
+    data = read_small(path, MAX_BYTES, "a URDF file", BodyError)
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities of entities would fill the memory
-        raise BodyError("it declares a document type, which no URDF needs; remove it")
+        raise BodyError(f"{path}: it declares a document type, which no URDF needs; remove it")
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise BodyError(f"not a URDF file: {error}") from None
+        raise BodyError(f"{path}: not a URDF file: {error}") from None
 
 
 def _robot(root: ElementTree.Element) -> Robot:
