@@ -19,8 +19,8 @@ from contactfpga.errors import ContactFPGAError
 
 if TYPE_CHECKING:
     from contactfpga.body import Body
-    from contactfpga.recordings.link_messages import Felt
     from contactfpga.recordings.session import Session
+    from contactfpga.ros.feed import Felt
 
 HELP = "Record a board, or all of a robot (ROBOT.toml in place of PORT), into an MCAP file."
 EXTRA = "record"

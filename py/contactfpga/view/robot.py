@@ -16,7 +16,7 @@ from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
 from contactfpga.inputs.values import shown
 from contactfpga.view.picture import rgb
-from contactfpga.view.stage import AMBIENT, SIDE, Stage
+from contactfpga.view.stage import Stage, light
 from contactfpga.view.tiles import MM, Tiles, quaternions
 
 if TYPE_CHECKING:
@@ -42,8 +42,9 @@ def visuals(urdf: Path) -> list[Visual]:
     """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
     :class:`BodyError`, OSError."""
     found = []
+    links = urdf_file.tree(urdf).findall("link")
     try:
-        for link in urdf_file.tree(urdf).findall("link"):
+        for link in links:
             found += [_visual(one, link.get("name", ""), urdf.parent) for one in link.findall("visual")]
     except BodyError as error:
         raise BodyError(f"{urdf}: {error}") from None
@@ -77,10 +78,7 @@ class RobotStage:
         self.unread: set[str] = set()
         """Kinds of mesh files that could not be read."""
         scene = server.scene
-        scene.configure_default_lights(enabled=False, cast_shadow=False)
-        scene.configure_environment_map(None)
-        scene.add_light_ambient("/light/all", intensity=AMBIENT)
-        scene.add_light_directional("/light/side", intensity=SIDE, position=(1.0, -0.5, 1.0))
+        light(server, (1.0, -0.5, 1.0))
         names = [plan.frame for plan in body.links.values()]
         if body.kinematics is not None:
             names = list(body.kinematics.robot.links)
