@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 TURN_S = 0.04
 TOLD_S = 0.25
-FINGER = 0.9
 TURN_RAD = 3.15
 
 
@@ -98,8 +97,7 @@ class BodyView:
         for name, state in states.items():
             stage, virtual = self.stage.stages[name], source.virtual.get(name)
             if virtual is not None and name not in self.hands:
-                sheet = source.body.links[name].skin
-                self.hands[name] = Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+                self.hands[name] = Hand.on(virtual, source.body.links[name].skin.sheet)
                 stage.press_with(self.hands[name])
             if state.zones is not None:
                 truth = None if virtual is None else virtual.pressed
