@@ -2,6 +2,7 @@
 
 import errno
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,7 @@ from wire import Wire
 
 import contactfpga
 from contactfpga import cli
+from contactfpga.driver.recording import FileTap
 from contactfpga.driver.transport import RecordingTransport
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
@@ -108,3 +110,15 @@ def test_a_port_is_given_back_though_its_recording_cannot_be_closed():
     with pytest.raises(OSError, match="No space"):
         RecordingTransport(port, Full()).close()
     assert closed
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_named():
+    says = r"^/dev/full cannot be written: No space left on device; make room, then record again$"
+    with pytest.raises(contactfpga.ContactFPGAError, match=says):
+        FileTap("/dev/full", "a").take(bytes(1 << 20), 0.0)
+    tap = FileTap("/dev/full", "a")
+    tap.take(b"what waits", 0.0)
+    with pytest.raises(contactfpga.ContactFPGAError, match=says):
+        tap.close()
+    tap.close()

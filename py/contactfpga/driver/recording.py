@@ -44,15 +44,26 @@ class FileTap:
     """Writes the bytes to a file."""
 
     def __init__(self, path: str | Path, port: str):
+        self._path = path
         self._file = create(path, port)
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Append them."""
-        self._file.write(data)
+        """Append them. Raises :class:`ContactFPGAError`."""
+        try:
+            self._file.write(data)
+        except OSError as error:
+            raise self._failed(error) from None
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file. Raises :class:`ContactFPGAError`."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _failed(self, error: OSError) -> ContactFPGAError:
+        reason = error.strerror or told(error)
+        return ContactFPGAError(f"{self._path} cannot be written: {reason}; make room, then record again")
 
 
 @dataclasses.dataclass(frozen=True)
