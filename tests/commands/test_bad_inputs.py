@@ -243,7 +243,7 @@ def test_millimeters_in_files_are_told_from_meters(tmp_path, run, name, old, new
 
 
 def options():
-    """(words of the command, option) of every option that takes a number."""
+    """(words of the command, option, how many) of every option that takes numbers."""
     found = []
 
     def walk(parser, words):
@@ -253,7 +253,8 @@ def options():
                     walk(below, [*words, name])
             elif action.type is not None and not action.choices:
                 assert action.type not in (int, float), f"{words} {action.option_strings}: say a range"
-                found.append((words, action.option_strings[0]))
+                if action.dest != "joint":  # a name and a number, which has tests of its own
+                    found.append((words, action.option_strings[0], action.nargs or 1))
 
     walk(cli._parser(), [])
     return found
@@ -264,20 +265,24 @@ NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
 
 
 def test_every_numeric_option_is_found():
-    assert {" ".join(words) for words, _ in OPTIONS} == {
+    assert {" ".join(words) for words, *_ in OPTIONS} == {
         *("zones", "wire", "doctor", "build", "replay", "cover impact", "cover sense", "chart", "fit", "arm", "settle"),
-        *("latency", "flips", "haptics place"),
+        *("latency", "flips", "haptics place", "haptics zero", "haptics threshold", "surface", "body show"),
+        *("body register", "body learn", "view", "publish", "record", "ros"),
     }
-    assert len(OPTIONS) > 45
+    assert len(OPTIONS) > 100
 
 
 @pytest.mark.parametrize(
-    ("words", "option"), OPTIONS, ids=lambda value: value if isinstance(value, str) else " ".join(value)
+    ("words", "option", "count"), OPTIONS, ids=lambda value: " ".join(value) if isinstance(value, list) else str(value)
 )
 @pytest.mark.parametrize("text", NUMBERS, ids=lambda text: text[:8] or "empty")
-def test_no_numeric_option_takes_what_is_no_number_in_its_range(words, option, text, run):
-    status, errors = run(*words, f"{option}={text}")
+def test_no_numeric_option_takes_what_is_no_number_in_its_range(words, option, count, text, run):
+    status, errors = run(*words, *([f"{option}={text}"] if count == 1 else [option, "0", *[text] * (count - 1)]))
     assert status == 2
+    if count > 1 and text == "-inf":  # which argparse takes for an option
+        assert f"argument {option}: expected {count} arguments" in refused(status, errors)
+        return
     assert f"argument {option}: '{text[:40]}" in refused(status, errors)
     assert " is not a " in errors
 
@@ -314,11 +319,11 @@ texts = st.text(max_size=12).filter(lambda text: not {"\0"} & set(text))
     bad=st.one_of(texts, st.floats().map(str), st.integers().map(str)),
     more=st.lists(texts, max_size=3),
 )
-@example(which=(["zones"], "--baud"), bad="0", more=[])
-@example(which=(["doctor"], "--seconds"), bad="-1", more=[])
+@example(which=(["zones"], "--baud", 1), bad="0", more=[])
+@example(which=(["doctor"], "--seconds", 1), bad="-1", more=[])
 def test_random_words_never_end_in_a_traceback(which, bad, more, run):
-    words, option = which
-    if words[0] in ("zones", "wire", "doctor"):
+    words, option, _ = which
+    if words[0] not in NEEDED and words[0] not in ("cover", "settle", "chart"):
         more = ["NONE"]  # and no port of this machine
     run(*words, *NEEDED.get(words[0], []), f"{option}={bad}", *more)
 

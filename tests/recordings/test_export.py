@@ -3,6 +3,7 @@
 import csv
 import json
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from recorded_stream import StreamPort, recorded
 import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.recordings import Recording, table
+from contactfpga.wire.protocol import Frame, no_records
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +109,14 @@ def test_without_pyarrow_the_extra_is_named(file, tmp_path, monkeypatch, capsys)
     assert cli.main(["export", str(file), str(tmp_path / "x.parquet")]) == 1
     assert "pip install '.[analysis]'" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_ring_is_named_and_has_no_x():
+    skin = Skin(rows=4, columns=8, surface="cylinder", radius_mm=20.0, closed=True, report="cells")
+    cells = np.zeros((4, 8), bool)
+    cells[1] = True
+    zones = contactfpga.Zones(Frame(0, 0, frozenset(), 0, 0, 0, 8, no_records(skin.sheet), cells), skin.sheet, 0)
+    (piece,) = table.pieces(SimpleNamespace(frames=lambda: [(0.0, "arm", zones)]))
+    assert piece["winding"].tolist() == ["ring"]
+    assert np.isnan(piece["x_mm"]).all()
+    assert piece["y_mm"].tolist() == [skin.pitch_y_mm]

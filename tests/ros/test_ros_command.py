@@ -26,8 +26,6 @@ def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
     [
         (["--namespace", "a b"], "namespace is 'a b'; it has letters, digits and _, and / between parts"),
         (["--frame", "a b"], "frame is 'a b'; a frame's name has letters, digits"),
-        (["--place", "0", "0", "nan"], "place_m is [0.0, 0.0, nan]; it must be three finite numbers"),
-        (["--zones-hz", "0"], "zones_hz is 0.0; it must be above 0 and at most 100000"),
         (["--friction", "0.5"], "--friction is of forces; add --units"),
         (["--seconds", "1", "nowhere"], "nowhere cannot be opened"),
     ],
@@ -37,6 +35,20 @@ def test_what_cannot_be_is_refused_in_a_line(capsys, arguments, said):
     status, text = refused(capsys, "--domain", "88", *arguments)
     assert status == 1
     assert said in " ".join(text.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--place", "0", "0", "nan"], "argument --place: 'nan' is not a number from -100 to 100 m"),
+        (["--zones-hz", "0"], "argument --zones-hz: '0' is not a number above 0 and at most 100000 Hz"),
+    ],
+)
+def test_numbers_out_of_range_are_refused_as_they_are_read(capsys, arguments, said):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["ros", *arguments])
+    assert ended.value.code == 2
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_units_of_a_board_that_has_none_are_refused(board, capsys, tmp_path):

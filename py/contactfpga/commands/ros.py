@@ -22,11 +22,22 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parent = "Publish where the link's frame lies in this one, on /tf_static."
     parser.add_argument("--parent", metavar="NAME", default="", help=parent)
     place = "Where it lies, in m (default: 0 0 0)."
-    parser.add_argument("--place", nargs=3, type=float, metavar=("X", "Y", "Z"), default=(0.0, 0.0, 0.0), help=place)
+    parser.add_argument(
+        "--place",
+        nargs=3,
+        type=numbers.number(-100, 100, "m"),
+        metavar=("X", "Y", "Z"),
+        default=(0.0, 0.0, 0.0),
+        help=place,
+    )
     turn = "How it is turned, in rad, about the fixed x, y and z axes in turn (default: 0 0 0)."
-    parser.add_argument("--turn", nargs=3, type=float, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn)
+    parser.add_argument(
+        "--turn", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
+    )
     rate = "Publish zones, tracks and contacts at most as often (default: 1000)."
-    parser.add_argument("--zones-hz", type=float, metavar="HZ", default=1000.0, help=rate)
+    parser.add_argument(
+        "--zones-hz", type=numbers.number(0, 1e5, "Hz", above=True), metavar="HZ", default=1000.0, help=rate
+    )
     flags.forces(parser, "Publish forces too")
     domain = "ROS_DOMAIN_ID (default: 0)."
     parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)

@@ -14,7 +14,7 @@ from contactfpga.surfaces.laying import Laid, Triangles
 HELP = "Lay a sheet on a mesh: a table of point and normal per cell."
 EXTRA = "surface"
 
-_LENGTH, _ANGLE = numbers.number(-1e5, 1e5, "mm"), numbers.number(-7, 7, "rad")
+_LENGTH = numbers.number(-1e5, 1e5, "mm")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
     parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
     rpy = "Its roll, pitch and yaw in rad (default: 0 0 0)."
-    parser.add_argument("--rpy", nargs=3, type=_ANGLE, default=(0, 0, 0), metavar=("R", "P", "Y"), help=rpy)
+    parser.add_argument("--rpy", nargs=3, type=numbers.TURN, default=(0, 0, 0), metavar=("R", "P", "Y"), help=rpy)
     scale = "Millimeters per unit of the mesh (default: 1; 1000 for a mesh in meters)."
     parser.add_argument("--scale", type=numbers.number(1e-6, 1e6, "mm"), default=1.0, metavar="MM", help=scale)
 

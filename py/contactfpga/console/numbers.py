@@ -75,5 +75,6 @@ CELL = number(-1e300, 1e300)
 """A value that cells are compared with."""
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
+TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")
 DOMAIN = whole(0, 232)
 """The domains of DDS: beyond, its port numbers end."""

@@ -25,6 +25,7 @@ COLUMNS = {
     "y_mm": (np.float64, "barycenter along the rows in mm"),
     "area_cells": (np.int32, "pressed cells of the zone"),
     "ghost": (np.bool_, "other pressed switches may have made it"),
+    "winding": (np.str_, "ring or wound: it leads around a sheet whose ends meet, and has no x; else empty"),
     "flags": (np.uint8, "of the frame: the bits of contactfpga_msgs/Zones"),
 }
 """Type and meaning of each column."""
@@ -32,7 +33,7 @@ COLUMNS = {
 ROWS = 1 << 16
 """Of a piece."""
 
-_NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False)
+_NOTHING = (-1, -1, np.nan, np.nan, np.nan, 0, False, "")
 Piece = dict[str, np.ndarray]
 
 
@@ -64,6 +65,7 @@ def _zones(zones: Zones, tracker: Tracker) -> list[tuple[object, ...]]:
             np.nan if zone.y_mm is None else zone.y_mm,
             zone.area_cells,
             zone.ghost,
+            zone.winding,
         )
         for number, zone in enumerate(zones)
     ] or [_NOTHING]

@@ -207,11 +207,12 @@ KINDS = ("point", f"finger of {2 * FINGER_MM:g} mm")
 
 
 def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) -> Forces:
-    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, each of which alone closes a
-    switch, and their pushes as found."""
+    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found. Points
+    lie where each alone closes a switch; fingers lie anywhere, since they are wider than the pitch."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
-    places = _pair(setting, apart_mm, push_n, np.random.default_rng([seed, 9]))
+    near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == KINDS[0] else math.inf
+    places = _pair(setting, apart_mm, near_mm, np.random.default_rng([seed, 9]))
     fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
     units = Felt(Scene(fingers), cells, skin, seed)
     if kind == KINDS[0]:
@@ -231,13 +232,13 @@ def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) 
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
 
 
-def _pair(setting: Setting, apart_mm: float, push_n: float, rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Places in mm."""
-    pitch, reach_mm = setting.pitch_mm, 1e3 * reach_of(POINT).reach_m(push_n)
+def _pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Places in mm, each nearer than ``near_mm`` to a switch."""
+    pitch = setting.pitch_mm
     while True:
         turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2
         x, y = (MIDDLE + rng.random(2)) * pitch
         places = [(x + side * half * math.cos(turn), y + side * half * math.sin(turn)) for side in (-1, 1)]
         off = [math.hypot(x - pitch * round(x / pitch), y - pitch * round(y / pitch)) for x, y in places]
-        if max(off) < reach_mm:
+        if max(off) < near_mm:
             return places
