@@ -197,6 +197,21 @@ def test_angles_are_those_of_the_frames_time(robot):
         snapshot.contacts()
 
 
+def test_joints_that_fail_say_so_where_angles_are_needed(patient):
+    def joints(_):
+        raise KeyError("elbow")
+
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), joints, opened=plugged.opened) as body, body.subscribe() as queue:
+        first = queue.next(10.0)
+        assert queue.next(10.0).host_time_s > first.host_time_s  # its threads go on
+        snapshot = body.read(10.0)
+        assert set(snapshot.answering) == {"arm", "chest"}
+        with pytest.raises(NoJoints, match=r"^link 'arm': the joints given to the body failed: KeyError\('elbow'\)"):
+            snapshot.contacts()
+        assert snapshot.contacts("link") is not None
+
+
 def test_base_frame_needs_angles_and_a_urdf(robot):
     states = {"arm": state_of(ROUND, 0, 0, 10.0), "chest": state_of(FLAT, 0, 0, 10.0)}
     with pytest.raises(NoJoints, match=r"give them to Body.open\(joints\)"):

@@ -1,6 +1,9 @@
 """What `record=` writes, `replay://` reads."""
 
+import errno
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from model_board import SCAN_US, ModelBoard
@@ -8,6 +11,8 @@ from wire import Wire
 
 import contactfpga
 from contactfpga import cli
+from contactfpga.driver.recording import FileTap
+from contactfpga.driver.transport import RecordingTransport
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
@@ -90,3 +95,32 @@ def test_doctor_of_a_recording_says_where_it_ends(tmp_path, capsys):
     file.write_bytes(model.hello())
     assert cli.main(["doctor", f"replay://{file}"]) == 1
     assert "holds no frame" in capsys.readouterr().out
+
+
+def test_a_port_is_given_back_though_its_recording_cannot_be_closed():
+    class Full:
+        def take(self, data, clock_s):
+            pass
+
+        def close(self):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    closed = []
+    port = SimpleNamespace(name="a", live=True, threaded=True, write=None, clock=None, close=lambda: closed.append(1))
+    with pytest.raises(OSError, match="No space"):
+        RecordingTransport(port, Full()).close()
+    assert closed
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_named():
+    says = r"^/dev/full cannot be written: No space left on device; make room, then record again$"
+    tap = FileTap("/dev/full", "a")
+    with pytest.raises(contactfpga.ContactFPGAError, match=says):
+        tap.take(bytes(1 << 20), 0.0)
+    tap.close()
+    tap = FileTap("/dev/full", "a")
+    tap.take(b"what waits", 0.0)
+    with pytest.raises(contactfpga.ContactFPGAError, match=says):
+        tap.close()
+    tap.close()

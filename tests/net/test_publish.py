@@ -221,6 +221,13 @@ CERTIFICATE = (
 
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="no openssl")
+@pytest.mark.parametrize("opened", [session.listening, session.connected])
+def test_an_endpoint_that_zenoh_cannot_read_is_one_line(opened):
+    says = r"^endpoint 'nowhere': Endpoints must be of the form [^{}]*; for instance tcp/127\.0\.0\.1:7447$"
+    with pytest.raises(contactfpga.ContactFPGAError, match=says):
+        opened("nowhere")
+
+
 def test_certificates_and_users_as_in_the_example(tmp_path):
     """The two files of examples/net, with certificates made as docs/net.md says."""
     for command in (AUTHORITY, CERTIFICATE):

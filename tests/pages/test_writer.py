@@ -42,6 +42,17 @@ def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
     assert writer.page(tmp_path / "page.md").read_text() == PAGE
 
 
+def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch):
+    page, folder = tmp_path / "page.md", tmp_path / "images"
+    page.write_text(PAGE)
+    monkeypatch.setattr(sys, "argv", ["page", str(page), str(folder)])
+    assert writer.page_and_folder("Write it.") == (page, folder)
+    assert folder.is_dir()
+    monkeypatch.setattr(sys, "argv", ["page", str(page), str(page)])
+    with pytest.raises(OutputError, match=r"^folder is '.*page.md'; that is no folder$"):
+        writer.page_and_folder("Write it.")
+
+
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
     [

@@ -10,7 +10,6 @@ from rosbags.highlevel import AnyReader
 import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.body import Body
-from contactfpga.body.contact import placed
 from contactfpga.recordings import Recording, Session
 from contactfpga.recordings.recorder import Split
 from contactfpga.wire.hellos import Cutter
@@ -146,7 +145,7 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
         (first, *_) = [message for topic, message in found if topic == f"/{plan.name}/zones"]
         assert first.header.frame_id == plan.frame
         zone = first.zones[0]
-        point, normal = placed(plan, 1000 * zone.x, 1000 * zone.y)
+        point, normal = plan.place(1000 * zone.x, 1000 * zone.y)
         np.testing.assert_allclose((zone.position.x, zone.position.y, zone.position.z), point)
         np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
 

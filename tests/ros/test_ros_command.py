@@ -40,11 +40,11 @@ def test_what_cannot_be_is_refused_in_a_line(capsys, arguments, said):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--place", "0", "0", "nan"], "--place: 'nan' is not a number from -100 to 100 m"),
-        (["--zones-hz", "0"], "--zones-hz: '0' is not a number above 0 and at most 100000 Hz"),
+        (["--place", "0", "0", "nan"], "argument --place: 'nan' is not a number from -100 to 100 m"),
+        (["--zones-hz", "0"], "argument --zones-hz: '0' is not a number above 0 and at most 100000 Hz"),
     ],
 )
-def test_numbers_out_of_range_are_refused(capsys, arguments, said):
+def test_numbers_out_of_range_are_refused_as_they_are_read(capsys, arguments, said):
     with pytest.raises(SystemExit) as ended:
         cli.main(["ros", *arguments])
     assert ended.value.code == 2

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin, surfaces
-from contactfpga.surfaces import Cone, Cylinder, Plane, SurfaceError
+from contactfpga.surfaces import Cone, Cylinder, Mirrored, Plane, SurfaceError
 
 ALL = [Plane(), Plane(12.5), Cylinder(38.0), Cone(40.0, 0.15), Cone(40.0, -0.15), Cone(5.0, 3.0)]
+MIRRORED = [Mirrored(Plane(), 35.0), Mirrored(Cone(40.0, 0.15), 35.0)]
 PLACES = [(0.0, 0.0), (10.0, 25.0), (-33.0, 7.0), (55.0, 90.0), (3.0, -2.0)]
 
 
@@ -32,7 +33,7 @@ def test_sheet_is_neither_stretched_nor_turned(surface, place):
     assert np.cross(along_x, along_y) == pytest.approx(np.array(surface.place(x, y)[1]), abs=1e-6)
 
 
-@pytest.mark.parametrize("surface", ALL, ids=str)
+@pytest.mark.parametrize("surface", ALL + MIRRORED, ids=str)
 @pytest.mark.parametrize("off_mm", [0.0, 2.0, -1.0])
 def test_flat_undoes_place_also_off_the_surface(surface, off_mm):
     for x, y in PLACES:
@@ -41,7 +42,7 @@ def test_flat_undoes_place_also_off_the_surface(surface, off_mm):
         assert surface.flat(near) == pytest.approx((x, y), abs=1e-9)
 
 
-@pytest.mark.parametrize("surface", ALL, ids=str)
+@pytest.mark.parametrize("surface", ALL + MIRRORED, ids=str)
 def test_arrays_say_the_same_as_single_places(surface):
     x, y = np.array([[1.0, -2.5, math.nan], [40.0, 7.0, 3.0]]), np.array([[3.0, 50.0, 1.0], [0.0, math.nan, 2.0]])
     points, normals = surface.place(x, y)
@@ -61,6 +62,10 @@ def test_cone_has_its_radius_and_slope():
     (x, y, z), (_, _, up) = Cone(40.0, 0.15).place(0.0, 100.0)
     assert (x - 40) / z == pytest.approx(0.15)
     assert (y, up < 0) == (pytest.approx(0), True)
+
+
+def test_mirrored_columns_count_from_the_other_end():
+    assert Mirrored(Cylinder(38.0), 35.0).place(10.0, 7.0) == Cylinder(38.0).place(25.0, 7.0)
 
 
 def test_surface_of_a_skin():

@@ -1,13 +1,19 @@
 """A robot in the view: links, sheets on them and the mouse's rays move with the joints."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 
 pytest.importorskip("viser")
 
-from contactfpga.body import Body
+from contactfpga.body import Body, BodyError
+from contactfpga.driver import driver
+from contactfpga.errors import PortNotFound
 from contactfpga.view import robot
 from contactfpga.view import server as serving
+from contactfpga.view.bodies import BodySource
 
 URDF = """<robot name="arm">
   <link name="base"/>
@@ -47,7 +53,7 @@ def stage(request, tmp_path):
     (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 4\n")
     (tmp_path / "robot.toml").write_text(TABLE.format(mirrored=str(request.param).lower()))
     server, _ = serving.serve(port=0)
-    yield robot.RobotStage(server, Body.load(tmp_path / "robot.toml"), tmp_path / "arm.urdf"), request.param
+    yield robot.RobotStage(server, Body.load(tmp_path / "robot.toml")), request.param
     serving.stop(server)
 
 
@@ -78,3 +84,45 @@ def test_a_mesh_that_cannot_be_read_is_said(tmp_path, stage):
     visual = robot.visuals(tmp_path / "arm.urdf")[0]
     stage[0]._add_mesh(robot.Visual("arm", visual.pose, path, (1.0, 1.0, 1.0)))
     assert stage[0].unread == {".dae"}
+
+
+def test_a_mesh_of_a_package_that_is_not_installed_is_left_out(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.replace("arm.stl", "package://nobodys_description/meshes/arm.stl"))
+    assert robot.visuals(path) == []
+
+
+@pytest.mark.parametrize(("old", "new"), [('xyz="0.1 0 0"', 'xyz="0.1 0"'), ('scale="2 1 1"', 'scale="big"')])
+def test_a_mesh_without_a_place_is_refused_in_one_line(tmp_path, old, new):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF.replace(old, new))
+    (tmp_path / "arm.stl").write_text(TETRAHEDRON)
+    name, _, value = new.partition("=")
+    with pytest.raises(
+        BodyError, match=rf"^{path}: {name} of a mesh of link 'arm' is {value[1:-1]!r}; it must be three"
+    ):
+        robot.visuals(path)
+
+
+def test_only_one_link_at_a_time_is_searched_for(tmp_path, monkeypatch):
+    """Two searches would each find the ports that the other one listens to taken."""
+    (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 4\n")
+    table = '[[links]]\nname = "{name}"\nskin = "skin.toml"\n'
+    (tmp_path / "robot.toml").write_text("".join(table.format(name=name) for name in "abc"))
+    lock, inside, most = threading.Lock(), [], []
+
+    def search(port, skin, timeout):
+        with lock:
+            inside.append(port)
+            most.append(len(inside))
+        time.sleep(0.05)
+        with lock:
+            inside.pop()
+        raise PortNotFound("no board answers")
+
+    monkeypatch.setattr(driver, "open", search)
+    source = BodySource(tmp_path / "robot.toml")
+    assert {state.status for state in source.states().values()} == {"lost"}
+    source.close()
+    assert len(most) >= 3
+    assert max(most) == 1

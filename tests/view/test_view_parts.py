@@ -1,6 +1,7 @@
 """The parts of the view that know no browser: places, fingers, pace, counters, what is drawn."""
 
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,10 +9,12 @@ import pytest
 from tracked import frame
 
 from contactfpga import Skin
+from contactfpga.driver import driver
 from contactfpga.driver.stats import Stats
+from contactfpga.errors import ContactFPGAError
 from contactfpga.surfaces import Cone
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.view import picture
+from contactfpga.view import opening, picture
 from contactfpga.view.fingers import Hand
 from contactfpga.view.meter import CHART_S, Meter
 from contactfpga.view.pace import MAX_LAG_S, MOMENT_S, Pace
@@ -263,3 +266,28 @@ def test_silence_is_said(board):
         assert "no data" not in dict(source.told())
         port._link.last_s -= 2.0
         assert dict(source.told())["no data"].startswith("for 2.")
+
+
+@pytest.mark.parametrize(
+    ("port", "given", "says"),
+    [
+        ("robot.toml", {"units": "units.toml"}, "--units is of a board; robot.toml says it of each link"),
+        ("robot.toml", {"baud": 9600}, "--baud is of a board; robot.toml says it of each link"),
+        ("replay://a.bin", {"skin": "skin.toml"}, "--skin is of a board; replay://a.bin is a recording"),
+        ("replay://a.bin", {"units": "units.toml"}, "--units is of a board; replay://a.bin is a recording"),
+        ("sim://", {"link": "arm"}, "--link is of a recording; sim:// is none"),
+        (None, {"link": "arm"}, "--link is of a recording; name one"),
+    ],
+)
+def test_what_would_be_left_out_is_refused(port, given, says):
+    with pytest.raises(ContactFPGAError, match=f"^{re.escape(says)}$"), opening.opened(opening.Named(port, **given)):
+        pass
+
+
+def test_no_board_is_opened_for_units_that_cannot_be_read(tmp_path, monkeypatch):
+    """Nobody would give its port back."""
+    opened = []
+    monkeypatch.setattr(driver, "open", lambda *named, **more: opened.append(named))
+    with pytest.raises(OSError, match=r"none\.toml"):
+        opening._source(opening.Named("/dev/ttyUSB0", units=tmp_path / "none.toml"))
+    assert not opened

@@ -5,6 +5,7 @@ import pytest
 import contactfpga
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.view import player as playing
+from contactfpga.view import replayed
 from contactfpga.view.player import Player
 from contactfpga.view.replayed import ByteRecording, Clock
 
@@ -107,3 +108,11 @@ def test_what_cannot_be_played_is_named(tmp_path):
     (tmp_path / "noise.bin").write_bytes(b"\x00\x01\x02" * 100)
     with pytest.raises(ContactFPGAError, match="holds no hello"):
         ByteRecording(f"replay://{tmp_path}/noise.bin")
+
+
+@pytest.mark.parametrize(("name", "link"), [("{}", "arm"), ("replay://{}?link=arm", None)])
+def test_a_link_of_bytes_alone_is_refused(tmp_path, name, link):
+    path = tmp_path / "touches.bin"
+    path.write_bytes(b"nothing")
+    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is of what `contactfpga record` makes$"):
+        replayed.load(name.format(path), link)

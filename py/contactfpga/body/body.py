@@ -6,7 +6,8 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga.body import plan, urdf
+from contactfpga.body import plan
+from contactfpga.body import urdf as urdf_file
 from contactfpga.body.answer import BodyError
 from contactfpga.body.joints import Joints
 from contactfpga.body.kinematics import Kinematics
@@ -27,6 +28,8 @@ class Body:
     links: dict[str, Plan]
     kinematics: Kinematics | None = None
     """None: no URDF is known, so there is no base frame."""
+    urdf: Path | None = None
+    """The file that says how they hang together."""
 
     @classmethod
     def load(cls, path: str | Path) -> Body:
@@ -40,10 +43,9 @@ class Body:
             tables = values.get("links")
             if not isinstance(tables, list) or not tables:
                 raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")
-            kinematics = None
-            if "urdf" in values:
-                kinematics = Kinematics(urdf.load(urdf.located(plan.text(values, "urdf"), path.parent)))
-            return cls(_by_name([plan.read(one, path.parent) for one in tables], kinematics), kinematics)
+            urdf = urdf_file.located(plan.text(values, "urdf"), path.parent) if "urdf" in values else None
+            kinematics = None if urdf is None else Kinematics(urdf_file.load(urdf))
+            return cls(_by_name([plan.read(one, path.parent) for one in tables], kinematics), kinematics, urdf)
         except BodyError as error:
             raise BodyError(f"{path}: {error}") from None
 

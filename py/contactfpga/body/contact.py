@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ import numpy as np
 from contactfpga import haptics
 from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
-from contactfpga.surfaces.shapes import Floats, Vector
+from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
@@ -57,10 +56,10 @@ class Contact:
         return dataclasses.replace(
             self,
             frame=frame,
-            point_m=None if self.point_m is None else _vector(pose.apply(np.array(self.point_m))),
-            normal=None if self.normal is None else _vector(pose.turn(np.array(self.normal))),
+            point_m=None if self.point_m is None else vector(pose.apply(np.array(self.point_m))),
+            normal=None if self.normal is None else vector(pose.turn(np.array(self.normal))),
             covariance_m2=None if self.covariance_m2 is None else pose.rotation @ self.covariance_m2 @ pose.rotation.T,
-            force_n=None if self.force_n is None else _vector(pose.turn(np.array(self.force_n))),
+            force_n=None if self.force_n is None else vector(pose.turn(np.array(self.force_n))),
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -71,26 +70,19 @@ class Contact:
         return values | {"zone": dataclasses.asdict(self.zone)}
 
 
-def placed(plan: Plan, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
-    """Point in m and outward normal, in the link's frame, of a place of its sheet."""
-    x_mm = (plan.skin.columns - 1) * plan.skin.pitch_x_mm - x_mm if plan.mirrored else x_mm
-    point_mm, normal = plan.surface.place(x_mm, y_mm)
-    return _vector(plan.pose.apply(1e-3 * np.array(point_mm))), _vector(plan.pose.turn(np.array(normal)))
-
-
 def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[Contact]:
     """The contacts in the link's frame, one per zone; with the joints' angles, they say how much of them is a fold."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
-    sigma_m = 1e-3 * math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
+    sigma_m = 1e-3 * plan.sigma_mm
     tracks = () if state.tracks is None else state.tracks.active
     ids = {id(track.zone): track.id for track in tracks if not track.held}
     found = []
     for zone in zones:
         point = normal = spread = None
         if zone.x_mm is not None and zone.y_mm is not None:
-            point, normal = placed(plan, zone.x_mm, zone.y_mm)
+            point, normal = plan.place(zone.x_mm, zone.y_mm)
             spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
         when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
         made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
@@ -117,8 +109,3 @@ def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | No
         return None
     cells = cells_of(zones, zone)
     return None if cells is None else plan.folds.share(angles[plan.folds.joint], cells)
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactfpga.body.answer import BodyError
-from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
@@ -67,10 +67,7 @@ class Folds:
     @classmethod
     def load(cls, path: str | Path) -> Folds:
         """Read what :meth:`save` wrote. Raises :class:`BodyError`, OSError."""
-        with open_regular(path) as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise BodyError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a file of `contactfpga body learn`?")
+        data = read_small(path, MAX_BYTES, "a file of `contactfpga body learn`", BodyError)
         try:
             return _read(json.loads(data))
         except (ValueError, RecursionError, KeyError, TypeError, IndexError) as error:

@@ -15,11 +15,21 @@ from contactfpga.body.plan import Plan
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
 from contactfpga.driver import driver, finding
+from contactfpga.driver.board import Board
 from contactfpga.driver.subscription import checked
 from contactfpga.errors import BoardClosed, ReadTimeout
 
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
+
+
+_SEARCHING = threading.Lock()  # two searches would hold each other's ports
+
+
+def open_board(plan: Plan, timeout: float = 1.0) -> Board:
+    """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
+    with _SEARCHING if finding.searched(plan.port) else contextlib.nullcontext():
+        return driver.open(plan.port, plan.skin, timeout=timeout)
 
 
 class OpenBody:
@@ -43,7 +53,6 @@ class OpenBody:
         self._timeout, self._period_s = checked(timeout), period_s
         self._changed = threading.Condition()
         self._changes = self._given = 0
-        self._searching = threading.Lock()
         self._closing = False
         self._queues: list[SnapshotQueue] = []
         self._readers = {
@@ -59,9 +68,7 @@ class OpenBody:
             self._changed.wait_for(lambda: all(reader.tried for reader in self._readers.values()))
 
     def _open_board(self, plan: Plan) -> OpenBoard:
-        searched = plan.port is None or finding.searched(plan.port)
-        with self._searching if searched else contextlib.nullcontext():  # two searches would hold each other's ports
-            return driver.open(plan.port, plan.skin, timeout=self._timeout)
+        return open_board(plan, self._timeout)
 
     @staticmethod
     def clock() -> float:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+
+import numpy as np
 
 from contactfpga import surfaces
 from contactfpga.body.answer import BodyError
@@ -17,7 +20,8 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics.units import LoadCells
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin import Skin
-from contactfpga.surfaces import Mesh, Surface
+from contactfpga.surfaces import Cone, Cylinder, Mesh, Mirrored, Plane, Surface
+from contactfpga.surfaces.shapes import Vector, vector
 
 KEYS = (
     "name", "frame", "skin", "port", "point_m", "rpy_rad", "mirrored", "surface", "units", "friction", "late_s",
@@ -42,7 +46,7 @@ class Plan:
     """Of the surface's frame in the link's."""
     mirrored: bool
     """Columns run the other way: x counts from the last one."""
-    surface: Surface
+    surface: Plane | Cylinder | Cone | Mesh
     units: LoadCells | None
     friction: float
     late_s: float
@@ -51,6 +55,22 @@ class Plan:
     """From which on the link is silent."""
     folds: Folds | None = None
     """What the folding cover presses."""
+
+    @property
+    def laid(self) -> Surface:
+        """The surface as the sheet lies on it: mirrored or not."""
+        width_mm = (self.skin.columns - 1) * self.skin.pitch_x_mm
+        return Mirrored(self.surface, width_mm) if self.mirrored else self.surface
+
+    def place(self, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
+        """Point in m and outward normal, in the link's frame, of a place of its sheet."""
+        point_mm, normal = self.laid.place(x_mm, y_mm)
+        return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
+
+    @property
+    def sigma_mm(self) -> float:
+        """Standard deviation of a place within a cell, along the surface."""
+        return math.hypot(self.skin.pitch_x_mm, self.skin.pitch_y_mm) / math.sqrt(24)
 
     def __post_init__(self) -> None:
         if not 0 < self.late_s <= self.silent_s:
@@ -115,7 +135,7 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     return port
 
 
-def _surface(values: Any, skin: Skin, folder: Path) -> Surface:
+def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone | Mesh:
     if values is None:
         return surfaces.of(skin.sheet)
     if isinstance(values, dict):

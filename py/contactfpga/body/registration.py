@@ -15,7 +15,8 @@ from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.surfaces.shapes import Floats
+from contactfpga.surfaces import Surface
+from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.zone import Zones
 
 KEYS = ("point_m", "normal", "pressed_mm")
@@ -79,7 +80,7 @@ def register(plan: Plan, presses: Sequence[Press]) -> Registration:
     mirrored = min(fits, key=lambda one: _rms(fits[one][1]))
     pose, residuals, levers = fits[mirrored]
     other = _rms(fits[not mirrored][1])
-    cell_mm = math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
+    cell_mm = plan.sigma_mm
     sigma_rad = cell_mm / max(1e-9, levers)
     if sigma_rad > LARGEST_RAD:
         raise BodyError(
@@ -100,7 +101,8 @@ def register(plan: Plan, presses: Sequence[Press]) -> Registration:
 
 def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Floats, float]:
     """Pose, residuals in mm with those of normals as lengths, and by which lever in mm the worst angle is known."""
-    places = [_placed(plan, press, mirrored) for press in presses]
+    surface = dataclasses.replace(plan, mirrored=mirrored).laid
+    places = [_placed(surface, press) for press in presses]
     ours = np.array([place[0] for place in places]) / 1000
     known = np.array([press.point_m for press in presses], float)
     middle, there = ours.mean(axis=0), known.mean(axis=0)
@@ -120,11 +122,9 @@ def _fit(plan: Plan, presses: Sequence[Press], mirrored: bool) -> tuple[Pose, Fl
     return pose, residuals, 1000 * math.sqrt(max(0.0, float(np.linalg.eigvalsh(inertia)[0])))
 
 
-def _placed(plan: Plan, press: Press, mirrored: bool) -> tuple[Any, Any]:
+def _placed(surface: Surface, press: Press) -> tuple[Vector, Vector]:
     assert press.pressed_mm is not None
-    x, y = press.pressed_mm
-    x = (plan.skin.columns - 1) * plan.skin.pitch_x_mm - x if mirrored else x
-    return plan.surface.place(x, y)
+    return surface.place(*press.pressed_mm)
 
 
 def _rms(residuals: Floats) -> float:

@@ -23,7 +23,6 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
 
-STATUSES = ("ok", "late", "silent", "lost", "mismatch")
 BASE, LINK = "base", "link"
 LINK_PX = 200
 
@@ -126,7 +125,7 @@ class Snapshot:
         if found is None:
             raise NoJoints(f"link {shown(name)}: no joint angles are known; give them to Body.open(joints)")
         if isinstance(found, ContactFPGAError):
-            raise NoJoints(f"link {shown(name)}: {found}")
+            raise NoJoints(f"link {shown(name)}: {found}") from found.__cause__
         return found
 
     def _repr_html_(self) -> str:
@@ -146,3 +145,7 @@ def _angles(joints: Joints, state: LinkState) -> Mapping[str, float] | ContactFP
         return joints(state.frame_s)
     except ContactFPGAError as error:  # said to whoever asks for what needs them
         return error
+    except Exception as error:  # of a program's own code: the threads that read the links go on
+        failed = NoJoints(f"the joints given to the body failed: {error!r}")
+        failed.__cause__ = error
+        return failed

@@ -12,8 +12,8 @@ import numpy as np
 
 from contactfpga.body.answer import BodyError
 from contactfpga.body.pose import Pose
-from contactfpga.inputs.files import open_regular
-from contactfpga.inputs.values import shown
+from contactfpga.inputs.files import read_small
+from contactfpga.inputs.values import number_in, shown
 from contactfpga.surfaces.shapes import Floats, Vector
 
 MAX_BYTES = 20_000_000
@@ -68,28 +68,30 @@ def located(urdf: str, folder: Path) -> Path:
 
 def load(path: Path) -> Robot:
     """Read a URDF file. Raises :class:`BodyError`, OSError."""
-    with open_regular(path) as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise BodyError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a URDF file?")
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities of entities would fill the memory
-        raise BodyError(f"{path}: it declares a document type, which no URDF needs; remove it")
+    root = tree(path)
     try:
-        tree = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        raise BodyError(f"{path}: not a URDF file: {error}") from None
-    try:
-        return _robot(tree)
+        return _robot(root)
     except BodyError as error:
         raise BodyError(f"{path}: {error}") from None
 
 
-def _robot(tree: ElementTree.Element) -> Robot:
-    if tree.tag != "robot":
-        raise BodyError(f"its outermost element is {shown(tree.tag)}; in a URDF it is 'robot'")
-    links = tuple(_text(link, "name", "a link") for link in tree.findall("link"))
+def tree(path: Path) -> ElementTree.Element:
+    """The outermost element of a URDF file. Raises :class:`BodyError`, OSError."""
+    data = read_small(path, MAX_BYTES, "a URDF file", BodyError)
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities of entities would fill the memory
+        raise BodyError(f"{path}: it declares a document type, which no URDF needs; remove it")
+    try:
+        return ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise BodyError(f"{path}: not a URDF file: {error}") from None
+
+
+def _robot(root: ElementTree.Element) -> Robot:
+    if root.tag != "robot":
+        raise BodyError(f"its outermost element is {shown(root.tag)}; in a URDF it is 'robot'")
+    links = tuple(_text(link, "name", "a link") for link in root.findall("link"))
     joints: dict[str, Joint] = {}
-    for element in tree.findall("joint"):
+    for element in root.findall("joint"):
         joint = _joint(element)
         if joint.name in joints:
             raise BodyError(f"two joints are named {shown(joint.name)}")
@@ -106,7 +108,7 @@ def _robot(tree: ElementTree.Element) -> Robot:
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
         raise BodyError(f"{len(roots)} links hang on no joint; a robot has one base")
-    return Robot(tree.get("name", ""), links, joints, roots[0])
+    return Robot(root.get("name", ""), links, joints, roots[0])
 
 
 def _joint(element: ElementTree.Element) -> Joint:
@@ -117,11 +119,11 @@ def _joint(element: ElementTree.Element) -> Joint:
         raise BodyError(f"{where} is of type {shown(kind)}; it must be one of {', '.join(MOVING)}, fixed")
     ends = [_text(_child(element, tag, where), "link", f"{tag} of {where}") for tag in ("parent", "child")]
     placed = element.find("origin")
-    point, rpy = (_vector(placed, key, where) for key in ("xyz", "rpy"))
+    point, rpy = (vector(placed, key, where) for key in ("xyz", "rpy"))
     axis = np.zeros(3)
     if kind in MOVING:
         told = element.find("axis")
-        axis = np.array((1.0, 0.0, 0.0) if told is None else _vector(told, "xyz", where))
+        axis = np.array((1.0, 0.0, 0.0) if told is None else vector(told, "xyz", where))
         length = float(np.linalg.norm(axis))
         if length < 1e-9:
             raise BodyError(f"the axis of {where} has no direction")
@@ -150,8 +152,9 @@ def _text(element: ElementTree.Element, key: str, where: str) -> str:
     return found
 
 
-def _vector(element: ElementTree.Element | None, key: str, where: str) -> Vector:
-    text = "0 0 0" if element is None else element.get(key, "0 0 0")
+def vector(element: ElementTree.Element | None, key: str, where: str, usual: str = "0 0 0") -> Vector:
+    """Three numbers, ``usual`` where they are not given; ``where``: whose they are. Raises :class:`BodyError`."""
+    text = usual if element is None else element.get(key, usual)
     parts = text.split()
     if len(parts) != 3:
         raise BodyError(f"{key} of {where} is {shown(text)}; it must be three numbers")
@@ -160,10 +163,7 @@ def _vector(element: ElementTree.Element | None, key: str, where: str) -> Vector
 
 
 def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not math.isfinite(value):
         raise BodyError(f"{where} says {shown(text)} where a finite number is due")
     return value

@@ -8,7 +8,7 @@ import threading
 
 from contactfpga.console import flags, numbers, terminal
 from contactfpga.driver import driver
-from contactfpga.driver.transport import Transport, connect
+from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.net import address
 from contactfpga.wire.hello import Hello
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     hello, device = _look(args)
     key = key or address.key_of(hello.name, hello.fingerprint)
     here = args.connect or args.listen or address.ENDPOINT
-    transport = _transport(args, device, hello)
+    transport = connect(device, args.baud or hello.baud)
     try:
         open_session = session.connected if args.connect else session.listening
         with open_session(args.connect or args.listen, args.config) as network:
@@ -67,10 +67,6 @@ def _look(args: argparse.Namespace) -> tuple[Hello, str]:
         raise ContactFPGAError(f"port is {args.port!r}; give a board, no recording and nothing that is published")
     with driver.open(args.port, args.skin, baud=args.baud, timeout=args.timeout) as board:
         return board.hello, board.port
-
-
-def _transport(args: argparse.Namespace, device: str, hello: Hello) -> Transport:
-    return connect(device, args.baud or hello.baud)
 
 
 def _warn(args: argparse.Namespace, here: str) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import signal
 import sys
 import threading
@@ -20,8 +19,8 @@ from contactfpga.errors import ContactFPGAError
 
 if TYPE_CHECKING:
     from contactfpga.body import Body
-    from contactfpga.recordings.link_messages import Felt
     from contactfpga.recordings.session import Session
+    from contactfpga.ros.feed import Felt
 
 HELP = "Record a board, or all boards of a robot (ROBOT.toml instead of PORT), into an MCAP file."
 EXTRA = "record"
@@ -39,10 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
     seconds = "The same, with so many seconds each."
     parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
-    units = "Add forces, from the board's pressure units in this TOML file (docs/haptics.md)."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
-    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+    flags.forces(parser, "Add forces")
     bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."
     parser.add_argument("--bytes-only", action="store_true", help=bare)
 
@@ -52,8 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.recordings.recorder import Split
     from contactfpga.recordings.session import Session
 
-    if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction needs --units: it is used for forces only")
+    flags.check_forces(args)
     body = _body(args)
     split = None
     if args.split_mb is not None or args.split_s is not None:
@@ -110,10 +105,8 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
         session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout, felt=felt)
         return
-    from contactfpga.body.contact import placed
-
     for plan in body.links.values():
-        mount = Mount(plan.frame, functools.partial(placed, plan))
+        mount = Mount(plan.frame, plan.place)
         session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount)
 
 

@@ -6,7 +6,6 @@ import argparse
 
 from contactfpga.console import flags, numbers, terminal
 from contactfpga.console.forces import Forces
-from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics import WithReadings
 
 HELP = "Publish the skin as ROS 2 topics, with no ROS installed."
@@ -39,10 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--zones-hz", type=numbers.number(0, 1e5, "Hz", above=True), metavar="HZ", default=1000.0, help=rate
     )
-    units = "Publish forces too, from the board's pressure units in this TOML file (docs/haptics.md)."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
-    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+    flags.forces(parser, "Publish forces too")
     domain = "ROS_DOMAIN_ID (default: 0)."
     parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
     network = "Reach nodes on other computers too; without it only those on this one."
@@ -57,8 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.ros.feed import Feed
     from contactfpga.ros.settings import Settings
 
-    if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction needs --units: it is used for forces only")
+    flags.check_forces(args)
     settings = Settings(
         frame=args.frame, parent=args.parent, place_m=args.place, turn_rad=args.turn, zones_hz=args.zones_hz
     )

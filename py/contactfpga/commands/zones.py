@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 
-from contactfpga.console import flags, numbers
+from contactfpga.console import flags
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
-from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics import WithReadings
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
@@ -26,18 +25,14 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
     )
-    units = "Show the force at each zone too, from the board's pressure units in this TOML file (docs/haptics.md)."
-    parser.add_argument("--units", metavar="FILE", help=units)
-    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
-    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+    flags.forces(parser, "Show the force at each zone too")
     record = "Write every byte received to this file; replay://FILE plays it back."
     parser.add_argument("--record", metavar="FILE", help=record)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    if args.friction is not None and args.units is None:
-        raise ContactFPGAError("--friction needs --units: it is used for forces only")
+    flags.check_forces(args)
     if args.json:
         return _json(args)
     from contactfpga.console import live, views  # rich, which scripts do without

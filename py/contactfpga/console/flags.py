@@ -7,6 +7,7 @@ import argparse
 from contactfpga.console import numbers
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
+from contactfpga.errors import ContactFPGAError
 
 PORT = (
     "Device path, name:NAME or usb:SERIAL of a board, sim:// or replay://FILE (default: the one supported board that "
@@ -22,6 +23,20 @@ def connection(parser: argparse.ArgumentParser, port: str = PORT) -> None:
     parser.add_argument("--baud", type=numbers.BAUD, help="Bits per second (default: the Skin's, or 3000000).")
     wait = "Seconds to wait for the board (default: 1)."
     parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
+
+
+def forces(parser: argparse.ArgumentParser, what: str) -> None:
+    """Forces from pressure units; ``what`` the command does with them."""
+    units = f"{what}, from the board's pressure units in this TOML file (docs/haptics.md)."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    friction = "Friction coefficient of what touches (default: 0.5); needs --units."
+    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
+
+
+def check_forces(args: argparse.Namespace) -> None:
+    """Before a board is opened: raises :class:`ContactFPGAError` for friction where no forces are asked for."""
+    if args.friction is not None and args.units is None:
+        raise ContactFPGAError("--friction needs --units: it is used for forces only")
 
 
 def once(parser: argparse.ArgumentParser) -> None:

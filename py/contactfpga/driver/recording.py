@@ -13,6 +13,7 @@ from urllib.parse import unquote
 from contactfpga.driver.mcap_bytes import MAGIC, McapStream
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.values import number_in
 
 SCHEME = "replay://"
 _OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
@@ -43,15 +44,26 @@ class FileTap:
     """Writes the bytes to a file."""
 
     def __init__(self, path: str | Path, port: str):
+        self._path = path
         self._file = create(path, port)
 
     def take(self, data: bytes, clock_s: float) -> None:
-        """Append them."""
-        self._file.write(data)
+        """Append them. Raises :class:`ContactFPGAError`."""
+        try:
+            self._file.write(data)
+        except OSError as error:
+            raise self._failed(error) from None
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file. Raises :class:`ContactFPGAError`."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._failed(error) from None
+
+    def _failed(self, error: OSError) -> ContactFPGAError:
+        reason = error.strerror or told(error)
+        return ContactFPGAError(f"{self._path} cannot be written: {reason}; make room, then record again")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,10 +106,7 @@ def parse(name: str) -> ReplayAddress:
 def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
     if text is None:
         return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not 0 <= value < math.inf:
         raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
     return value

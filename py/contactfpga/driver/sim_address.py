@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from contactfpga.errors import PortNotFound
+from contactfpga.inputs.values import number_in
 
 OPTIONS = ("scene", "skin", "threshold", "units")
 _FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER and &units=FILE where wanted"
@@ -58,10 +59,7 @@ def _decoded(name: str, text: str) -> str:
 
 
 def _number(name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not math.isfinite(value):
         raise PortNotFound(f"{name}: threshold is {text!r}; it must be a finite number")
     return value

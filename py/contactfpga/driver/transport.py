@@ -159,8 +159,10 @@ class RecordingTransport:
         return data
 
     def close(self) -> None:
-        self._tap.close()
-        self._transport.close()
+        try:
+            self._tap.close()
+        finally:
+            self._transport.close()
 
 
 def counters_of(transport: Transport) -> Counters | None:

@@ -12,6 +12,7 @@ from contactfpga.haptics.answer import Floats, Vector
 from contactfpga.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution
 from contactfpga.haptics.system import System
 from contactfpga.haptics.wrench import ALARM
+from contactfpga.surfaces.shapes import vector
 
 EDGES = 12
 """Of the pyramid that stands for friction's cone, inside of it."""
@@ -43,7 +44,7 @@ def within_cones(system: System) -> Solution:
     forces = cones.nearest(system)
     if system.places_widen(forces):
         forces = cones.nearest(system)
-    return _solution(system, [_vector(force) for force in forces.reshape(-1, 3)], PURE_FORCE)
+    return _solution(system, [vector(force) for force in forces.reshape(-1, 3)], PURE_FORCE)
 
 
 def _along_normals(system: System) -> list[Vector]:
@@ -104,7 +105,7 @@ def _along_edges(system: System) -> list[Vector]:
     found = np.zeros((len(system.touches), 3))
     for amount, own, edge in zip(amounts, owners, edges):
         found[own] += amount * edge
-    return [_vector(force) for force in found]
+    return [vector(force) for force in found]
 
 
 def _least_squares(matrix: Floats, wanted: Floats) -> Floats:
@@ -148,8 +149,3 @@ def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
 
 def _rank(system: System, matrix: Floats) -> int:
     return _spaces(system, matrix)[0]
-
-
-def _vector(force: Floats) -> Vector:
-    x, y, z = force.tolist()
-    return x, y, z

@@ -22,6 +22,16 @@ def open_regular(path: str | Path) -> BinaryIO:
         raise
 
 
+def read_small(path: str | Path, most: int, what: str, refused: type[Exception]) -> bytes:
+    """All bytes of a file that has ``most`` of them at most; ``what``: the kind of file it is to be. Raises ``refused``
+    for a longer one, OSError."""
+    with open_regular(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise refused(f"{path}: longer than {most:,} bytes; is it {what}?")
+    return data
+
+
 def told(error: OSError) -> str:
     """An OSError as a user reads it: the file and what is wrong with it, without the number."""
     reason = error.strerror or str(error) or type(error).__name__

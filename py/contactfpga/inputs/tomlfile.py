@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import shown
 
 Table = TypeVar("Table")
@@ -57,11 +57,7 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
 
 
 def _text(path: str | Path, refused: type[ValueError]) -> str:
-    with open_regular(path) as file:
-        data = file.read(MAX_BYTES + 1)
-    if len(data) > MAX_BYTES:
-        raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
-    return data.decode()
+    return read_small(path, MAX_BYTES, "a TOML file", refused).decode()
 
 
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:

@@ -31,6 +31,14 @@ def whole(value: object) -> int | None:
         return None
 
 
+def number_in(text: str) -> float:
+    """The number that a text is; NaN, which lies in no range, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def shown(value: Any) -> str:
     """``repr`` of a value, short enough for a message."""
     try:

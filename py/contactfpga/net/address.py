@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import ipaddress
-import math
 import re
 from urllib.parse import unquote
 
 from contactfpga.errors import PortNotFound
+from contactfpga.inputs.values import number_in
 
 SCHEME = "zenoh://"
 ENDPOINT = "tcp/127.0.0.1:7447"
@@ -69,10 +69,7 @@ def is_loopback(endpoint: str) -> bool:
 
 
 def _seconds(name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_in(text)
     if not 0 <= value <= 86_400:
         raise PortNotFound(f"{name}: wait is {text!r}; it must be a number of seconds from 0 to 86400")
     return value

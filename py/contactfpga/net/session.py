@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,12 +54,22 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
     for name, value in settings.items():
         as_usual = given.get(name, "null") in ("null", "[]", usual.get_json(name))
         if as_usual or (endpoint is not None and name == f"{what}/endpoints"):
-            found.insert_json5(name, json.dumps(value))
+            _insert(found, name, value)
     places = json.loads(found.get_json(f"{what}/endpoints"))
     try:
         return zenoh.open(found)
     except zenoh.ZError as error:
         raise ContactFPGAError(f"{_where(places)}: cannot {what} there: {_reason(error)}; {_step(what)}") from None
+
+
+def _insert(found: zenoh.Config, name: str, value: Any) -> None:
+    import zenoh
+
+    try:
+        found.insert_json5(name, json.dumps(value))
+    except zenoh.ZError as error:  # of what a user names: an endpoint
+        reason = re.sub(r'^.*msg: "', "", _reason(error))
+        raise ContactFPGAError(f"endpoint {value[0]!r}: {reason}; for instance {ENDPOINT}") from None
 
 
 def _where(places: Any) -> str:

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from contactfpga.driver.board import Board
 from contactfpga.driver.told import Told
-from contactfpga.haptics import Contacts
 from contactfpga.recordings import messages
 from contactfpga.recordings.mount import Mount
 from contactfpga.recordings.recorder import LinkFile
 from contactfpga.ros import convert
 from contactfpga.ros.cdr import encode
+from contactfpga.ros.feed import Felt
 from contactfpga.ros.markers import markers, outline
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.tracking.tracks import Tracks
 from contactfpga.wire.faults import Faults
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
-
-Felt = Callable[[Zones, Tracks], Contacts | None]
-"""The forces at the zones of a frame; None: no readings belong to it."""
 
 DRAWN_S = 1 / 30
 """How often what 3-D programs show is written."""

@@ -12,7 +12,6 @@ from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.recordings.mcap_file import McapFile
 
-DAMAGED = "damaged"
 _HEAD = 9
 """Bytes before a record: what it is, and how long."""
 

@@ -13,11 +13,12 @@ from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
-from contactfpga.recordings.link_messages import Felt, LinkMessages
+from contactfpga.recordings.link_messages import LinkMessages
 from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
 from contactfpga.recordings.mount import Mount
 from contactfpga.recordings.recorder import Recorder, Split, link_name
 from contactfpga.recordings.whole_file import RecordingFailed
+from contactfpga.ros.feed import Felt
 from contactfpga.skin import Skin
 
 SUFFIX = ".mcap"

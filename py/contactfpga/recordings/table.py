@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from contactfpga.recordings.recording import Recording
-from contactfpga.ros.convert import FLAGS
+from contactfpga.ros.convert import flag_bits
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 
@@ -45,7 +45,7 @@ def pieces(recording: Recording, rows: int = ROWS) -> Iterator[Piece]:
     for t_s, link, zones in recording.frames():
         tracker = trackers.setdefault(link, Tracker())
         number = counts[link] = counts.get(link, -1) + 1
-        flags = sum(FLAGS[flag] for flag in zones.flags)
+        flags = flag_bits(zones.flags)
         head = t_s, link, number, zones.time_us
         found += [(*head, *values, flags) for values in _zones(zones, tracker)]
         if len(found) >= rows:

@@ -90,7 +90,7 @@ def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
         "stamp_sigma": _NAN if sigma_s is None else sigma_s,
         "device_time_us": frame.time_us,
         "sequence": frame.sequence,
-        "flags": _flag_bits(frame.flags),
+        "flags": flag_bits(frame.flags),
         "overwritten": frame.overwritten,
         "pressed": frame.pressed,
         "total_zones": frame.total_zones,
@@ -101,7 +101,8 @@ def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
 
 
 @functools.cache
-def _flag_bits(flags: frozenset[str]) -> int:
+def flag_bits(flags: frozenset[str]) -> int:
+    """The flags of a frame as a ``Zones`` has them."""
     return sum(FLAGS[name] for name in flags)
 
 

@@ -33,7 +33,7 @@ POLL_S = 0.1
 Send = Callable[[str, bytes], None]
 """Publishes a message, written as CDR, by the name of its topic in :data:`TOPICS`."""
 Felt = Callable[[Zones, Tracks], "Contacts | None"]
-"""The forces at the zones of a frame, from pressure units."""
+"""The forces at the zones of a frame, from pressure units; None: no readings belong to it."""
 
 
 class Frames(Protocol):

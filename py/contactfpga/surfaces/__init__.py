@@ -3,11 +3,12 @@
 from contactfpga.skin.sheet import Sheet
 from contactfpga.surfaces.answer import SurfaceError
 from contactfpga.surfaces.mesh import Mesh
+from contactfpga.surfaces.mirrored import Mirrored
 from contactfpga.surfaces.surface import Cone, Cylinder, Plane
 
-Surface = Plane | Cylinder | Cone | Mesh
+Surface = Plane | Cylinder | Cone | Mesh | Mirrored
 
-__all__ = ["Cone", "Cylinder", "Mesh", "Plane", "Surface", "SurfaceError", "of"]
+__all__ = ["Cone", "Cylinder", "Mesh", "Mirrored", "Plane", "Surface", "SurfaceError", "of"]
 
 
 def of(sheet: Sheet) -> Plane | Cylinder:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import math
 import zipfile
 from pathlib import Path
@@ -10,10 +11,10 @@ from typing import Any, overload
 
 import numpy as np
 
-from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.files import read_small
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.surfaces.answer import SurfaceError, length
-from contactfpga.surfaces.shapes import Floats, Vector, is_one
+from contactfpga.surfaces.shapes import Floats, Vector, is_one, vector
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
 MAX_BYTES = 4_000_000
@@ -60,15 +61,12 @@ class Mesh:
     @classmethod
     def load(cls, path: str | Path) -> Mesh:
         """Read a table that :meth:`save` wrote. Raises :class:`SurfaceError`, OSError."""
-        with open_regular(path) as file:
-            if len(file.read(MAX_BYTES + 1)) > MAX_BYTES:
-                raise SurfaceError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a table of `contactfpga surface`?")
-            file.seek(0)
-            try:
-                with np.load(file, allow_pickle=False) as values:
-                    found = {key: _small(values, key) for key in KEYS}
-            except (ValueError, KeyError, EOFError, zipfile.BadZipFile, AttributeError, TypeError) as error:
-                raise SurfaceError(f"{path}: not a table of `contactfpga surface`: {error}") from None
+        data = read_small(path, MAX_BYTES, "a table of `contactfpga surface`", SurfaceError)
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as values:
+                found = {key: _small(values, key) for key in KEYS}
+        except (ValueError, KeyError, EOFError, zipfile.BadZipFile, AttributeError, TypeError) as error:
+            raise SurfaceError(f"{path}: not a table of `contactfpga surface`: {error}") from None
         try:
             if found["pitch_mm"].shape != (2,) or found["closed"].shape != ():
                 raise SurfaceError("pitch_mm must be two numbers, and closed one")
@@ -105,8 +103,7 @@ class Mesh:
         normals = normals / np.linalg.norm(normals, axis=-1)[..., None]
         points[nowhere] = normals[nowhere] = math.nan
         if is_one(x_mm, y_mm):
-            (px, py, pz), (nx, ny, nz) = points.tolist(), normals.tolist()
-            return (px, py, pz), (nx, ny, nz)
+            return vector(points), vector(normals)
         return points, normals
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:

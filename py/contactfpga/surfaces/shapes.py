@@ -40,6 +40,12 @@ def _each(function: Callable[[float], float], values: Floats) -> Floats:
     return np.array([function(value) for value in values.ravel().tolist()], float).reshape(values.shape)
 
 
+def vector(values: Floats) -> Vector:
+    """Three numbers as plain ones."""
+    x, y, z = values.tolist()
+    return x, y, z
+
+
 def is_one(*values: Any) -> bool:
     """Whether these are plain numbers and no arrays."""
     return all(isinstance(value, (float, int)) for value in values)

@@ -124,7 +124,7 @@ class Cone:
         radius = way * sine
         points = np.stack([radius * around, radius * aside, (way - tip) * cosine], axis=-1)
         normals = np.stack([cosine * around, cosine * aside, np.where(np.isnan(way), math.nan, -sine)], axis=-1)
-        return (_vector(points), _vector(normals)) if is_one(x_mm, y_mm) else (points, normals)
+        return (shapes.vector(points), shapes.vector(normals)) if is_one(x_mm, y_mm) else (points, normals)
 
     def flat(self, point_mm: Vector) -> tuple[float, float]:
         """The place, in mm, of the surface's point nearest to this one; it lies within half a turn of column 0."""
@@ -134,8 +134,3 @@ class Cone:
         way = tip + out * sine + point_mm[2] * cosine
         angle = math.atan2(point_mm[1], point_mm[0]) * abs(sine)
         return abs(way) * math.sin(angle), way * math.cos(angle) - tip
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactfpga.body import Body
-from contactfpga.body.open_body import OpenBody
-from contactfpga.body.plan import Plan, text
+from contactfpga.body.open_body import OpenBody, open_board
+from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
-from contactfpga.body.urdf import located
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
-from contactfpga.inputs import tomlfile
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.view.fingers import Hand, Touchable
 from contactfpga.view.robot import RobotStage
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
 
 TURN_S = 0.04
 TOLD_S = 0.25
-FINGER = 0.9
 TURN_RAD = 3.15
 
 
@@ -35,7 +32,6 @@ class BodySource:
     def __init__(self, path: str | Path, timeout: float = 1.0):
         self.title = str(path)
         self.body = Body.load(path)
-        self.urdf = _urdf(Path(path))
         kinematics = self.body.kinematics
         self.angles: dict[str, float] = dict.fromkeys(kinematics.joint_names if kinematics else (), 0.0)
         """In rad, of prismatic joints in m; what the sliders set."""
@@ -47,7 +43,7 @@ class BodySource:
 
     def _opened(self, plan: Plan) -> Board:
         if plan.port is None or not plan.port.startswith("sim:"):
-            return driver.open(plan.port, plan.skin, timeout=self._timeout)
+            return open_board(plan, self._timeout)
         virtual: Any = transport.virtual_board(plan.port, plan.skin)
         self.virtual[plan.name] = virtual
         return driver.open(virtual, plan.skin, timeout=self._timeout)
@@ -61,19 +57,12 @@ class BodySource:
         self._open.close()
 
 
-def _urdf(path: Path) -> Path | None:
-    from contactfpga.body.answer import BodyError
-
-    values = tomlfile.load(path, BodyError)
-    return located(text(values, "urdf"), path.parent) if "urdf" in values else None
-
-
 class BodyView:
     """Shows a body in a server's page."""
 
     def __init__(self, server: viser.ViserServer, source: BodySource):
         self._source = source
-        self.stage = RobotStage(server, source.body, source.urdf)
+        self.stage = RobotStage(server, source.body)
         self._moved = dict(source.angles)
         self.stage.move(source.angles)
         self.stage.look(source.angles)
@@ -108,8 +97,7 @@ class BodyView:
         for name, state in states.items():
             stage, virtual = self.stage.stages[name], source.virtual.get(name)
             if virtual is not None and name not in self.hands:
-                sheet = source.body.links[name].skin
-                self.hands[name] = Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+                self.hands[name] = Hand.on(virtual, source.body.links[name].skin.sheet)
                 stage.press_with(self.hands[name])
             if state.zones is not None:
                 truth = None if virtual is None else virtual.pressed

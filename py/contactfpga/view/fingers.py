@@ -9,6 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
+from contactfpga.skin.sheet import Sheet
+
+FINGER = 0.9
+"""Radius of the mouse's finger, of the pitch."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Finger:
@@ -54,6 +59,11 @@ class Hand:
         self._down: list[Finger] = []
         self._dragged: dict[object, Finger] = {}
         self._stays: set[object] = set()
+
+    @classmethod
+    def on(cls, board: Touchable, sheet: Sheet) -> Hand:
+        """With a finger that suits this board's sheet."""
+        return cls(board, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
 
     @property
     def fingers(self) -> list[Finger]:

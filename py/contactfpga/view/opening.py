@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from contactfpga.driver import driver, sim_address, transport
+from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.view import server
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
 SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
 """Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
-
-FINGER = 0.9
-"""Radius of the mouse's finger, of the pitch."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,6 +69,7 @@ def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int 
     """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
     does."""
     named = named or Named()
+    _check(named)
     source: Source | BodySource
     source, hand = (BodySource(named.port, named.timeout), None) if _is_body(named.port) else _source(named)
     try:
@@ -91,6 +90,19 @@ def run(shown: Shown, seconds: float | None = None) -> None:
         shown.view.turn()
 
 
+def _check(named: Named) -> None:
+    """Raises :class:`~contactfpga.ContactFPGAError` for what is named and would be left out."""
+    port = named.port
+    is_body = _is_body(port)
+    recorded = port is not None and not is_body and is_recording(port)
+    for name in ("skin", "baud", "units"):
+        if getattr(named, name) is not None and (is_body or recorded):
+            other = "says it of each link" if is_body else "is a recording"
+            raise ContactFPGAError(f"--{name} is of a board; {port} {other}")
+    if named.link is not None and not recorded:
+        raise ContactFPGAError(f"--link is of a recording; {'name one' if port is None else f'{port} is none'}")
+
+
 def _is_body(port: str | None) -> TypeGuard[str]:
     return port is not None and port.endswith(".toml")
 
@@ -99,13 +111,13 @@ def _source(named: Named) -> tuple[Source, Hand | None]:
     if named.port is not None and is_recording(named.port):
         return Player(load(named.port, named.link, named.timeout)), None
     if named.port is not None and not named.port.startswith("sim:"):
+        cells = _cells(named)
         board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)
-        return BoardSource(board, named.port, cells=_cells(named)), None
-    virtual = _virtual(named)
+        return BoardSource(board, named.port, cells=cells), None
+    virtual, cells = _virtual(named), _cells(named)
     board = driver.open(virtual, None if named.port is None else named.skin, timeout=named.timeout)
-    sheet = board.sheet
-    hand = Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
-    return BoardSource(board, named.port or "a virtual sheet", virtual, _cells(named)), hand
+    source = BoardSource(board, named.port or "a virtual sheet", virtual, cells)
+    return source, Hand.on(virtual, board.sheet)
 
 
 def _cells(named: Named) -> LoadCells | None:

@@ -52,11 +52,14 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
     """
     port = name if name.startswith(recording.SCHEME) else f"{recording.SCHEME}{name}"
     asked = recording.parse(port)
+    link = link or asked.link
     if not _is_mcap(asked.path):
+        if link is not None:
+            raise ContactFPGAError(f"{asked.path} holds one board; --link is of what `contactfpga record` makes")
         return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout)
     from contactfpga.recordings import Recording
 
-    return LinkRecording(Recording(asked.path), link or asked.link)
+    return LinkRecording(Recording(asked.path), link)
 
 
 def _is_mcap(path: Path) -> bool:

@@ -6,21 +6,22 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.body import Body
+from contactfpga.body import Body, BodyError
+from contactfpga.body import urdf as urdf_file
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
-from contactfpga.body.urdf import located
-from contactfpga.surfaces import Surface
+from contactfpga.inputs.values import shown
 from contactfpga.view.picture import rgb
-from contactfpga.view.stage import AMBIENT, SIDE, Stage
+from contactfpga.view.stage import Stage, light
 from contactfpga.view.tiles import MM, Tiles, quaternions
 
 if TYPE_CHECKING:
+    from xml.etree import ElementTree
+
     import viser
 
 ROOT = "/robot"
@@ -37,70 +38,53 @@ class Visual:
     scale: tuple[float, float, float]
 
 
-@dataclasses.dataclass(frozen=True)
-class Mirrored:
-    """A surface on which columns count from the other end."""
-
-    surface: Surface
-    width_mm: float
-    """From the first to the last column."""
-
-    def place(self, x_mm: Any, y_mm: Any) -> Any:
-        """As of the surface."""
-        return self.surface.place(self.width_mm - x_mm, y_mm)
-
-
-def surface_of(plan: Plan) -> Any:
-    """Where the cells of a link's sheet lie, in the sheet's own frame."""
-    width_mm = (plan.skin.columns - 1) * plan.skin.pitch_x_mm
-    return Mirrored(plan.surface, width_mm) if plan.mirrored else plan.surface
-
-
 def visuals(urdf: Path) -> list[Visual]:
-    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out."""
+    """The meshes that a URDF names and that are there; boxes, spheres and cylinders are left out. Raises
+    :class:`BodyError`, OSError."""
     found = []
-    for link in ElementTree.parse(urdf).getroot().findall("link"):
-        for visual in link.findall("visual"):
-            mesh = visual.find("geometry/mesh")
-            if mesh is None:
-                continue
-            name = mesh.get("filename", "")
-            path = located(name.removeprefix("file://"), urdf.parent) if name else None
-            if path is None or not path.is_file():
-                continue
-            origin = visual.find("origin")
-            shift, turn = (_numbers(origin, each, (0.0, 0.0, 0.0)) for each in ("xyz", "rpy"))
-            found.append(Visual(link.get("name", ""), Pose.of(shift, turn), path, _numbers(mesh, "scale", (1, 1, 1))))
-    return found
+    links = urdf_file.tree(urdf).findall("link")
+    try:
+        for link in links:
+            found += [_visual(one, link.get("name", ""), urdf.parent) for one in link.findall("visual")]
+    except BodyError as error:
+        raise BodyError(f"{urdf}: {error}") from None
+    return [visual for visual in found if visual is not None]
 
 
-def _numbers(element: Any, name: str, usual: tuple[float, float, float]) -> tuple[float, float, float]:
-    text = None if element is None else element.get(name)
-    if not text:
-        return usual
-    x, y, z = map(float, text.split())
-    return x, y, z
+def _visual(element: ElementTree.Element, link: str, folder: Path) -> Visual | None:
+    mesh = element.find("geometry/mesh")
+    path = None if mesh is None else _path(mesh.get("filename", ""), folder)
+    if path is None:
+        return None
+    where, origin = f"a mesh of link {shown(link)}", element.find("origin")
+    shift, turn = (urdf_file.vector(origin, key, where) for key in ("xyz", "rpy"))
+    return Visual(link, Pose.of(shift, turn), path, urdf_file.vector(mesh, "scale", where, "1 1 1"))
+
+
+def _path(name: str, folder: Path) -> Path | None:
+    try:
+        path = urdf_file.located(name.removeprefix("file://"), folder)
+    except BodyError:  # of a package that is not installed: the sheets can be shown all the same
+        return None
+    return path if path.is_file() else None
 
 
 class RobotStage:
     """Links as meshes where these can be read, else as lines between joints; and a stage for each sheet."""
 
-    def __init__(self, server: viser.ViserServer, body: Body, urdf: Path | None):
+    def __init__(self, server: viser.ViserServer, body: Body):
         self._server, self._body = server, body
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
         """Kinds of mesh files that could not be read."""
         scene = server.scene
-        scene.configure_default_lights(enabled=False, cast_shadow=False)
-        scene.configure_environment_map(None)
-        scene.add_light_ambient("/light/all", intensity=AMBIENT)
-        scene.add_light_directional("/light/side", intensity=SIDE, position=(1.0, -0.5, 1.0))
+        light(server, (1.0, -0.5, 1.0))
         names = [plan.frame for plan in body.links.values()]
         if body.kinematics is not None:
             names = list(body.kinematics.robot.links)
         for name in dict.fromkeys(names):
             self._frames[name] = scene.add_frame(f"{ROOT}/{name}", show_axes=False)
-        for visual in visuals(urdf) if urdf is not None else ():
+        for visual in visuals(body.urdf) if body.urdf is not None else ():
             self._add_mesh(visual)
         self.stages = {name: self._add_sheet(plan) for name, plan in body.links.items()}
         self._bones: Any = None
@@ -132,7 +116,7 @@ class RobotStage:
         node = f"{ROOT}/{plan.frame}/{plan.name}"
         wxyz = quaternions(plan.pose.rotation[None])[0]
         self._server.scene.add_frame(node, show_axes=False, wxyz=wxyz, position=plan.pose.point_m)
-        return Stage(self._server, Tiles(plan.skin.sheet, surface_of(plan)), node=node)
+        return Stage(self._server, Tiles(plan.skin.sheet, plan.laid), node=node)
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Draw all links at these angles."""

@@ -69,10 +69,7 @@ class Stage:
     def look(self) -> None:
         """Set light and camera of those who come so that the sheet is in view and its colors are as chosen."""
         scene = self._server.scene
-        scene.configure_default_lights(enabled=False, cast_shadow=False)
-        scene.configure_environment_map(None)
-        scene.add_light_ambient("/light/all", intensity=AMBIENT)
-        scene.add_light_directional("/light/side", intensity=SIDE, position=(0.3, -0.5, 1.0))
+        light(self._server, (0.3, -0.5, 1.0))
         tiles, camera = self.tiles, self._server.initial_camera
         normal, away, aside = (mean(each) for each in (tiles.normals, tiles.along_y, tiles.along_x))
         far = FAR * tiles.size_mm * MM
@@ -185,6 +182,15 @@ class Stage:
             place = self._met(eye, np.array(to) - eye)
             if place is not None:
                 hand.drag(event.client_id, *place)
+
+
+def light(server: viser.ViserServer, side: tuple[float, float, float]) -> None:
+    """From all sides, and a little from this one."""
+    scene = server.scene
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.configure_environment_map(None)
+    scene.add_light_ambient("/light/all", intensity=AMBIENT)
+    scene.add_light_directional("/light/side", intensity=SIDE, position=side)
 
 
 def mean(directions: np.ndarray) -> np.ndarray:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga_sim.pages import writer
 from contactfpga_sim.studies.arm import comply, latency_charts, report, run_pictures, sweep
 from contactfpga_sim.studies.arm.case import Case
@@ -132,12 +130,7 @@ def speed_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
 
 def main() -> int:
     """Write the tables into the page and the pictures into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on the arm.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    writer.page(args.page)
-    outputs.folder(args.folder, "folder")
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the arm.")
     case = Case.load("paper")
     tasks = latency_charts.plan(case)
     with executor() as workers, progress() as step:
@@ -152,11 +145,11 @@ def main() -> int:
         "failures": failure_table,
         "steps": step_table,
     }
-    writer.write(args.page, tables)
-    print(f"wrote {args.page}")
+    writer.write(page, tables)
+    print(f"wrote {page}")
     drawn = (
-        *run_pictures.pictures(found, args.folder, ("svg",)),
-        *latency_charts.draw(case, tasks, points, args.folder, ("svg",)),
+        *run_pictures.pictures(found, folder, ("svg",)),
+        *latency_charts.draw(case, tasks, points, folder, ("svg",)),
     )
     for path in drawn:
         print(f"drew {path}")

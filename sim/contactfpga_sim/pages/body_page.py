@@ -5,7 +5,6 @@ python -m contactfpga_sim.pages.body_page docs/body.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import math
 import sys
@@ -18,10 +17,10 @@ import numpy as np
 from contactfpga import examples
 from contactfpga import picture_style as style
 from contactfpga.body import Body, LinkState
-from contactfpga.body.contact import on_link, placed
+from contactfpga.body.contact import on_link
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga.driver import sim_address
 from contactfpga_sim.pages import writer
 from contactfpga_sim.scenes.scene import scene
@@ -108,7 +107,7 @@ def draw(folder: Path) -> Path:
 def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
     skin = plan.skin
     x, y = np.meshgrid(np.arange(skin.columns) * skin.pitch_x_mm, np.arange(skin.rows) * skin.pitch_y_mm)
-    cells = np.array([pose.apply(np.array(placed(plan, *place)[0])) for place in zip(x.ravel(), y.ravel())])
+    cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])
     axes.plot(cells[:, across], cells[:, 2], ".", ms=1.2, color=style.SKY)
     axes.plot([], [], "s", ms=5, color=style.SKY, label="cells of the sheets")
     asked = sim_address.parse(plan.port or "sim://").scene
@@ -125,15 +124,10 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
 
 def main() -> int:
     """Write the tables into the page named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on bodies.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    page = writer.page(args.page)
-    outputs.folder(args.folder, "folder")
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on bodies.")
     writer.write(page, TABLES)
     print(f"wrote {page}")
-    print(f"drew {draw(args.folder)}")
+    print(f"drew {draw(folder)}")
     return 0
 
 

@@ -5,14 +5,12 @@ python -m contactfpga_sim.pages.cover_page docs/cover.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
 
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga.cover import drawing, formula_study, paper, study_drawing
 from contactfpga.cover.design import thinning
 from contactfpga.cover.foams import FOAMS
@@ -106,15 +104,10 @@ TABLES: writer.Tables = {
 
 def main() -> int:
     """Write the tables into the page and the pictures into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on the cover.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    writer.page(args.page)
-    outputs.folder(args.folder, "folder")
-    writer.write(args.page, TABLES)
-    print(f"wrote {args.page}")
-    for file in (*drawing.draw(args.folder, "svg"), study_drawing.study(args.folder / "cover-study.svg")):
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the cover.")
+    writer.write(page, TABLES)
+    print(f"wrote {page}")
+    for file in (*drawing.draw(folder, "svg"), study_drawing.study(folder / "cover-study.svg")):
         print(f"drew {file}")
     return 0
 

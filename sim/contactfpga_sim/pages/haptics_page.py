@@ -5,12 +5,10 @@ python -m contactfpga_sim.pages.haptics_page docs/haptics.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
-from pathlib import Path
 
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga.haptics import Cylinder, drawing
 from contactfpga.haptics.rate import Rating, Task, compared
 from contactfpga_sim.pages import haptics_felt, writer
@@ -89,16 +87,11 @@ TABLES: writer.Tables = {
 
 def main() -> int:
     """Write the tables into the page and the picture into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and the picture of the page on haptics.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    writer.page(args.page)
-    outputs.folder(args.folder, "folder")
-    writer.write(args.page, TABLES)
-    print(f"wrote {args.page}")
-    print(f"drew {drawing.draw(args.folder / 'haptics-place.svg', LINK, compared(LINK, RING_M))}")
-    for path in haptics_felt.draw(args.folder):
+    page, folder = writer.page_and_folder("Write the tables and the picture of the page on haptics.")
+    writer.write(page, TABLES)
+    print(f"wrote {page}")
+    print(f"drew {drawing.draw(folder / 'haptics-place.svg', LINK, compared(LINK, RING_M))}")
+    for path in haptics_felt.draw(folder):
         print(f"drew {path}")
     return 0
 

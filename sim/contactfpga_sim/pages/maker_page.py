@@ -5,14 +5,12 @@ python -m contactfpga_sim.pages.maker_page docs/maker.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterable
-from pathlib import Path
 
 from contactfpga.circuit import SCHOTTKY, SILICON, Circuit, needed, static
 from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga_sim.pages import schematic, writer
 
 SIZE = 16
@@ -84,14 +82,9 @@ TABLES: writer.Tables = {"diodes": diodes_table, "pulls": pulls_table, "series":
 
 def main() -> int:
     """Write the tables into the page and the schematic into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and the schematic of the maker's page.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    writer.page(args.page)
-    folder = outputs.folder(args.folder, "folder")
-    writer.write(args.page, TABLES)
-    print(f"wrote {args.page}")
+    page, folder = writer.page_and_folder("Write the tables and the schematic of the maker's page.")
+    writer.write(page, TABLES)
+    print(f"wrote {page}")
     print(f"drew {schematic.draw(folder / 'schematic.svg')}")
     return 0
 

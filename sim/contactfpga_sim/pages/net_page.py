@@ -5,13 +5,12 @@ python -m contactfpga_sim.pages.net_page docs/net.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import functools
 import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga.net.message import HEAD_BYTES
 from contactfpga_sim.pages import writer
 from contactfpga_sim.studies.net import load, source
@@ -127,15 +126,10 @@ def draw(folder: Path) -> Path:
 
 def main() -> int:
     """Write the tables into the page and the picture into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and the picture of the page on networks.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    page = writer.page(args.page)
-    outputs.folder(args.folder, "folder")
+    page, folder = writer.page_and_folder("Write the tables and the picture of the page on networks.")
     writer.write(page, TABLES)
     print(f"wrote {page}")
-    print(f"drew {draw(args.folder)}")
+    print(f"drew {draw(folder)}")
     return 0
 
 

@@ -5,14 +5,12 @@ python -m contactfpga_sim.pages.settle_page docs/settle.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import functools
 import sys
-from pathlib import Path
 
 from contactfpga.circuit import SILICON, Circuit, needed, patterns, problems
 from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga_sim.pages import writer
 from contactfpga_sim.sheet import agreement, spice
 from contactfpga_sim.sheet.agreement import Compared
@@ -141,19 +139,14 @@ COMPARED: writer.Tables = {"summary": summary_table, "agreement": agreement_tabl
 
 def main() -> int:
     """Write the tables into the page and the pictures into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and pictures of the page on settling.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    outputs.file(args.page, "page")
-    outputs.folder(args.folder, "folder")
-    writer.write(args.page, TABLES)
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on settling.")
+    writer.write(page, TABLES)
     if spice.installed():
-        writer.write(args.page, COMPARED)
+        writer.write(page, COMPARED)
     else:
         print("ngspice is not installed: its tables stay as they are")
-    print(f"wrote {args.page}")
-    for file in pictures.draw(args.folder):
+    print(f"wrote {page}")
+    for file in pictures.draw(folder):
         print(f"drew {file}")
     return 0
 

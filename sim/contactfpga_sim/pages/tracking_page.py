@@ -5,12 +5,11 @@ python -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga.console import interrupt, outputs
+from contactfpga.console import interrupt
 from contactfpga_sim.pages import failures_page, writer
 from contactfpga_sim.pages.figures import RECORDINGS
 from contactfpga_sim.studies.tracking import breaks, reflex, scenes, scores, speed
@@ -98,16 +97,11 @@ def draw(folder: Path) -> Path:
 
 def main() -> int:
     """Write the tables into the page and the picture into the folder named on the command line."""
-    parser = argparse.ArgumentParser(description="Write the tables and the picture of the page on tracking.")
-    parser.add_argument("page", type=Path)
-    parser.add_argument("folder", type=Path)
-    args = parser.parse_args()
-    page = writer.page(args.page)
-    outputs.folder(args.folder, "folder")
+    page, folder = writer.page_and_folder("Write the tables and the picture of the page on tracking.")
     for tables in (MEASURED, TABLES, JUDGED):
         writer.write(page, tables)
     print(f"wrote {page}")
-    print(f"drew {draw(args.folder)}")
+    print(f"drew {draw(folder)}")
     return 0
 
 

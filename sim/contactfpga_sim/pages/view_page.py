@@ -5,7 +5,6 @@ python -m contactfpga_sim.pages.view_page docs/view.md docs/images
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import functools
@@ -242,16 +241,8 @@ WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
 
 def main() -> int:
     """Measure, write the page, take the picture."""
-    parser = argparse.ArgumentParser(prog="make view-page", description=__doc__)
-    parser.add_argument("page", type=Path)
-    parser.add_argument("images", type=Path)
-    args = parser.parse_args()
-    try:
-        page = writer.page(args.page)
-        image, drawn = (outputs.file(args.images / name, "images") for name in ("view.png", "plot.svg"))
-    except outputs.OutputError as error:
-        print(f"make view-page: {error}", file=sys.stderr)
-        return 1
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the view.")
+    image, drawn = (outputs.file(folder / name, "folder") for name in ("view.png", "plot.svg"))
     plotted(drawn)
     with opening.opened(http_port=0) as shown:
         loads = load_table(shown)

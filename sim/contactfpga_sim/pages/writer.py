@@ -55,6 +55,16 @@ def page(path: str | Path, option: str = "page") -> Path:
     return outputs.file(path, option)
 
 
+def page_and_folder(description: str) -> tuple[Path, Path]:
+    """The page and the folder of its pictures that the command line names; ``description``: of the command. Both can be
+    written. Raises :class:`~contactfpga.console.outputs.OutputError`."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("page", type=Path, help="Page to write tables into.")
+    parser.add_argument("folder", type=Path, help="Folder to draw pictures in.")
+    args = parser.parse_args()
+    return page(args.page), outputs.folder(args.folder, "folder")
+
+
 def main(tables: Tables) -> int:
     """Update the pages named on the command line."""
     parser = argparse.ArgumentParser(description="Measure the tables in these pages and write them there.")

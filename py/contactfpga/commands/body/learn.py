@@ -14,6 +14,7 @@ from contactfpga.body import Body, folds
 from contactfpga.body.open_body import OpenBody
 from contactfpga.commands.body.register import link
 from contactfpga.console import numbers, outputs, terminal
+from contactfpga.inputs.values import number_in
 from contactfpga.zones.zone import Zones
 
 HELP = "Learn which cells the folding cover presses over a joint's range, with nobody near."
@@ -65,10 +66,7 @@ def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, 
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue
-        try:
-            angle = float(line[:MAX_LINE])
-        except ValueError:
-            angle = math.nan
+        angle = number_in(line[:MAX_LINE])
         if not math.isfinite(angle):
             raise ValueError(f"line {number} of standard input is {numbers.shortened(line.strip())!r}, no angle in rad")
         state = opened.read().links[name]

@@ -10,6 +10,7 @@ import time
 from contactfpga.body import Body, Contact, Snapshot
 from contactfpga.body.snapshot import BASE, LINK
 from contactfpga.console import numbers, terminal
+from contactfpga.inputs.values import number_in
 
 HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
 
@@ -31,10 +32,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def angle(text: str) -> tuple[str, float]:
     """NAME=RAD."""
     name, _, value = text.partition("=")
-    try:
-        found = float(value)
-    except ValueError:
-        found = math.nan
+    found = number_in(value)
     if not name or not math.isfinite(found):
         raise argparse.ArgumentTypeError(f"{numbers.shortened(text)!r} must be NAME=RAD, with a finite number")
     return name, found

@@ -13,7 +13,7 @@ from contactfpga.haptics.surface import Surface
 from contactfpga.haptics.unit import Unit
 from contactfpga.haptics.units import LoadCells
 from contactfpga.haptics.wrench import Noise, Wrench
-from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.files import read_small, told
 from contactfpga.inputs.values import shown
 
 MAX_BYTES = 1_000_000
@@ -24,11 +24,7 @@ MAX_UNITS = 64
 def load(path: str | Path, keys: tuple[str, ...]) -> dict[str, Any]:
     """The object in a file, with none but these keys. Raises :class:`HapticsError`."""
     try:
-        with open_regular(path) as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise HapticsError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a JSON file?")
-        values = json.loads(data)
+        values = json.loads(read_small(path, MAX_BYTES, "a JSON file", HapticsError))
     except OSError as error:
         raise HapticsError(told(error)) from None
     except HapticsError:

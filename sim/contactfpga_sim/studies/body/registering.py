@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.body import BodyError, registration
-from contactfpga.body.contact import placed
 from contactfpga.body.plan import Plan, read
 from contactfpga.body.pose import Pose
 from contactfpga.body.registration import Press
@@ -73,7 +72,7 @@ def _pressed(true: Plan, rng: np.random.Generator, normals: bool) -> Press:
     wide, high = (skin.columns - 1) * skin.pitch_x_mm, (skin.rows - 1) * skin.pitch_y_mm
     while True:
         x, y = rng.uniform(MARGIN_MM, wide - MARGIN_MM), rng.uniform(MARGIN_MM, high - MARGIN_MM)
-        point, normal = placed(true, x, y)
+        point, normal = true.place(x, y)
         dx, dy = PLACED_MM * rng.standard_normal(2)
         disc = Contact(shape=contacts.disc(FINGER_MM), x_mm=x + dx, y_mm=y + dy, force_n=10.0)
         rows, columns = np.nonzero(Scene((disc,)).pressed(0.0, skin))
