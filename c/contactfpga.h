@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 #ifndef CONTACTFPGA_PACKET_BYTES
-#define CONTACTFPGA_PACKET_BYTES 12350
+#define CONTACTFPGA_PACKET_BYTES 16462
 #endif
 
 #define CONTACTFPGA_MAX_LINES 64
@@ -88,6 +88,7 @@ typedef struct {
     bool on_change;       /* frames come when cells change, and as a keep-alive; else all the time */
     bool ghosts;          /* the sheet has no diodes */
     bool plane;           /* else a cylinder */
+    bool closed;          /* its last column is a neighbor of the first */
     bool guard;           /* it has guard lines, and names faults */
     bool self_test;       /* it can test its lines */
     uint16_t zone_capacity;
@@ -117,9 +118,13 @@ typedef struct {
 } contactfpga_frame;
 
 /* A contact zone. Its barycenter is sum_x / area along the columns, in cells, and sum_y / area along the rows; with
- * CONTACTFPGA_BARYCENTER the board has divided: x and y are in cells / 2^fraction_bits, and the sums are 0. */
+ * CONTACTFPGA_BARYCENTER the board has divided: x and y are in cells / 2^fraction_bits, and the sums are 0. On a closed
+ * sheet ``turned`` cells lie past the seam, seen from the others: (sum_x + columns * turned) / area is the barycenter. A
+ * zone that is a ring or wound has no x (docs/skin.md). */
+typedef enum { CONTACTFPGA_PLAIN = 0, CONTACTFPGA_RING = 1, CONTACTFPGA_WOUND = 2 } contactfpga_winding;
 typedef struct {
-    uint32_t area, sum_x, sum_y, x, y;
+    uint32_t area, sum_x, sum_y, x, y, turned;
+    contactfpga_winding winding;
 } contactfpga_zone;
 
 /* What the pressure units read. */
@@ -139,7 +144,7 @@ typedef struct {
 
 /* Widths of a sheet's fields on the wire. */
 typedef struct {
-    uint8_t area, sum_x, sum_y, zones, overwritten, record[3], record_bytes, item_bytes, trailer_bytes;
+    uint8_t area, sum_x, sum_y, zones, overwritten, record[4], record_bytes, item_bytes, trailer_bytes;
     uint16_t cells, max_zones, max_items;
 } contactfpga_widths;
 
@@ -190,7 +195,8 @@ static inline bool contactfpga_column_open(const contactfpga_reader *reader, uin
 static inline bool contactfpga_column_stuck(const contactfpga_reader *reader, uint8_t column);
 static inline bool contactfpga_lines_joined(const contactfpga_reader *reader);
 
-/* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Its area must not be 0. */
+/* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Its area must not be 0. On a closed
+ * sheet x lies from 0 to the circumference, and is not a number for a zone that is a ring or wound. */
 static inline void contactfpga_barycenter_mm(
     const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm);
 
@@ -307,6 +313,8 @@ static inline uint8_t contactfpga__bytes(unsigned bits) {
 }
 
 static inline uint16_t contactfpga__max_zones(const contactfpga_hello *hello) {
+    if (hello->closed)
+        return (uint16_t)((hello->connectivity == 8 ? (hello->rows + 1) / 2 : hello->rows) * (hello->columns / 2));
     if (hello->connectivity == 8) return (uint16_t)((hello->rows + 1) / 2 * ((hello->columns + 1) / 2));
     return (uint16_t)((hello->rows * hello->columns + 1) / 2);
 }
@@ -320,13 +328,13 @@ static inline contactfpga_widths contactfpga__widths(const contactfpga_hello *he
     w.sum_x = contactfpga__width(rows * (columns * (columns - 1) / 2));
     w.sum_y = contactfpga__width(columns * (rows * (rows - 1) / 2));
     w.zones = contactfpga__width(w.max_zones);
-    w.record[0] = w.area, w.record[1] = w.sum_x, w.record[2] = w.sum_y;
+    w.record[0] = w.area, w.record[1] = w.sum_x, w.record[2] = w.sum_y, w.record[3] = hello->closed ? w.area : 0;
     if (hello->report == CONTACTFPGA_BARYCENTER) {
         w.record[0] = contactfpga__width(w.cells - 1u);
         w.record[1] = contactfpga__width((columns - 1) << hello->fraction_bits);
         w.record[2] = contactfpga__width((rows - 1) << hello->fraction_bits);
     }
-    w.record_bytes = contactfpga__bytes((unsigned)w.record[0] + w.record[1] + w.record[2]);
+    w.record_bytes = contactfpga__bytes((unsigned)w.record[0] + w.record[1] + w.record[2] + w.record[3]);
     w.item_bytes = hello->report == CONTACTFPGA_CELLS ? contactfpga__bytes(columns) : w.record_bytes;
     w.max_items = hello->report == CONTACTFPGA_CELLS ? hello->rows : hello->zone_capacity;
     unsigned counted = 24u + 8 + 3 + w.area + w.zones;
@@ -362,6 +370,7 @@ static inline bool contactfpga__may_be(const contactfpga_hello *hello) {
         && (hello->plane || contactfpga__is_length(hello->radius_mm)) && hello->rows >= 1 && hello->columns >= 1
         && hello->rows <= CONTACTFPGA_MAX_LINES && hello->columns <= CONTACTFPGA_MAX_LINES
         && hello->fraction_bits <= most_bits && (hello->connectivity == 4 || hello->connectivity == 8)
+        && (!hello->closed || (hello->columns >= 3 && !hello->plane && hello->report != CONTACTFPGA_BARYCENTER))
         && hello->zone_capacity >= 1 && hello->zone_capacity <= contactfpga__max_zones(hello) && hello->clock_hz
         && hello->baud;
 }
@@ -389,7 +398,8 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
     uint32_t odd = 0;
     switch (kind) {
     case CONTACTFPGA__SHEET:
-        hello->rows = value[0], hello->columns = value[1], hello->connectivity = value[2], hello->report = value[3];
+        hello->rows = value[0], hello->columns = value[1], hello->report = value[3];
+        hello->connectivity = value[2] & 0x7F, hello->closed = value[2] >> 7;
         hello->fraction_bits = value[4], hello->on_change = value[5] == 1;
         hello->zone_capacity = (uint16_t)(value[6] | value[7] << 8), hello->ghosts = value[8] == 1;
         hello->guard = value[9] & 1;
@@ -595,7 +605,7 @@ static inline bool contactfpga__take_time(contactfpga_reader *reader, contactfpg
 static inline bool contactfpga__read_zone(const contactfpga_reader *reader, uint16_t index, contactfpga_zone *zone) {
     const contactfpga_widths *w = &reader->widths;
     const uint8_t *record = reader->packet + (size_t)index * w->record_bytes;
-    unsigned used = (unsigned)w->record[0] + w->record[1] + w->record[2];
+    unsigned sums = (unsigned)w->record[0] + w->record[1] + w->record[2], used = sums + w->record[3];
     uint32_t first = contactfpga__bits(record, w->record[0], w->record[1]);
     uint32_t second = contactfpga__bits(record, (size_t)w->record[0] + w->record[1], w->record[2]);
     bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
@@ -603,6 +613,10 @@ static inline bool contactfpga__read_zone(const contactfpga_reader *reader, uint
     if (divided && !zone->area && w->cells == 1u << w->record[0]) zone->area = w->cells;
     zone->sum_x = divided ? 0 : first, zone->sum_y = divided ? 0 : second;
     zone->x = divided ? first : 0, zone->y = divided ? second : 0;
+    zone->turned = contactfpga__bits(record, sums, w->record[3]);
+    zone->winding = CONTACTFPGA_PLAIN;
+    if (reader->hello.closed && zone->area && zone->turned >= zone->area)
+        zone->winding = zone->turned == zone->area ? CONTACTFPGA_RING : CONTACTFPGA_WOUND;
     return !contactfpga__bits(record, used, 8u * w->record_bytes - used);
 }
 
@@ -620,6 +634,7 @@ static inline bool contactfpga__adds_up(const contactfpga_reader *reader, const 
         contactfpga__read_zone(reader, i, &zone);
         bool inside = zone.sum_x <= zone.area * most_x && zone.sum_y <= zone.area * most_y
             && zone.x <= most_x << hello->fraction_bits && zone.y <= most_y << hello->fraction_bits;
+        if (zone.winding == CONTACTFPGA_WOUND && zone.turned + 1 != UINT32_C(1) << reader->widths.area) return false;
         if (!zone.area || !inside) return false;
         carried += zone.area;
     }
@@ -901,7 +916,13 @@ static inline void contactfpga_barycenter_mm(
     const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm) {
     bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
     double steps = divided ? (double)(1u << reader->hello.fraction_bits) : (double)zone->area;
-    *x_mm = (divided ? zone->x : zone->sum_x) / steps * reader->hello.pitch_x_mm;
+    uint32_t around = reader->hello.columns * zone->area, x = divided ? zone->x : zone->sum_x;
+    if (reader->hello.closed) x = (x + reader->hello.columns * zone->turned) % around;
+    *x_mm = x / steps * reader->hello.pitch_x_mm;
+    if (zone->winding != CONTACTFPGA_PLAIN) {
+        double zero = 0.0;
+        *x_mm = zero / zero;
+    }
     *y_mm = (divided ? zone->y : zone->sum_y) / steps * reader->hello.pitch_y_mm;
 }
 

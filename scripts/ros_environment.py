@@ -21,10 +21,15 @@ DISTRIBUTIONS = ("jazzy", "kilted")
 WHEELS = (
     *("rclpy[fastrtps]", "diagnostic-msgs", "geometry-msgs", "lifecycle-msgs", "std-msgs", "visualization-msgs"),
     *("ament-cmake", "ament-package", "rosidl-default-generators", "rosidl-core-generators"),
-    *("ament-cmake-include-directories", "ament-cmake-ros", "ament-cmake-gmock", "ament-cmake-gtest"),
-    *("ament-cmake-pytest", "python-cmake-module"),
+    "ament-cmake-include-directories",
 )
-MORE_WHEELS = {"jazzy": (), "kilted": ("ament-cmake-ros-core",)}
+MORE_WHEELS = {
+    "jazzy": (
+        *("ament-cmake-ros", "ament-cmake-gmock", "ament-cmake-gtest", "ament-cmake-pytest"),
+        "python-cmake-module",
+    ),
+    "kilted": ("ament-cmake-ros-core",),
+}
 PLAIN = ("catkin_pkg", "serialx")
 BUILT_IN = "/opt/python/cp{0}-cp{0}"
 """Where the wheels were built."""

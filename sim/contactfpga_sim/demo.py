@@ -5,22 +5,33 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from contactfpga.console import interrupt, outputs, tables, terminal
+from contactfpga.driver import driver
+from contactfpga.haptics import LoadCells, WithReadings, felt
+from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire.protocol import Frame
 from contactfpga_sim.board.received import frames_in
+from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
 from contactfpga_sim.cosim.compare import Mismatch, compare
 from contactfpga_sim.golden import Timeline, Trace, predict
 from contactfpga_sim.scenes import drawing
 from contactfpga_sim.scenes import scene as scenes
+from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.studies import pool
+
+FORCED = "pushing"
+"""The scene with force: it runs on a board with pressure units."""
+
+LOOKS = 240
+"""Clocks between two looks at the scene's forces."""
 
 SCANS = 4
 """An untouched scan, then the scene; the first touched frame is complete after the second."""
@@ -65,7 +76,7 @@ def run(name: str, engine: str, skin: Skin) -> Outcome:
     scene = scenes.scene(skin, name)
     untouched = np.zeros((skin.rows, skin.columns), bool)
     frames = [untouched, *(scene(index * scan / skin.clock_hz) for index in range(SCANS - 1))]
-    timeline = Timeline.frames(skin, frames)
+    timeline = dataclasses.replace(Timeline.frames(skin, frames), units=_readings(name, skin, scan))
     cycles = SCANS * scan + Derived(skin).max_frame_bytes * 10 * Derived(skin).bit_clocks
     trace = ENGINES[engine](skin, timeline, cycles)
     try:
@@ -87,6 +98,37 @@ def run(name: str, engine: str, skin: Skin) -> Outcome:
         events=events,
         difference=difference,
     )
+
+
+def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]]]:
+    """What the pressure units of a Skin that has some read from cycle to cycle; they feel the scene from the start."""
+    if not skin.units:
+        return []
+    read = Felt(scenes.CONTACTS[name](skin), load_cells(), skin)
+    return [(cycle, read(cycle / skin.clock_hz)) for cycle in range(0, SCANS * scan, LOOKS)]
+
+
+def with_force() -> Skin:
+    """The reference sheet on pressure units."""
+    return Skin.load(examples() / "force.toml")
+
+
+def load_cells() -> LoadCells:
+    """Those units."""
+    return LoadCells.load(examples() / "units-flat.toml")
+
+
+def feel() -> str:
+    """The scene with force once more, through the driver: what its contacts push with, and what is found."""
+    skin, cells = with_force(), load_cells()
+    with driver.open(VirtualBoard(skin, FORCED, units=cells), skin) as board:
+        frames = WithReadings(board)
+        zones = next(zones for zones in iter(frames.next, None) if len(zones) and zones.units is not None)
+    found = felt(cells, zones)
+    pushes = [contact.load(zones.time_us / 1e6) for contact in scenes.CONTACTS[FORCED](skin).contacts]
+    true = " and ".join(f"{load.force_n:.1f} N" for load in pushes if load)
+    stated = " and ".join(f"{one.normal_n:.1f} N" for one in found or ())
+    return f"{FORCED}: contacts push with {true}; zones and three pressure units of 0.05 N of noise say {stated}."
 
 
 def _first_touched(trace: Trace, skin: Skin) -> tuple[int, int, int, Frame | None]:
@@ -111,7 +153,7 @@ LEGEND = (
 )
 """Which number of the table is which."""
 
-TITLE = "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud"
+TITLE = "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud"
 
 HEADS = (
     *("scene", "engine", "verdict", "zones", "last record after last row", "touch to first byte", "touch to last byte"),
@@ -150,6 +192,8 @@ def main() -> int:
     tables.show(rows_of(outcomes), keys=3, title=TITLE, texts=(VERDICT,), styles=styles)
     for line in LEGEND:
         terminal.say(line, hang=2)
+    if FORCED in RUNS:
+        terminal.say(feel(), hang=2)
     for out in wrong:
         terminal.say(f"{out.scene}, {out.engine}: {out.difference or 'no touched frame came'}", hang=2)
     if wrong:
@@ -159,7 +203,7 @@ def main() -> int:
     drawing.to_file(scenes_run, Skin(), picture)
     terminal.say(f"Scenes and their zones: {picture}")
     if not wrong:
-        terminal.say("Next:\n.venv/bin/python -c \"import contactfpga; print(contactfpga.read_zones('sim://'))\"")
+        terminal.say("Next, a virtual sheet in your browser, which the mouse presses:\n.venv/bin/contactfpga view")
     return 1 if wrong else 0
 
 
@@ -168,7 +212,7 @@ def _run_all(skin: Skin) -> list[Outcome]:
     outcomes = []
     with pool.progress() as step:
         for name, engine in runs:
-            outcomes.append(run(name, engine, skin))
+            outcomes.append(run(name, engine, with_force() if name == FORCED else skin))
             step("scenes", len(runs))
     return outcomes
 

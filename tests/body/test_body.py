@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import threading
 import time
 
@@ -14,7 +15,11 @@ from model_board import DirectPort
 import contactfpga
 from contactfpga import cli
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints, NoLinkData, OpenBody
+from contactfpga.body.pose import Pose
 from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.zone import Zones
 
 URDF = """<robot name="two"><link name="torso"/><link name="arm"/>
 <joint name="elbow" type="revolute"><parent link="torso"/><child link="arm"/>
@@ -46,6 +51,13 @@ def robot(tmp_path):
     (tmp_path / "flat.toml").write_text(FLAT.to_toml())
     (tmp_path / "robot.toml").write_text(ROBOT)
     return tmp_path / "robot.toml"
+
+
+@pytest.fixture
+def patient(robot):
+    """The same, for threads on a machine that is busy."""
+    robot.write_text(ROBOT.replace("[[links]]", "[[links]]\nlate_s = 1.0\nsilent_s = 1.5"))
+    return robot
 
 
 class Streaming(DirectPort):
@@ -123,6 +135,55 @@ def test_contacts_lie_where_the_geometry_says(robot):
     json.dumps(arm.to_dict())
 
 
+def test_force_is_that_which_the_units_measure(robot):
+    robot.write_text(ROBOT.replace("mirrored = true", 'units = "units.toml"'))
+    shutil.copy(contactfpga.examples() / "units.toml", robot.parent / "units.toml")
+    body = Body.load(robot)
+    cells = body.links["chest"].units
+    state = state_of(FLAT, 3, 5, 10.0)
+    push = np.array([0.5, -0.25, -4.0])
+    exerted = np.concatenate([push, np.cross([0.03, 0.05, 0.0], push)])
+    readings = cells.zeros + np.linalg.pinv(cells.matrix) @ exerted
+    state.zones._units = UnitSamples(0, tuple(readings.tolist()), (0.0,) * 6, (False,) * 6)
+    snapshot = Snapshot(body, 10.0, {"chest": state, "arm": state_of(ROUND, 0, 0, 10.0)}, lambda _: {"elbow": 0.0})
+    chest, arm = snapshot.contacts(links=["chest", "arm"])
+    assert chest.force_n == pytest.approx(tuple(push))
+    assert chest.normal_n == pytest.approx(4.0)
+    assert (arm.force_n, arm.normal_n) == (None, None)
+    turned = chest.moved(Pose.of((0, 0, 1), (math.pi / 2, 0, 0)), "elsewhere")
+    assert turned.force_n == pytest.approx((0.5, 4.0, -0.25))
+
+
+def test_zone_without_a_place_is_a_contact_all_the_same(robot):
+    board = DirectPort(FLAT)
+    board.moments = [(0, 0, 0)]
+    board.frame = lambda real=board.frame: real(flags=["mismatch"])
+    with contactfpga.open(board, FLAT) as opened:
+        states = {"arm": state_of(ROUND, 3, 5, 10.0), "chest": LinkState(opened.read(), 0.0, "ok", "", 10.0)}
+    snapshot = Snapshot(Body.load(robot), 10.0, states, lambda _: {"elbow": 0.3})
+    (chest,) = snapshot.contacts(links=["chest"])
+    assert (chest.point_m, chest.normal, chest.covariance_m2, chest.flags) == (None, None, None, {"mismatch"})
+    json.dumps(chest.to_dict())
+    with pytest.raises(BodyError, match="a contact on link 'chest' has no place"):
+        snapshot.jacobian(chest)
+
+
+def test_ring_on_a_closed_sheet_is_a_contact_without_a_place(robot):
+    skin = contactfpga.Skin(rows=6, columns=8, surface="cylinder", radius_mm=40.0, closed=True, report="cells")
+    (robot.parent / "flat.toml").write_text(skin.to_toml())
+    cells = np.zeros((6, 8), bool)
+    cells[4] = cells[0, [0, 7]] = True  # a ring, and a spot that lies on the seam
+    frame = Frame(0, 0, frozenset(), 0, 0, 0, 10, np.zeros((0, 4), np.int64), cells)
+    states = {"arm": None, "chest": LinkState(Zones(frame, skin.sheet, 0), 0.0, "ok", "", 10.0)}
+    body = Body.load(robot)
+    seam, ring = Snapshot(body, 10.0, {"chest": states["chest"]}).contacts("link")
+    assert ring.point_m is None
+    assert ring.zone.area_cells == 8
+    # Mirrored, columns 7 and 0 lie where 0 and 7 did: their middle is half a column before the x axis.
+    angle = -math.tau / 16
+    assert seam.point_m == pytest.approx((0.04 * math.cos(angle), 0.04 * math.sin(angle), 0.0))
+
+
 def test_angles_are_those_of_the_frames_time(robot):
     history = JointHistory(gap_s=1.0)
     history.add(10.0, {"elbow": 0.0})
@@ -147,9 +208,9 @@ def test_base_frame_needs_angles_and_a_urdf(robot):
     assert len(snapshot.contacts("link")) == 2
 
 
-def test_open_body_goes_on_without_a_link_and_takes_it_back(robot):
+def test_open_body_goes_on_without_a_link_and_takes_it_back(patient):
     plugged = Plugged()
-    with OpenBody(Body.load(robot), lambda _: {"elbow": 0.0}, opened=plugged.opened) as body:
+    with OpenBody(Body.load(patient), lambda _: {"elbow": 0.0}, opened=plugged.opened) as body:
         assert len(body.read().contacts()) == 2
         port = plugged.ports.pop("a")
         port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
@@ -168,9 +229,19 @@ def test_open_body_goes_on_without_a_link_and_takes_it_back(robot):
         body.latest()
 
 
-def test_read_waits_for_frames_scanned_after_the_call(robot):
+def test_ids_stay_with_contacts_that_move(patient):
     plugged = Plugged()
-    with OpenBody(Body.load(robot), opened=plugged.opened) as body:
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        first = body.read().contacts("link", links=["chest"])
+        plugged.ports["b"].moments = [(4, 11, 6)]
+        moved = body.read().contacts("link", links=["chest"])
+        assert [one.track for one in first] == [one.track for one in moved] == [1]
+        assert moved[0].point_m != first[0].point_m
+
+
+def test_read_waits_for_frames_scanned_after_the_call(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         body.read()
         for port in plugged.ports.values():
             port.moments = [(9, 9, 9)]
@@ -178,9 +249,9 @@ def test_read_waits_for_frames_scanned_after_the_call(robot):
         assert [one.zone.area_cells for one in found.contacts("link")] == [9, 9]
 
 
-def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(robot):
+def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient):
     plugged = Plugged()
-    with OpenBody(Body.load(robot), opened=plugged.opened) as body:
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         with body.subscribe(maxsize=8) as queue:
             times = [queue.next().host_time_s for _ in range(5)]
             wait_for(lambda: queue.dropped > 3)
@@ -190,10 +261,10 @@ def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(robot):
             body.subscribe(0)
 
 
-def test_closing_wakes_who_waits_and_ends_all_threads(robot):
+def test_closing_wakes_who_waits_and_ends_all_threads(patient):
     plugged = Plugged()
     before = threading.active_count()
-    body = OpenBody(Body.load(robot), opened=plugged.opened)
+    body = OpenBody(Body.load(patient), opened=plugged.opened)
     queue = body.subscribe()
     body.close()
     body.close()
@@ -202,7 +273,7 @@ def test_closing_wakes_who_waits_and_ends_all_threads(robot):
     assert threading.active_count() == before
 
 
-def test_link_whose_code_fails_is_lost_and_says_why(robot):
+def test_link_whose_code_fails_is_lost_and_says_why(patient):
     plugged = Plugged()
 
     def opened(plan):
@@ -210,7 +281,7 @@ def test_link_whose_code_fails_is_lost_and_says_why(robot):
             raise ZeroDivisionError("of a scene")
         return plugged.opened(plan)
 
-    with OpenBody(Body.load(robot), opened=opened) as body:
+    with OpenBody(Body.load(patient), opened=opened) as body:
         assert str(body.latest().links["arm"]) == "lost (no frame yet; of a scene)"
         assert body.read().answering == ("chest",)
 

@@ -4,7 +4,9 @@ import dataclasses
 import itertools
 import random
 import shutil
+import struct
 import subprocess
+from pathlib import Path
 
 import c_vectors
 import pytest
@@ -33,6 +35,7 @@ SKINS = [
     Skin(rows=16, columns=16, report="barycenter", connectivity=4, zone_capacity=3),
     Skin(rows=4, columns=9, report="cells", diodes="none"),
     Skin(rows=63, columns=64, settle_us=12.0, guard=True),
+    Skin(rows=6, columns=7, connectivity=4, surface="cylinder", radius_mm=9.0, closed=True),
     Skin(rows=6, columns=5, guard=True, self_test=True, scan="reversal", precharge_us=0.25),
     Skin(rows=5, columns=4, units=3),
 ]
@@ -100,7 +103,7 @@ def hello_line(hello: Hello) -> str:
     sheet = hello.sheet
     report = ["moments", "cells", "barycenter"].index(sheet.report)
     return (
-        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity} {report} {sheet.barycenter_bits} "
+        f"hello {sheet.rows}x{sheet.columns} {sheet.connectivity}{'c' * sheet.closed} {report} {sheet.barycenter_bits} "
         f"{int(hello.send == 'on_change')} {sheet.zone_capacity} {int(sheet.ghosts)} "
         f"{int(hello.guard)} {int(hello.self_test)} "
         f"{sheet.pitch_x_mm:.17g} {sheet.pitch_y_mm:.17g} {sheet.radius_mm or 0:.17g} {hello.fingerprint.hex()} "
@@ -296,6 +299,27 @@ def test_c_and_python_agree_on_every_flipped_bit(decoder, skin):
     assert by_c(decoder, data) == by_python(data)
 
 
+def test_sweeps_out_of_time_are_counted_and_not_shown(decoder):
+    """One before the first frame, one at the time of another, an older one; then other converters, and a restart."""
+    board = ModelBoard(Skin(rows=5, columns=4, units=3))
+    wire, hello = board.wire, board.hello()
+    data = hello + wire.sweep([1, 2, 3], 100, 3)
+    data += board.frame() + b"".join(
+        wire.sweep([1, 2, 3], time_us, sequence) for time_us, sequence in [(200, 5), (200, 6), (150, 7), (300, 9)]
+    )
+    facts = wire.facts()
+    facts[9] = facts[9][:4] + struct.pack("<HI", 5, 700)
+    data += wire.hello(sent=1, facts=facts) + wire.sweep([1, 2, 3], 120, 10)
+    board.power_up()
+    data += board.hello() + board.frame() + wire.sweep([0, 4095, 3], 100, 200)
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert [line.split()[1:3] for line in said if line.startswith("sweep ")] == [
+        *(["200", "5"], ["300", "9"], ["120", "10"], ["100", "200"])
+    ]
+    assert "sweeps=7 sweeps_lost=2 sweeps_unexplained=3" in said[-1]
+
+
 def test_the_histories_hold_all_that_is_counted():
     """Otherwise the comparison would say nothing of it."""
     seen = set()
@@ -331,7 +355,8 @@ def test_a_smaller_reader_refuses_what_is_too_long_and_reads_the_rest(tmp_path):
     assert "lost=1" in lines[-1]
 
 
-def test_barycenters_in_mm(tmp_path):
+def compiled_mm(folder: Path) -> Path:
+    """A program that writes the place of each zone in mm."""
     code = r"""
 #include <stdio.h>
 #include "contactfpga.h"
@@ -351,15 +376,33 @@ int main(void) {
     return 0;
 }
 """
-    (tmp_path / "mm.c").write_text(code)
-    subprocess.run([*COMPILERS["gcc"], f"-I{FOLDER}", "-o", tmp_path / "mm", tmp_path / "mm.c"], check=True, timeout=60)
+    (folder / "mm.c").write_text(code)
+    command = [*COMPILERS["gcc"], f"-I{FOLDER}", "-o", folder / "mm", folder / "mm.c"]
+    subprocess.run(command, check=True, timeout=60)
+    return folder / "mm"
+
+
+def test_barycenters_in_mm(tmp_path):
+    mm = compiled_mm(tmp_path)
     for skin in (Skin(pitch_x_mm=9.5), Skin(report="barycenter", pitch_y_mm=3.25)):
         board = ModelBoard(skin)
         board.moments = [(3, 40, 7), (4, 10, 6)]
         data = board.hello() + board.frame()
         (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
-        found = {tuple(map(float, line.split())) for line in by_c(tmp_path / "mm", data)}
+        found = {tuple(map(float, line.split())) for line in by_c(mm, data)}
         assert found == {(zone.x_mm, zone.y_mm) for zone in arrival.zones}
+
+
+def test_a_zone_over_the_seam_has_a_place_and_a_ring_has_none(tmp_path):
+    board = ModelBoard(Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True))
+    board.moments = [(3, 12, 7, 2), (7, 21, 7, 7), (4, 10, 6, 63)]
+    data = board.hello() + board.frame()
+    (arrival,) = [event for event in Conversation("", live=False).receive(data, 0.0) if isinstance(event, Arrival)]
+    assert {zone.winding for zone in arrival.zones} == {"", "ring", "wound"}
+    mm = compiled_mm(tmp_path)
+    wanted = [f"{'nan' if zone.x_mm is None else repr(zone.x_mm)} {zone.y_mm!r}" for zone in arrival.zones]
+    found = [" ".join(repr(abs(float(word))) for word in line.split()) for line in by_c(mm, data)]
+    assert sorted(found) == sorted(wanted)
 
 
 def test_a_board_of_few_clocks_per_bit_takes_pulses(tmp_path):

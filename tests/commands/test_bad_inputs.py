@@ -77,6 +77,7 @@ def files(tmp_path_factory):
     path("BINARY").write_bytes(bytes(range(256)))
     path("RECORDED").write_bytes(Wire(Skin()).hello() + Wire(Skin()).zones([]))
     path("NO_HELLO").write_bytes(b"\x00" * 1000)
+    path("MCAP").write_bytes(b"\x89MCAP0\r\n" + bytes(range(1, 256)) * 9)
     path("FOLDER", ".npy").mkdir()
     os.mkfifo(path("FIFO", ".npy"))
     path("NONE", ".npy")
@@ -126,6 +127,8 @@ def refused(status, errors):
 PORTS = [
     *("replay:///dev/zero", "replay://FIFO", "replay://FOLDER", "replay://~nosuch/x", "replay://", "replay://a\0b"),
     *("replay://NONE", "replay://NO_HELLO", "replay://BINARY", "/dev/null", "NONE", "FOLDER", "TEXT"),
+    *("replay://RECORDED?start=1", "replay://RECORDED?link=a", "replay://RECORDED?pace=1&elbow=2", "replay://MCAP"),
+    *("replay://RECORDED?start=-1", "replay://RECORDED?pace=1&pace=2", "replay://MCAP?start=nan"),
     *("sim://x", "sim:///", "sim://?scene", "sim://?scene=", "sim://?elbow=1", "sim://?scene=elbow"),
     *("sim://?scene=a%2", "sim://?scene=%ff", "sim://?scene=palm&scene=sole", "sim://?scene=palm&threshold=1"),
     *("sim://?scene=NAN&threshold=1", "sim://?scene=FLOATS", "sim://?scene=FLOATS&threshold=nan"),
@@ -150,6 +153,14 @@ CASES = [
     ["zones", "replay://RECORDED", "--record", "RECORDED"],
     ["zones", "sim://", "--record", "FOLDER"],
     ["zones", "sim://", "--record", "/no/folder/x"],
+    *(["recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    *(["record", name, "sim://"] for name in ("x.bin", "/no/folder/x.mcap", "x")),
+    *(["record", "x.mcap", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
+    ["record", "x.mcap", "replay://NONE"],
+    ["record", "x.mcap", "sim://", "--seconds", "0"],
+    ["record", "x.mcap", "sim://", "--split-mb", "0"],
+    ["record", "x.mcap", "sim://", "--friction", "1"],
     *(["board", "--scene", name] for name in ("elbow", "", *CELLS)),
     ["board", "--link", "/no/folder/x"],
     ["build", "elbow"],

@@ -171,13 +171,13 @@ def test_the_golden_model_floods_a_cylinder(connectivity, columns):
 def test_shapes_come_out_in_their_cycles(bench, connectivity, labeller):
     for picture, _ in SHAPES.values():
         cells = cells_of(picture)
-        turned = [np.roll(cells, shift, axis=1) for shift in range(0, cells.shape[1], 1 + cells.shape[1] // 5)]
-        check_simulated(bench, np.array([way for one in turned for way in (one, one[::-1])]), connectivity, labeller)
+        check_simulated(bench, np.array([cells, np.roll(cells, 2, axis=1)[::-1]]), connectivity, labeller)
 
 
 @pytest.mark.parametrize(("connectivity", "labeller"), RULES)
-def test_every_frame_of_three_rows_and_columns_comes_out_in_its_cycles(bench, connectivity, labeller):
-    check_simulated(bench, every_frame(3, 3), connectivity, labeller)
+def test_frames_of_three_rows_and_columns_come_out_in_their_cycles(bench, connectivity, labeller):
+    """Every fifth one; the compiled labellers take all of them."""
+    check_simulated(bench, every_frame(3, 3)[connectivity // 4 :: 5], connectivity, labeller)
 
 
 @pytest.mark.parametrize(("connectivity", "labeller"), RULES)
@@ -246,7 +246,7 @@ def check_compiled(frames, connectivity, labeller, stalled=False):
 @pytest.mark.parametrize(
     ("rows", "columns", "connectivity", "labeller"),
     sample(
-        [(*size, *rule) for size in ((4, 4), (5, 4), (4, 5), (6, 3)) for rule in RULES],
+        [(*size, *rule) for size in ((4, 4), (5, 4), (4, 5), (3, 3), (6, 3)) for rule in RULES],
         quick=[(4, 4, 8, "run")],
     ),
 )

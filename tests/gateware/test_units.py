@@ -12,7 +12,7 @@ from contactfpga import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.units import Units
-from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, units
 from contactfpga_sim.golden.facts import facts
@@ -66,15 +66,15 @@ def setting(rng, skin):
 class Inputs:
     """A converter at the pins of a component in the bench."""
 
-    def __init__(self, pins, timeline):
-        self.targets, self.watched = [pins.spi_miso], []
-        self._pins = [Value.cast(getattr(pins, name)) for name in converter.PINS]
-        self._model, self._units = converter.Mcp3208([0] * 8), dict(timeline.units)
+    def __init__(self, pins, timeline, model=converter.Mcp3208):
+        self._model, self._units = model([0] * 8), dict(timeline.units)
+        self.targets, self.watched = [getattr(pins, name) for name in self._model.gives], []
+        self._pins = [Value.cast(getattr(pins, name)) for name in self._model.reads]
 
     def drive(self, cycle, ctx):
         codes = self._units.get(cycle, [])
         self._model.codes[: len(codes)] = codes
-        return (self._model.step(*(ctx.get(pin) for pin in self._pins)),)
+        return self._model.step(*(ctx.get(pin) for pin in self._pins))
 
     def note(self, _cycle):
         pass
@@ -179,7 +179,7 @@ def test_pins_keep_the_times_of_the_data_sheet(bench, clock_hz, supply_v):
     skin = Skin(clock_hz=clock_hz, baud=clock_hz // 12, units=3, converter_v=supply_v, settle_us=100)
     dut = Mcp3208(skin)
     sim = bench(dut)
-    clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.PINS)
+    clock, select_n, mosi = (sim.watch(getattr(dut.pins, name)) for name in converter.Mcp3208.reads)
     sim.run(4 * Derived(skin).units.spacing_clocks)
     s, most_hz = 1 / clock_hz, LIMITS[supply_v][0]
     edges = changes(clock.values)
@@ -278,3 +278,50 @@ def packets(sent):
                 found.append((sent[begin][0], sent[begin][1], bytes(byte for _, byte in sent[begin:end])))
             begin = end + 1
     return found
+
+
+PACED = Skin(**SMALL, units=3, converter="ads131m08", unit_sums=[[1, 1, 1], [127, -127, 3]])
+
+
+def wide_readings(rng, skin, cycles):
+    """Of 24 bits, at random changes."""
+    ends = [0, 2**24 - 1, 2**23]
+    return [
+        (start, [rng.choice([*ends, rng.randrange(2**24)]) for _ in range(skin.units)])
+        for start in range(0, cycles, 701)
+    ]
+
+
+def test_a_converter_with_its_own_pace_in_every_clock(bench, rng):
+    skin, cycles = PACED, 29_500
+    requests = [
+        Request(cycle, 1, False, (rng.choice([THRESHOLD, ZERO]), rng.randrange(3) | rng.randrange(2**18) << 3))
+        for cycle in range(cycles)
+        if rng.random() < 0.003
+    ]
+    timeline = Timeline([], units=wide_readings(rng, skin, cycles))
+    expected = units.play(facts(skin), timeline, requests, cycles)
+    dut = Units(skin)
+    sim = bench(dut)
+    sim._add(Inputs(dut.pins, timeline, converter.Ads131m08))
+    orders = {one.cycle: one.command for one in requests}
+    sim.drive(dut.command, lambda cycle: int(cycle in orders))
+    sim.drive(dut.what, lambda cycle: orders.get(cycle, (0, 0))[0])
+    sim.drive(dut.value, lambda cycle: orders.get(cycle, (0, 0))[1])
+    over, due = sim.watch(dut.over), sim.watch(dut.packet.due)
+    sim.run(cycles)
+    assert changes(over.values) == [one for one in expected.over if one[0] < cycles]
+    assert due.values.index(1) == expected.packets[0][0]
+    assert len(expected.over) > 2
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("hz", [1_000_000, 12_000_000, 25_000_000, 48_000_000])
+def test_a_board_with_such_a_converter_does_what_the_golden_model_says(hz):
+    skin = PACED.replace(clock_hz=hz, baud=hz // 4, units=8, unit_sums=[[1] * 8])
+    cycles = 6 * Derived(skin).units.sweep_clocks
+    rng = random.Random(5)
+    command_bytes = command(129 * 128 + 1, THRESHOLD, 1 | 2**12 << 3, bit_clocks=4)
+    timeline = Timeline([], [(300, command_bytes)], units=wide_readings(rng, skin, cycles))
+    expected = predict(skin, timeline, cycles)
+    assert compare(expected, bench_native.run(skin, timeline, cycles)) > 100

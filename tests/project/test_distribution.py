@@ -203,6 +203,7 @@ def test_the_host_alone_decodes_a_frame(host, tmp_path):
         ("chart", "chart"),
         ("fit scenes.toml", "chart"),
         ("build icebreaker", "boards"),
+        ("ros sim://", "ros"),
     ],
 )
 def test_the_host_alone_names_the_extra_that_is_missing(host, command, extra):

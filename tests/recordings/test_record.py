@@ -224,3 +224,22 @@ def test_a_port_that_is_lost_leaves_a_whole_file(tmp_path, capsys):
         with pytest.raises(contactfpga.PortLost):
             session.stop()
     assert Recording(tmp_path / "x.mcap").links
+
+
+def test_bytes_that_wait_are_written_though_a_recording_is_played_slowly(tmp_path):
+    """Its times are the board's, but what waits is timed by this computer's clock."""
+    from model_board import ModelBoard
+    from recorded_stream import SKIN as PLAIN
+
+    model = ModelBoard(PLAIN)
+    data = model.hello()
+    for _ in range(6):
+        data += model.frame()
+        model.time_us += 50_000
+    (tmp_path / "x.bin").write_bytes(data)
+    with Session(tmp_path / "x.mcap") as session:
+        session.add(f"replay://{tmp_path / 'x.bin'}?pace=1")
+        session.start()
+        while session.running:
+            session.wait(1.0)
+    assert len(list(Recording(tmp_path / "x.mcap").raw_bytes())) > 3

@@ -30,15 +30,25 @@ def record(file, port, **options):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
-class Sender:
-    """Sends frames through a fake board, fast or slowly, and knows what it sent and when."""
+def frames(board):
+    """What it sends next, in pieces."""
+    made = ModelBoard(SKIN)
+    made.sent, made.time_us, made.heard = board.sent, board.time_us, board.heard
+    return [b"".join(made.frame() for _ in range(20)) for _ in range(60)]
 
-    def __init__(self, board, pause_s):
-        self.sent, self.when = bytearray(), []
+
+def noise(_board):
+    """No packet at all, which nothing can compress: far more bytes than frames would be."""
+    return [os.urandom(4096).replace(b"\0", b"\1") for _ in range(80)]
+
+
+class Sender:
+    """Sends pieces through a fake board, fast or slowly, and knows how much it sent."""
+
+    def __init__(self, board, pieces, pause_s):
+        self.sent = bytearray()
         self._board, self._pause_s, self._stop = board, pause_s, threading.Event()
-        made = ModelBoard(SKIN)
-        made.sent, made.time_us, made.heard = board.sent, board.time_us, board.heard
-        self._pieces = [b"".join(made.frame() for _ in range(20)) for _ in range(60)]
+        self._pieces = pieces(board)
         self._thread = threading.Thread(target=self._run)
 
     def _run(self):
@@ -46,7 +56,6 @@ class Sender:
             piece = self._pieces.pop(0)
             self._board.send(piece)
             self.sent += piece
-            self.when.append((time.monotonic(), len(self.sent)))
             time.sleep(self._pause_s)
 
     def __enter__(self):
@@ -58,16 +67,17 @@ class Sender:
         self._thread.join()
 
 
-def test_after_kill_9_hardly_anything_is_lost(tmp_path, capsys):
+@pytest.mark.parametrize("pieces", [frames, noise])
+def test_after_kill_9_hardly_anything_is_lost(tmp_path, capsys, pieces):
+    """The real command. Others use this computer as well, so twice as much may wait as should."""
     file = tmp_path / "touches.mcap"
     with FakeBoard(SKIN) as board:
         process = record(file, board.path)
         try:
             wait_until(lambda: file.exists() and file.stat().st_size > 0)
-            with Sender(board, 0.01) as sender:
-                wait_until(lambda: len(sender.sent) > 12_000)
-                waiting = board.waiting()
-                killed_s = time.monotonic()
+            with Sender(board, pieces, 0.02) as sender:
+                wait_until(lambda: len(sender.sent) > (12_000 if pieces is frames else 4 * LOST_BYTES))
+                came = len(sender.sent) - board.waiting()
                 process.send_signal(signal.SIGKILL)
         finally:
             process.kill()
@@ -81,10 +91,7 @@ def test_after_kill_9_hardly_anything_is_lost(tmp_path, capsys):
     assert begun >= 0
     kept = kept[begun:]
     assert bytes(sender.sent[: len(kept)]) == kept  # from the first byte on, with none missing in between
-    came = max(count for when, count in sender.when if when <= killed_s) - waiting
-    assert came - len(kept) < LOST_BYTES
-    early = max((count for when, count in sender.when if when <= killed_s - 10 * LOST_S), default=0)
-    assert len(kept) >= early - waiting  # ten times as long, as others use this computer as well
+    assert came - len(kept) < 2 * LOST_BYTES
 
 
 def test_no_more_waits_than_what_may_be_lost(tmp_path):
@@ -129,12 +136,13 @@ def recovered_frames(file, folder):
     return len(list(Recording(into).frames()))
 
 
-def test_ctrl_c_closes_the_file(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_ends_a_program_closes_the_file(tmp_path, number):
     with FakeBoard(SKIN) as board:
         file = tmp_path / "x.mcap"
         process = record(file, board.path)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, errors = process.communicate(timeout=LONG)
     assert process.returncode == 0
     assert errors == ""
@@ -154,7 +162,7 @@ def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
         file = tmp_path / "x.mcap"
         process = record(file, board.path, preexec_fn=limited)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
-        with Sender(board, 0.002):
+        with Sender(board, frames, 0.002):
             _, errors = process.communicate(timeout=LONG)
     assert process.returncode == 1
     assert f"{file}: there is no room for more (File too large); the 0.0 MB that are there are whole" in errors

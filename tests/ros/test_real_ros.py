@@ -8,14 +8,12 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from fake_board import FakeBoard
+from ros_board import SKIN, flowing
 from ros_environment import DISTRIBUTIONS, Environment
 
-from contactfpga import Skin
 from contactfpga.ros.hashes import type_hash
 from contactfpga.ros.settings import TOPICS
 
@@ -24,8 +22,7 @@ pytestmark = [pytest.mark.campaign, pytest.mark.timeout(3600)]
 ROOT = Path(__file__).resolve().parents[2]
 LISTENER = ROOT / "tests" / "support" / "ros_listener.py"
 DOMAINS = {"jazzy": 91, "kilted": 92}
-DEACTIVATE, ACTIVATE = 4, 3
-"""Transitions of a lifecycle node."""
+TRANSITIONS = {"configure": 1, "cleanup": 2, "activate": 3, "deactivate": 4}
 
 
 @pytest.fixture(scope="module", params=DISTRIBUTIONS)
@@ -42,15 +39,8 @@ def ros(request):
 
 @pytest.fixture
 def port():
-    """Of a board that sends a frame each millisecond, and a hello now and then."""
-    with FakeBoard(Skin(name="forearm")) as board:
-        board.stream = lambda: sent(board)
-        yield board.path
-
-
-def sent(board):
-    time.sleep(0.001)
-    return (board.hello() if board.sent % 400 == 0 else b"") + board.frame()
+    with flowing() as path:
+        yield path
 
 
 @contextlib.contextmanager
@@ -75,7 +65,7 @@ def heard(ros, domain, *orders, seconds=12):
 
 
 def check(found):
-    """The zone of :class:`FakeBoard`, 4 cells at column 2.5 and row 1.5, in every message that tells of it."""
+    """The zone of the board, 4 cells at column 2.5 and row 1.5, in every message that tells of it."""
     came = found["came"]
     assert set(came) == {"/skin/skin", "/skin/zones", "/skin/tracks", "/skin/contacts", "/skin/markers", "/tf_static",
                          "/diagnostics"}  # fmt: skip
@@ -86,10 +76,10 @@ def check(found):
     assert (zone["area_cells"], zone["sum_x"], zone["sum_y"], zone["x"], zone["y"]) == (4, 10, 6, 0.025, 0.015)
     assert contact["position"] == zone["position"] == {"x": 0.025, "y": 0.015, "z": 0.0}
     assert contact["name"] == f"forearm/{track['id']}"
-    assert came["/skin/skin"]["last"]["fingerprint"] == list(Skin(name="forearm").fingerprint)
+    assert came["/skin/skin"]["last"]["fingerprint"] == list(SKIN.fingerprint)
     assert came["/tf_static"]["last"]["transforms"][0]["child_frame_id"] == "forearm"
     assert "contacts" in {marker["ns"] for marker in came["/skin/markers"]["last"]["markers"]}
-    assert came["/diagnostics"]["last"]["status"][0]["hardware_id"] == Skin().fingerprint.hex()
+    assert came["/diagnostics"]["last"]["status"][0]["hardware_id"] == SKIN.fingerprint.hex()
 
 
 def test_ros_reads_what_we_publish_without_ros(ros, port):
@@ -108,10 +98,11 @@ def test_ros_reads_what_we_publish_without_ros(ros, port):
 def test_the_node_publishes_and_follows_its_lifecycle(ros, port):
     domain = DOMAINS[ros.distribution] + 10
     command = [ros.python, "-m", "contactfpga_ros.skin", "--ros-args", "-p", f"port:={port}", "-p", "parent:=base"]
+    orders = {6: "deactivate", 7: "cleanup", 8: "configure", 9: "activate"}
     with running(command, ros.variables(domain)):
-        found = heard(ros, domain, f"{DEACTIVATE}@6", f"{ACTIVATE}@9", seconds=16)
+        found = heard(ros, domain, *(f"{TRANSITIONS[name]}@{at}" for at, name in orders.items()), seconds=16)
     check(found)
-    assert found["states"] == [[True, "inactive"], [True, "active"]]
+    assert found["states"] == [[True, name] for name in ("inactive", "unconfigured", "inactive", "active")]
     at_s = found["came"]["/skin/zones"]["at_s"]
     assert max(after - before for before, after in itertools.pairwise(at_s)) > 1.5
     assert max(at_s) > 14
@@ -122,8 +113,7 @@ def test_the_node_says_that_no_board_is_there_and_goes_on_when_it_comes(ros, tmp
     command = [ros.python, "-m", "contactfpga_ros.skin", "--ros-args", "-p", f"port:={link}", "-p", "retry_s:=0.2"]
     with running([*command, "-p", "parent:=base"], ros.variables(domain)):
         absent = heard(ros, domain, seconds=6)["came"]
-        with FakeBoard(Skin(name="forearm"), link) as board:
-            board.stream = lambda: sent(board)
+        with flowing(link):
             check(heard(ros, domain))
     assert set(absent) == {"/diagnostics"}
     assert absent["/diagnostics"]["last"]["status"][0]["level"] == [2]

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import subprocess
 import sys
 
@@ -16,6 +17,7 @@ from contactfpga.skin.derived import Derived
 
 LONG = {"settle_us": 1000.0}  # no row too short for what the rest asks of it
 
+CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
 REFUSED = [
     ({"name": 7}, "name is 7; it must be a string"),
@@ -97,14 +99,35 @@ REFUSED = [
     ({"surface": "cylinder", "radius_mm": -50}, "radius_mm is -50.0; it must lie between 0.1 and 100000.0 mm"),
     (
         {"surface": "cylinder", "radius_mm": 25},
-        "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet, which is not "
-        "supported; use at most 15 columns",
+        "16 columns of 10.0 mm take 160 mm of a circumference of 157.08 mm: the sheet's ends meet; set "
+        "closed = true, or use at most 15 columns",
     ),
     (
         {"surface": "cylinder", "radius_mm": 1.0, "columns": 1},
-        "1 columns of 10.0 mm take 10 mm of a circumference of 6.28319 mm: the sheet's ends meet, which is not "
-        "supported; use a larger radius_mm or a smaller pitch_x_mm",
+        "1 columns of 10.0 mm take 10 mm of a circumference of 6.28319 mm: the sheet's ends meet; set "
+        "closed = true, or use a larger radius_mm or a smaller pitch_x_mm",
     ),
+    ({"closed": 1}, "closed is 1; it must be true or false"),
+    ({"closed": True}, "surface is 'plane'; closed = true needs surface = 'cylinder' and radius_mm"),
+    ({**CLOSED, "columns": 2}, "columns is 2; closed = true needs at least 3"),
+    (
+        {**CLOSED, "pitch_x_mm": 9.9},
+        "pitch_x_mm is 9.9; 16 columns around a radius of 25 mm have 9.81748 mm, leave it out",
+    ),
+    (
+        {**CLOSED, "radius_mm": 20_000.0},
+        "16 columns around a radius of 20000 mm have a pitch of 7853.98 mm; it must lie between 0.01 and 1000.0 mm",
+    ),
+    ({**CLOSED, "labeller": "single"}, "labeller is 'single'; closed = true needs labeller = 'run' or 'serial'"),
+    (
+        {**CLOSED, "labeller": "projection"},
+        "labeller is 'projection'; closed = true needs labeller = 'run' or 'serial'",
+    ),
+    (
+        {**CLOSED, "report": "barycenter"},
+        "report is 'barycenter'; closed = true needs report = 'moments' or 'cells'",
+    ),
+    ({**CLOSED, "diodes": "none", "connectivity": 4}, "diodes is 'none'; closed = true needs 'col2row' or 'row2col'"),
     # its mask
     ({"mask": 3}, "mask is 3; it must be a list of [row, column]"),
     ({"mask": "ab"}, "mask is 'ab'; it must be a list of [row, column]"),
@@ -375,6 +398,27 @@ def test_a_cylinder_takes_as_many_columns_as_the_message_says(radius_mm):
         Skin(columns=most + 1, **fields)
 
 
+def test_the_pitch_of_a_closed_sheet_follows_from_its_radius():
+    skin = Skin(**CLOSED)
+    assert skin.pitch_x_mm == 2 * math.pi * 25 / 16
+    assert skin == Skin(**CLOSED, pitch_x_mm=9.8175), "a pitch that is rounded is made exact"
+    assert skin.replace(columns=8).pitch_x_mm == 2 * math.pi * 25 / 8
+    assert skin.replace(radius_mm=50.0).pitch_x_mm == 2 * math.pi * 50 / 16
+    assert skin.fingerprint != Skin(surface="cylinder", radius_mm=25, pitch_x_mm=9.8).fingerprint
+
+
+@pytest.mark.parametrize(("connectivity", "zones"), [(8, 3 * 3), (4, 5 * 3)])
+def test_the_most_zones_around_a_cylinder(connectivity, zones):
+    """Of 5x7: a row holds no more runs than half its columns."""
+    assert Skin(**CLOSED, rows=5, columns=7, connectivity=connectivity).max_zones() == zones
+
+
+def test_a_closed_sheet_is_read_from_the_file_that_is_written_of_it(tmp_path):
+    skin = Skin(**CLOSED, columns=7)
+    (tmp_path / "skin.toml").write_text(skin.to_toml())
+    assert Skin.load(tmp_path / "skin.toml") == skin
+
+
 def test_a_small_baud_error_is_accepted():
     assert Derived(Skin(baud=921_600)).bit_clocks == 13
 
@@ -569,6 +613,7 @@ OTHER = {
 def test_every_field_is_in_the_fingerprint():
     others = [Skin(**{name: value}) for name, value in OTHER.items()]
     others += [Skin(surface="cylinder", radius_mm=radius_mm) for radius_mm in (100.0, 101.0)]
+    others.append(Skin(**CLOSED))
     registers = Skin(row_drive="74hc595", column_read="74hc165")
     only_there = {"row_chains": 2, "column_chains": 2, "shift_hz": 4_000_000}
     others += [registers, *(registers.replace(**{name: value}) for name, value in only_there.items())]
@@ -584,7 +629,17 @@ def test_every_field_is_in_the_fingerprint():
     measured = Skin(units=2)
     of_units = {"converter": "toy_converter:MINE", "converter_v": 5.0, "unit_sums": ((1, 1),)}
     others += [measured, *(measured.replace(**{name: value}) for name, value in of_units.items())]
-    elsewhere = {"units", "name", "surface", "radius_mm", "scan", "project_us", "barycenter_bits", "self_test"}
+    elsewhere = {
+        "units",
+        "name",
+        "closed",
+        "surface",
+        "radius_mm",
+        "scan",
+        "project_us",
+        "barycenter_bits",
+        "self_test",
+    }
     assert {*OTHER, *elsewhere, *only_there, *of_units} == {field.name for field in dataclasses.fields(Skin)}
     assert len({skin.fingerprint for skin in [Skin(), *others]}) == len(others) + 1
 

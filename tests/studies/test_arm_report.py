@@ -183,7 +183,8 @@ def test_the_pages_set_is_what_the_command_gives(found):
 
 
 def test_the_page_has_a_section_for_every_table():
-    assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == ["set", "sheet", "speeds", "pushes", "failures", "steps"]
+    named = ["set", "sheet", "speeds", "defense", "pushes", "failures", "steps"]
+    assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == named
     assert writer.update("<!-- figures: steps -->\nold\n<!-- end -->", {"steps": lambda: "new"}) == (
         "<!-- figures: steps -->\nnew\n<!-- end -->"
     )

@@ -24,6 +24,7 @@ SKINS = {
     "faults": Skin(rows=3, columns=4, guard=True),
     "pressure units": Skin(rows=5, columns=4, units=3),
     "overflow": Skin(rows=8, columns=8, zone_capacity=2, connectivity=4),
+    "around a cylinder": Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True),
 }
 
 
@@ -58,7 +59,8 @@ def _stream(skin: Skin, seed: int) -> str:
     report = ["moments", "cells", "barycenter"].index(skin.report)
     bits = skin.barycenter_bits if known.divided else 0
     lines.append(
-        f"hello {skin.rows}x{skin.columns} {skin.connectivity} {report} {bits} {int(skin.send == 'on_change')} "
+        f"hello {skin.rows}x{skin.columns} {skin.connectivity}{'c' * skin.closed} {report} {bits} "
+        f"{int(skin.send == 'on_change')} "
         f"{skin.zone_capacity} {int(skin.diodes == 'none')} {int(skin.guard)} "
         f"{int(skin.self_test)} {skin.pitch_x_mm:.17g} {skin.pitch_y_mm:.17g} "
         f"{skin.radius_mm or 0:.17g} {known.fingerprint.hex()} {skin.clock_hz} {skin.baud} {sent} {epoch} {heard} "
@@ -98,11 +100,13 @@ def _frame(wire: Wire, rng, index: int, sent: int, heard: int):
     return data, [",".join(map(str, row)) for row in carried], area, len(rows), len(flags)
 
 
-def _zone(skin: Skin, rng, whole: bool, divided: bool) -> tuple[int, int, int]:
+def _zone(skin: Skin, rng, whole: bool, divided: bool) -> tuple[int, ...]:
     columns, rows = skin.columns, skin.rows
     area = rows * columns if whole else int(rng.integers(1, max(2, min(9, rows * columns // 4))))
     x, y = (rng.integers(0, columns, area), rng.integers(0, rows, area)) if not whole else np.indices((columns, rows))
     sums = int(x.sum()), int(y.sum())
+    if skin.closed:
+        return area, *sums, [0, area, 63][int(rng.integers(3))]
     if not divided:
         return area, *sums
     return area, *((2 * total * 2**skin.barycenter_bits + area) // (2 * area) for total in sums)

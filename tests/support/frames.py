@@ -11,8 +11,14 @@ def moments(rng, skin, zones):
     rows = []
     for _ in range(zones):
         area = rng.randrange(1, 10)
-        rows.append((area, rng.randrange(area * (skin.columns - 1) + 1), rng.randrange(area * (skin.rows - 1) + 1)))
+        row = area, rng.randrange(area * (skin.columns - 1) + 1), rng.randrange(area * (skin.rows - 1) + 1)
+        rows.append(row + ((past(rng, skin, area),) if skin.closed else ()))
     return rows
+
+
+def past(rng, skin, area):
+    """Cells past the seam, or a ring, or wound."""
+    return rng.choice([rng.randrange(area), area, (1 << (skin.rows * skin.columns).bit_length()) - 1])
 
 
 def frame(rng, skin, zones=None):

@@ -8,6 +8,7 @@ import time
 
 import rclpy
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 TOPICS = {
@@ -30,6 +31,8 @@ def plain(value):
         return list(value)
     if isinstance(value, (str, int, float, bool)):
         return value
+    if hasattr(value, "tolist"):  # numpy's
+        return value.tolist()
     return [plain(one) for one in value]
 
 
@@ -38,6 +41,8 @@ class Listener:
 
     def __init__(self):
         self.node = rclpy.create_node("listener")
+        self.executor = SingleThreadedExecutor()  # that of rclpy.spin_once takes the node in and out each time
+        self.executor.add_node(self.node)
         self.begun = time.monotonic()
         self.came = {}
         for topic, kind in TOPICS.items():
@@ -62,7 +67,7 @@ class Listener:
         if not client.wait_for_service(timeout_sec=10):
             raise SystemExit(f"/skin/{name} is not there")
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(self.node, future, timeout_sec=10)
+        self.executor.spin_until_future_complete(future, timeout_sec=10)
         return future.result()
 
     def hashes(self):
@@ -79,7 +84,7 @@ def main():
     orders = sorted((float(at), int(number)) for number, at in (order.split("@") for order in sys.argv[2:]))
     until = listener.begun + float(sys.argv[1])
     while time.monotonic() < until:
-        rclpy.spin_once(listener.node, timeout_sec=0.05)
+        listener.executor.spin_once(timeout_sec=0.05)
         if orders and time.monotonic() - listener.begun >= orders[0][0]:
             request = ChangeState.Request()
             request.transition.id = orders.pop(0)[1]

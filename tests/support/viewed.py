@@ -17,6 +17,7 @@ class Page:
         self._socket = socket_of(port, guard, **asked)
         self.heard = []
         """Messages as dictionaries."""
+        self._waiting = []
 
     def __enter__(self):
         return self
@@ -32,10 +33,11 @@ class Page:
         """Until a message is ``wanted``, which is returned."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
-            for message in unpacked(self._socket.recv(timeout=seconds)):
-                self.heard.append(message)
+            while self._waiting:
+                self.heard.append(message := self._waiting.pop(0))
                 if wanted(message):
                     return message
+            self._waiting += unpacked(self._socket.recv(timeout=seconds))
         raise AssertionError(f"heard only {sorted({message['type'] for message in self.heard})}")
 
 

@@ -80,13 +80,14 @@ class Wire:
         counted = 24 + 8 + 3 + self.known.area_bits + self.known.zones_bits
         self.overwritten_bits = -(-(counted + 4) // 8) * 8 - counted
 
-    def record(self, area, sum_x, sum_y) -> bytes:
+    def record(self, area, sum_x, sum_y, turned=0) -> bytes:
         """A zone's record; with ``report = "barycenter"`` of area, x and y in steps of 1/2^bits of a cell."""
         known = self.known
         if known.divided:
             area_bits, x_bits, y_bits = known.barycenter_bits
             return fields((area % (1 << area_bits), area_bits), (sum_x, x_bits), (sum_y, y_bits))
-        return fields((area, known.area_bits), (sum_x, known.sum_x_bits), (sum_y, known.sum_y_bits))
+        past = [(turned, known.area_bits)] if self.skin.closed else []
+        return fields((area, known.area_bits), (sum_x, known.sum_x_bits), (sum_y, known.sum_y_bits), *past)
 
     def trailer(self, *, time=0, sequence=0, overwritten=0, heard=1, cells=0, zones=0) -> bytes:
         return fields(
@@ -143,7 +144,7 @@ class Wire:
         skin = self.skin
         report = ["moments", "cells", "barycenter"].index(skin.report)
         bits = skin.barycenter_bits if skin.report == "barycenter" else 0
-        sizes = (skin.rows, skin.columns, skin.connectivity, report, bits, skin.send == "on_change")
+        sizes = (skin.rows, skin.columns, skin.connectivity + 128 * skin.closed, report, bits, skin.send == "on_change")
         facts = {
             SHEET: struct.pack("<BBBBBBHBB", *sizes, skin.zone_capacity, skin.diodes == "none", skin.guard),
             PITCH: struct.pack("<dd", skin.pitch_x_mm, skin.pitch_y_mm),

@@ -1,6 +1,7 @@
 """The parts of the view that know no browser: places, fingers, pace, counters, what is drawn."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from contactfpga.tracking.tracker import Tracker
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
 from contactfpga.view.meter import CHART_S, Meter
-from contactfpga.view.pace import MAX_LAG_S, Pace
+from contactfpga.view.pace import MAX_LAG_S, MOMENT_S, Pace
 from contactfpga.view.tiles import Tiles
 from contactfpga.zones.batch import Batch
 
@@ -228,3 +229,37 @@ def test_a_trail_shows_the_last_second_of_each_contact():
     assert moving[:, 0, 0].min() == pytest.approx(0.010)
     assert moving[:, 1, 0].max() == pytest.approx(0.030)
     assert math.dist(lines[-1][0], lines[-1][1]) == pytest.approx(0)
+
+
+def test_a_slow_machine_simulates_less_at_a_time():
+    """And no less than before, however long it takes to draw: else it would come to a stop."""
+    pace = Pace(0.0, lambda: 0.0)
+    assert pace.most_s == pytest.approx(MOMENT_S)
+    for _ in range(50):
+        pace.ran(pace.most_s, pace.most_s / 0.1)  # a tenth of real time
+    assert pace.most_s == pytest.approx(0.1 * MOMENT_S, rel=0.01)
+
+
+def test_latency_is_from_the_sample_to_the_last_byte():
+    """Of a board with a clock of its own it takes the host's estimate of the sample's moment."""
+    names = ["time_us", "host_time_s", "arrived_s"]
+    frames = np.zeros(5, [(name, float) for name in names])
+    frames["time_us"], frames["arrived_s"] = 1e6 * np.arange(5), np.arange(5) + 250e-6
+    frames["host_time_s"] = np.arange(5) + 100e-6
+    for virtual, late_s in ((True, 250e-6), (False, 150e-6)):
+        meter = Meter()
+        assert meter.late_s is None
+        meter.take_latency(SimpleNamespace(frames=frames), virtual)
+        assert meter.late_s == pytest.approx(late_s)
+
+
+def test_silence_is_said(board):
+    """No data is never no contact: what is drawn then is said to be old."""
+    import contactfpga
+    from contactfpga.view.sources import BoardSource
+
+    with contactfpga.open(board.path) as port:
+        source = BoardSource(port, "board")
+        assert "no data" not in dict(source.told())
+        port._link.last_s -= 2.0
+        assert dict(source.told())["no data"].startswith("for 2.")

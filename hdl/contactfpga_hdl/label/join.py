@@ -2,7 +2,7 @@
 
 import math
 
-from amaranth.hdl import Array, Module, Mux, Signal, Value
+from amaranth.hdl import Array, Const, Module, Mux, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -76,8 +76,8 @@ class Join(wiring.Component):
                 m.d.comb += current.open.eq(self.step.seam)
             m.d.comb += turns.seam.eq(~self.step.has_before & ~self.step.has_run)
             pop = pop | turns.seam & (stack.level != 0)
-            turns.find(m, self.step, current, pop, earlier, turned)
-            turns.keep(m, works, self.step, earlier, later)
+            turns.find(m, current.turn, self.step.has_before & earlier, pop, Const(0), turned)
+            turns.keep(m, works & self.step.has_before, earlier, later)
         passed = self.step.has_before & ~later  # the last run of its zone
         begun = self.step.has_before & ~earlier  # the first one
         joined = self._take_in(m, current, pop, stack.top, turns)

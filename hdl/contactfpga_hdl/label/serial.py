@@ -12,8 +12,9 @@ from amaranth.lib import data, memory, wiring
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.ports import labeller_ports
+from contactfpga_hdl.label.serial_turns import SerialTurns, stored_turns
 from contactfpga_hdl.label.steps import nesting, place_of
-from contactfpga_hdl.payloads import moments_layout
+from contactfpga_hdl.label.unwrap import kept_layout, zone_of
 
 
 class _Walk:
@@ -54,6 +55,7 @@ class _Acts:
         self.adds = Signal()  # the cell is added
         self.starts = Signal()  # and it is the first of its run
         self.joins = Signal()  # the run of the row before joins the group
+        self.apart = Signal()  # and does not touch the column to the left
 
 
 class _Group:
@@ -65,14 +67,14 @@ class _Group:
         self.first = Signal(place_bits)  # place of the first of them, or of the column to the left
         self.end = Signal(place_bits)  # place of the last one
         self.innermost = Signal(place_bits)  # of the groups that wait, the one to go on next
-        self.moments = Signal(moments_layout(derived))
+        self.moments = Signal(kept_layout(derived))
 
 
 def _stored_layout(derived: Derived, place_bits: int) -> data.StructLayout:
     """A group that waits, or a zone of the row before; ``below`` is the place of the group that waits next."""
-    return data.StructLayout(
-        {"moments": moments_layout(derived), "has_run": 1, "first": place_bits, "end": place_bits, "below": place_bits}
-    )
+    places = {"first": place_bits, "end": place_bits, "below": place_bits}
+    turns = stored_turns() if derived.skin.closed else {}
+    return data.StructLayout({"moments": kept_layout(derived), "has_run": 1, **places, **turns})
 
 
 class SerialLabeller(wiring.Component):
@@ -80,7 +82,7 @@ class SerialLabeller(wiring.Component):
 
     A row of C columns takes C + e + 2 clocks, and a zone leaves a clock after the last column of its last cluster
     (docs/timing.md). e is the number of runs in the row before, so at most ceil(C/2), with 8-connectivity; with 4 it
-    is at most C.
+    is at most C. Where the ends of the sheet meet, a row takes two clocks more if it is joined over the seam.
 
     rows (in): a frame's rows in ascending order.
     records (out): its zones, then an end mark.
@@ -93,45 +95,67 @@ class SerialLabeller(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         walk, acts = _Walk(self.derived), _Acts()
+        around = SerialTurns(self.derived) if self.derived.skin.closed else None
         group = _Group(self.derived, len(walk.place))
         # Does the zone of the run of the row before have others in that row?
         earlier = Signal()
         later = Signal()
         m.submodules.earlier = earlier_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
         m.submodules.later = later_runs = memory.Memory(shape=1, depth=self.derived.open_zones, init=[])
-        self._walk(m, walk, acts)
-        self._cut(m, walk, acts, earlier & ~group.whole)
+        self._walk(m, walk, acts, around)
+        self._cut(m, walk, acts, earlier & ~group.whole, around)
         read_earlier = earlier_runs.read_port()
         read_later = later_runs.read_port()
         self._read_bracket(m, walk, acts, read_earlier)
         self._read_bracket(m, walk, acts, read_later)
         m.d.comb += [earlier.eq(read_earlier.data), later.eq(read_later.data)]
+        if around is not None:
+            m.submodules.linked_runs = around.linked_runs
+            read_linked = around.linked_runs.read_port()
+            self._read_bracket(m, walk, acts, read_linked)
+            with m.If(around.at_seam):
+                m.d.comb += [earlier.eq(1), later.eq(0)]
+            around.find(m, acts, earlier, later, group.whole, read_linked.data)
         # The upper half of the memory stays zero: what is read there adds nothing.
         stored = _stored_layout(self.derived, len(walk.place))
         m.submodules.groups = groups = memory.Memory(shape=stored, depth=2 << len(walk.place), init=[])
         found = self._read_group(m, walk, acts, group, groups, earlier)
         if nesting(self.derived):
-            self._nest(m, acts, group, earlier, later, found.below)
+            self._nest(m, acts, group, earlier, later, found.below, around)
+        if around is not None:
+            self._go_around(m, acts, walk, group, found, earlier, around)
         self._know_runs(m, walk, acts, group, found)
-        self._write_brackets(m, walk, acts, group, found, earlier_runs, later_runs)
+        write = self._write_brackets(m, walk, acts, group, found, earlier_runs, later_runs)
+        if around is not None:
+            write_linked = around.linked_runs.write_port()
+            m.d.comb += [
+                write_linked.en.eq(write.en),
+                write_linked.addr.eq(write.addr),
+                write_linked.data.eq(around.link(group.has_run, acts.starts, found)),
+            ]
         self._sum(m, walk, acts, group, found)
-        self._store_group(m, acts, group, groups)
+        self._store_group(m, acts, group, groups, around)
         self._let_out(m, walk, acts, group)
         return m
 
-    def _walk(self, m: Module, walk: _Walk, acts: _Acts) -> None:
+    def _walk(self, m: Module, walk: _Walk, acts: _Acts, around: SerialTurns | None) -> None:
         row = self.rows.payload
         handed = self.rows.valid & ~walk.active & ~walk.tail
-        ends = walk.column == self.derived.skin.columns - 1
+        last = walk.column == self.derived.skin.columns - 1
         m.d.comb += [
             self.rows.ready.eq(acts.enable & ~walk.active & ~walk.tail),
             walk.next_column.eq(Mux(walk.active, walk.column + 1, 0)),
         ]
+        passes, ends = acts.advance, last
+        if around is not None:
+            passes, ends = acts.advance & ~around.at_seam, last & ~around.meets
+            advance = acts.enable & walk.active & acts.advance
+            around.walk(m, acts.enable & handed, row.cells, walk.before[1:], last & ~around.at_seam, advance)
         with m.If(acts.enable):
             m.d.sync += [walk.tail.eq(0), walk.second.eq(~acts.advance)]
-            with m.If(acts.advance):
+            with m.If(passes):
                 m.d.sync += [walk.cell_left.eq(walk.cell), walk.before_left.eq(walk.cell_before)]
-            with m.If(Mux(walk.active, acts.advance, handed)):
+            with m.If(Mux(walk.active, passes, handed)):
                 m.d.sync += [
                     walk.cells.eq(Mux(walk.active, walk.cells >> 1, row.cells)),
                     walk.before.eq(Cat(walk.before[1:], walk.cell & ~walk.last)),
@@ -139,21 +163,27 @@ class SerialLabeller(wiring.Component):
                     walk.active.eq(~walk.active | ~ends),
                     walk.tail.eq(walk.active & ends),
                 ]
+            if around is not None:
+                with m.If(around.at_seam & acts.advance):
+                    m.d.sync += [walk.active.eq(0), walk.tail.eq(1)]
             with m.If(handed):
                 counted = Mux(walk.last, 0, walk.y + 1)
                 m.d.sync += [walk.last.eq(row.last), walk.y.eq(row.y if self.derived.skips else counted)]
 
-    def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value) -> None:
+    def _cut(self, m: Module, walk: _Walk, acts: _Acts, waits: Value, around: SerialTurns | None) -> None:
         """Where a cluster ends: with 8-connectivity at an empty column, otherwise where neither row goes on.
 
         ``waits``: the group waits for the run of the row before if one begins.
         """
         inside = walk.cell_left | walk.before_left
-        m.d.comb += acts.begins.eq(walk.cell_before & ~walk.before_left)
+        begins, goes_on = walk.cell_before & ~walk.before_left, walk.cell | walk.cell_before
+        if around is not None:
+            begins, goes_on = begins | around.at_seam, goes_on | around.at_seam
+        m.d.comb += acts.begins.eq(begins)
         if self.derived.skin.connectivity == 8:
             two = acts.begins
             m.d.comb += [
-                acts.closes.eq(inside & ~(walk.cell | walk.cell_before)),
+                acts.closes.eq(inside & ~goes_on),
                 acts.adds.eq(walk.cell & ~walk.second),
             ]
         else:
@@ -161,11 +191,13 @@ class SerialLabeller(wiring.Component):
             m.d.comb += ends.eq(inside & ~(walk.cell & walk.cell_left | walk.cell_before & walk.before_left))
             two = acts.begins | ends & walk.cell
             # A run of the row before whose zone the group has waited for goes on with the group.
-            awaited = acts.begins & waits
+            awaited = acts.begins & waits if around is None else acts.begins & waits | around.at_seam
             m.d.comb += [
                 acts.closes.eq(ends & ~awaited & ~walk.second),
                 acts.adds.eq(walk.cell & (walk.second == ends)),
             ]
+            if around is not None:
+                m.d.comb += acts.apart.eq(ends & ~around.at_seam)
         m.d.comb += [
             acts.advance.eq(walk.second | ~two),
             acts.starts.eq(acts.adds & ~walk.cell_left),
@@ -189,8 +221,9 @@ class SerialLabeller(wiring.Component):
         found: data.View,
         earlier_runs: memory.Memory,
         later_runs: memory.Memory,
-    ) -> None:
-        """A run has later ones until its zone is known to have none; it has earlier ones if its group has."""
+    ) -> memory.WritePort:
+        """A run has later ones until its zone is known to have none; it has earlier ones if its group has. Returns the
+        port that says the latter."""
         write_earlier = earlier_runs.write_port()
         write_later = later_runs.write_port()
         m.d.comb += [
@@ -201,11 +234,21 @@ class SerialLabeller(wiring.Component):
             write_later.addr.eq(Mux(acts.starts, walk.place, group.end)),
             write_later.data.eq(acts.starts),
         ]
+        return write_earlier
 
-    def _nest(self, m: Module, acts: _Acts, group: _Group, earlier: Value, later: Value, below: Value) -> None:
+    def _nest(
+        self,
+        m: Module,
+        acts: _Acts,
+        group: _Group,
+        earlier: Value,
+        later: Value,
+        below: Value,
+        around: SerialTurns | None,
+    ) -> None:
         # For each zone with runs of the row before passed and to come, the innermost first, whether its group has no
         # other one further out.
-        outermost = Signal(nesting(self.derived))
+        outermost = Signal(nesting(self.derived) + self.derived.skin.closed)
         with m.If(acts.enable):
             with m.If(acts.closes):
                 m.d.sync += group.whole.eq(1)
@@ -219,6 +262,27 @@ class SerialLabeller(wiring.Component):
                 m.d.sync += group.innermost.eq(group.first)
             with m.Elif(acts.joins & earlier & group.whole):
                 m.d.sync += group.innermost.eq(below)
+        if around is not None:
+            with m.If(around.begins):
+                m.d.sync += [group.whole.eq(0), outermost.eq(Cat(1, outermost))]
+
+    def _go_around(
+        self,
+        m: Module,
+        acts: _Acts,
+        walk: _Walk,
+        group: _Group,
+        found: data.View,
+        earlier: Value,
+        around: SerialTurns,
+    ) -> None:
+        """Turns of the group, its runs and its cells."""
+        over = acts.closes | ~walk.active
+        joins, zone = acts.joins & (~earlier | group.whole), acts.joins & ~earlier
+        unwrapped = around.unwrap(m, group.moments, found.moments, joins, zone, acts.adds)
+        with m.If(acts.enable):
+            around.keep(m, acts.starts, group.has_run, found, over)
+            m.d.sync += [group.moments[name].eq(unwrapped[name]) for name in unwrapped.shape().members]
 
     def _read_group(
         self, m: Module, walk: _Walk, acts: _Acts, group: _Group, groups: memory.Memory, earlier: Value
@@ -255,7 +319,9 @@ class SerialLabeller(wiring.Component):
         with m.If(acts.enable & (acts.closes | ~walk.active)):  # at power-up what the memory reads is not known
             m.d.sync += group.moments.eq(0)
 
-    def _store_group(self, m: Module, acts: _Acts, group: _Group, groups: memory.Memory) -> None:
+    def _store_group(
+        self, m: Module, acts: _Acts, group: _Group, groups: memory.Memory, around: SerialTurns | None
+    ) -> None:
         write = groups.write_port()
         m.d.comb += [
             write.en.eq(acts.closes & (group.has_run | ~group.whole)),
@@ -266,13 +332,17 @@ class SerialLabeller(wiring.Component):
             write.data.end.eq(group.end),
             write.data.below.eq(group.innermost),
         ]
+        if around is not None:
+            back = group.moments.back & ~(group.whole & around.first_turn)
+            turns = [write.data.first_turn.eq(around.first_turn), write.data.last_turn.eq(around.last_turn)]
+            m.d.comb += [write.data.moments.back.eq(back), *turns]
 
     def _let_out(self, m: Module, walk: _Walk, acts: _Acts, group: _Group) -> None:
         mark = Signal()
         leaves = acts.closes & group.whole & (~group.has_run | walk.last)
         m.d.comb += [
             self.records.valid.eq(leaves | mark),
-            self.records.payload.zone.eq(group.moments),
+            self.records.payload.zone.eq(zone_of(self.derived, group.moments)),
             self.records.payload.end.eq(mark),
             acts.enable.eq(~self.records.valid | self.records.ready),
         ]

@@ -51,10 +51,12 @@ class Sum(wiring.Component):
         if self.derived.skin.closed:
             m.submodules.unwrap = unwrap = Unwrap(self.derived)
             m.d.comb += [
-                unwrap.join.eq(join),
                 unwrap.kept.eq(kept),
-                unwrap.waiting.eq(stack.top),
-                unwrap.loaded.eq(read.data),
+                unwrap.found.eq(Mux(join.pop, stack.top, Mux(join.load, read.data, 0))),
+                unwrap.joins.eq(join.pop | join.load),
+                unwrap.zone.eq(join.load),
+                unwrap.cells.eq(join.run.area),
+                *(getattr(unwrap, name).eq(join[name]) for name in ("down", "turn", "ring")),
             ]
             m.d.comb += [group[name].eq(unwrap.group[name]) for name in unwrap.group.shape().members]
             stored = Signal(moments)

@@ -6,7 +6,6 @@ two ways disagree by a turn they go round the cylinder, as a ring.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
-from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import nesting
@@ -22,33 +21,35 @@ def turns_layout() -> dict[str, int]:
 
 
 class Turns:
-    """The turn of the step's cluster.
+    """The turn of the cluster that is walked.
 
-    It is known from the zone of the step's run of the row before if that has an earlier one, and at the seam: the first
-    cluster is the neighbor of the last one, which therefore lies a turn back.
+    It is known from the zone of a run of the row before that has an earlier one, and at the seam: the first cluster is
+    the neighbor of the last one, which therefore lies a turn back.
     """
 
     def __init__(self, derived: Derived):
-        self.seam = Signal(name="seam_step")  # the step joins the last cluster with the first one
-        self.turn = Signal()
-        self.down = Signal()  # what the group had before this step is now known to lie a turn back
+        self.seam = Signal(name="at_seam")  # the last cluster is joined with the first one
+        self.turn = Signal(name="turn_now")
+        self.down = Signal()  # what the group had before is now known to lie a turn back
         self.ring = Signal()
         self._zones = Signal(nesting(derived), name="zone_turns")  # of zones with runs passed and to come, inner first
 
-    def find(self, m: Module, step: data.View, current: data.View, pop: Value, earlier: Value, linked: Value) -> None:
-        """``linked``: the run lies a turn further back than the one of its zone before it."""
+    def find(self, m: Module, turn: Value, goes_on: Value, pop: Value, apart: Value, linked: Value) -> None:
+        """``turn``: as known so far. ``goes_on``: a run of the row before has an earlier one of its zone, and lies a
+        turn further back than that if ``linked``. ``pop``: what it or the seam joins waited. ``apart``: the run does
+        not touch the cluster before it, though the group goes on."""
         m.d.comb += [
-            self.turn.eq(current.turn),
-            self.ring.eq(~pop & (self.turn != current.turn)),
-            self.down.eq(pop & self.turn & ~current.turn),
+            self.turn.eq(turn),
+            self.ring.eq(~pop & ~apart & (self.turn != turn)),
+            self.down.eq(pop & self.turn & ~turn),
         ]
         with m.If(self.seam):
             m.d.comb += self.turn.eq(1)
-        with m.Elif(step.has_before & earlier):
+        with m.Elif(goes_on):
             m.d.comb += self.turn.eq(self._zones[0] | linked)
 
-    def keep(self, m: Module, works: Value, step: data.View, earlier: Value, later: Value) -> None:
-        """Remember it for the zone of the step's run of the row before."""
-        with m.If(works & step.has_before):
+    def keep(self, m: Module, passes: Value, earlier: Value, later: Value) -> None:
+        """Remember it for the zone of a run of the row before that ``passes``."""
+        with m.If(passes):
             kept = Mux(earlier, self._zones >> 1, self._zones)
             m.d.sync += self._zones.eq(Mux(later, Cat(self.turn, kept), kept))

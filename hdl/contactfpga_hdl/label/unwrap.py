@@ -9,7 +9,6 @@ from amaranth.hdl import Cat, Elaboratable, Module, Mux, Signal, Value
 from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.steps import join_layout
 from contactfpga_hdl.payloads import moments_layout
 
 
@@ -40,39 +39,43 @@ def zone_of(derived: Derived, group: data.View) -> Value:
 
 
 class Unwrap(Elaboratable):
-    """The turns of a group after a step.
+    """The turns of a group that cells, and what was found for it, are added to.
 
-    join (in): the step. kept, waiting, loaded (in): the group before it, and what joins it.
-    group (out): the group after it.
+    kept, down (in): the group so far, and whether all of it is now known to lie a turn back.
+    found, joins, zone (in): what joins it, if anything does: a zone of the row before, or a group that waited, which
+    gives the group its first cluster; all zeros if nothing does.
+    turn, cells (in): of the cluster that is walked, and how many of its cells are new.
+    ring (in): this makes the group a ring.
+    group (out): the group then.
     """
 
     def __init__(self, derived: Derived):
-        kept = kept_layout(derived)
-        self.join = Signal(join_layout(derived))
-        self.kept, self.waiting, self.loaded = (Signal(kept, name=name) for name in ("kept", "waiting", "loaded"))
-        self.group = Signal(data.StructLayout(turned_layout(derived)))
+        self.kept, self.found = (Signal(kept_layout(derived), name=f"turned_{name}") for name in ("kept", "found"))
+        self.down, self.joins, self.zone, self.turn, self.ring = (
+            Signal(name=f"turned_{name}") for name in ("down", "joins", "zone", "turn", "ring")
+        )
+        self.cells = Signal(derived.area_bits, name="turned_cells")
+        self.group = Signal(data.StructLayout(turned_layout(derived)), name="turned_group")
 
     def elaborate(self, platform):
         m = Module()
-        join, kept, group = self.join, self.kept, self.group
-        found, adds = Signal.like(self.kept), join.pop | join.load
-        m.d.comb += found.eq(Mux(join.pop, self.waiting, Mux(join.load, self.loaded, 0)))
+        kept, found, group = self.kept, self.found, self.group
         # A turn back, or two, from the group's first cluster: the lower turn of what there was and of what joins it.
-        moved = join.load & join.turn
-        kept_back, found_back = kept.back | join.down, adds & (found.back | moved)
-        too_far = kept.back & join.down | adds & found.back & moved
-        back = kept_back | found_back | join.turn
-        kept_above, found_above, run_above = back & ~kept_back, adds & back & ~found_back, back & ~join.turn
+        moved = self.zone & self.turn
+        kept_back, found_back = kept.back | self.down, self.joins & (found.back | moved)
+        too_far = kept.back & self.down | self.joins & found.back & moved
+        back = kept_back | found_back | self.turn
+        kept_above, found_above, cells_above = back & ~kept_back, self.joins & back & ~found_back, back & ~self.turn
         shares = (
             Mux(kept_above, kept.area, kept.turned),
             Mux(found_above, found.area, found.turned),
-            Mux(run_above, join.run.area, 0),
+            Mux(cells_above, self.cells, 0),
         )
         m.d.comb += [
             group.back.eq(back),
-            group.two.eq(kept.two | found.two | kept_above | found_above | run_above),
+            group.two.eq(kept.two | found.two | kept_above | found_above | cells_above),
             group.turned.eq((shares[0] + shares[2]) + shares[1]),
             group.wound.eq(kept.wound | found.wound | too_far | kept_above & kept.two | found_above & found.two),
-            group.ring.eq(kept.ring | found.ring | join.ring),
+            group.ring.eq(kept.ring | found.ring | self.ring),
         ]
         return m

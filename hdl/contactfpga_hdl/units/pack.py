@@ -75,7 +75,7 @@ class UnitPacker(wiring.Component):
         place = Signal(PLACE_BITS)
         trails, closes = Signal(), Signal()
         with m.If(self.sampled):
-            m.d.sync += begun.eq(time)
+            m.d.sync += begun.eq(time - self.derived.units.delay_us)
         m.d.sync += closes.eq(0)
         with m.If(self.done):
             m.d.sync += [word.eq(self.reading.value), left.eq(self._digits), trails.eq(0)]

@@ -9,10 +9,14 @@ from contactfpga.skin.units import INDEX_BITS
 
 
 def unit_pins(skin: Skin) -> dict[str, wiring.Member]:
-    """The pins at the converter; none without units."""
+    """The pins at the converter; none without units. With a pace of its own: when a conversion is ready, and the clock
+    that it is given."""
     if not skin.units:
         return {}
-    return {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
+    pins = {"spi_clock": Out(1), "spi_select_n": Out(1, init=1), "spi_mosi": Out(1), "spi_miso": In(1)}
+    if Derived(skin).units.converter.pace is not None:
+        pins |= {"spi_ready_n": In(1, init=1), "spi_pace": Out(1)}
+    return pins
 
 
 def reading_layout(skin: Skin) -> data.StructLayout:

@@ -14,12 +14,21 @@ from pathlib import Path
 
 from contactfpga.boards import pll
 from contactfpga.skin import Skin, SkinError
+from contactfpga.skin.derived import Derived
 
 NAME = "contactfpga"
 """Of the files that a build leaves."""
 
-UNIT_PORTS = ("spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
-"""At the converter of the pressure units."""
+UNIT_PORTS = ("spi_ready_n", "spi_pace", "spi_clock", "spi_select_n", "spi_mosi", "spi_miso")
+"""At the converter of the pressure units; one without a pace of its own leaves out the first two."""
+
+
+def unit_ports(skin: Skin) -> tuple[str, ...]:
+    """Those of a Skin's converter; none without units."""
+    if not skin.units:
+        return ()
+    return UNIT_PORTS if Derived(skin).units.converter.pace is not None else UNIT_PORTS[2:]
+
 
 MAX_BRIDGE_ERROR = 0.03
 """FTDI's limit for the difference between its rate and that of the other end."""
@@ -99,18 +108,19 @@ class BoardSpec:
 
     @property
     def converter(self) -> tuple[str, ...]:
-        """The pins of :data:`UNIT_PORTS`, for a Skin with units; for others they are the sheet's."""
+        """The pins of :data:`UNIT_PORTS`, as far as a Skin's converter has them; else they are the sheet's."""
         return self.row_side[-len(UNIT_PORTS) :]
 
     def pins(self, skin: Skin) -> dict[str, tuple[str, ...]]:
         """Pins of each port that the gateware has at the sheet and at the units' converter, lowest bit first, and of
         ``alive``."""
         columns = self.column_side[:-1] if skin.alive else self.column_side
-        rows = self.row_side[: -len(UNIT_PORTS)] if skin.units else self.row_side
+        ports = unit_ports(skin)
+        rows = self.row_side[: len(self.row_side) - len(ports)]
         dealt = self._dealt(row_wires(skin), rows + columns[::-1])
         dealt |= self._dealt(column_wires(skin), columns + rows[::-1])
-        if skin.units:
-            dealt |= {port: (pin,) for port, pin in zip(UNIT_PORTS, self.converter, strict=True)}
+        converter = self.converter[len(UNIT_PORTS) - len(ports) :]
+        dealt |= {port: (pin,) for port, pin in zip(ports, converter, strict=True)}
         return dealt | ({"alive": (self.alive,)} if skin.alive else {})
 
     @staticmethod
@@ -142,7 +152,7 @@ class BoardSpec:
 
     def _check_wires(self, skin: Skin) -> None:
         rows, columns = sum(row_wires(skin).values()), sum(column_wires(skin).values())
-        free = self.lines - skin.alive - (len(UNIT_PORTS) if skin.units else 0)
+        free = self.lines - skin.alive - len(unit_ports(skin))
         if rows + columns <= free:
             return
         direct_rows, direct_columns = skin.row_drive == "direct", skin.column_read == "direct"

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 from contactfpga.boards.spec import BoardSpec
+from contactfpga.choices import converters
 from contactfpga.skin import Skin
 
 OWN = "(on the board)"
@@ -24,11 +25,25 @@ _CHIP_PINS = {
     "column_clock": "CLK 2 of every 74HC165",
     "column_load_n": "SH/LD 1 of every 74HC165",
     "column_data": "QH 9 of chip 0, chain {}, 74HC165",
-    "spi_clock": "CLK 13 of the MCP3208",
-    "spi_select_n": "CS 10 of the MCP3208, 10 kΩ to its supply",
-    "spi_mosi": "DIN 11 of the MCP3208",
-    "spi_miso": "DOUT 12 of the MCP3208",
 }
+
+_CONVERTER_PINS = {
+    "mcp3208": {
+        "spi_clock": "CLK 13 of the MCP3208",
+        "spi_select_n": "CS 10 of the MCP3208, 10 kΩ to its supply",
+        "spi_mosi": "DIN 11 of the MCP3208",
+        "spi_miso": "DOUT 12 of the MCP3208",
+    },
+    "ads131m08": {
+        "spi_clock": "SCLK of the ADS131M08",
+        "spi_select_n": "CS of the ADS131M08, 10 kΩ to its supply",
+        "spi_mosi": "DIN of the ADS131M08",
+        "spi_miso": "DOUT of the ADS131M08",
+        "spi_ready_n": "DRDY of the ADS131M08",
+        "spi_pace": "XTAL1/CLKIN of the ADS131M08",
+    },
+}
+"""By the name of the converter; of one of your own the port itself is said."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,6 +139,8 @@ def _lines(skin: Skin, port: str, count: int) -> Sequence[Line]:
         return column_lines(skin)
     if port == "alive":
         return [Line("watchdog: turns each ms while all is well")]
+    if port.startswith("spi_"):
+        return [Line(_CONVERTER_PINS.get(converters.find(skin.converter).name, {}).get(port, port))]
     return [Line(_CHIP_PINS[port].format(chain)) for chain in range(count)]
 
 

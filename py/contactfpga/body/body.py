@@ -75,5 +75,7 @@ def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan
                 both = f"{shown(ports[one.port])} and {shown(one.name)}"
                 raise BodyError(f"links {both} have one port, {shown(one.port)}")
             ports[one.port] = one.name
+        if one.folds is not None and kinematics is not None and one.folds.joint not in kinematics.joint_names:
+            raise BodyError(f"link {shown(one.name)}: its folds are of joint {shown(one.folds.joint)}; there is none")
         found[one.name] = one
     return found

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contactfpga import haptics
+from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
 from contactfpga.surfaces.shapes import Floats, Vector
-from contactfpga.zones.zone import Zone
+from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
     from contactfpga.body.plan import Plan
@@ -30,11 +32,13 @@ class Contact:
     """Device time of its frame."""
     host_time_s: float
     """The same on the body's clock."""
-    point_m: Vector
-    normal: Vector
-    """Outward unit normal."""
-    covariance_m2: Floats
-    """(3, 3) of the point: chance within a cell, along the surface."""
+    point_m: Vector | None
+    """None for a zone that has no place: one that goes all the way round a closed sheet, or that has no cells, which
+    only a frame flagged ``mismatch`` can hold."""
+    normal: Vector | None
+    """Outward unit normal; None as ``point_m``."""
+    covariance_m2: Floats | None
+    """(3, 3) of the point: chance within a cell, along the surface; None as ``point_m``."""
     zone: Zone
     flags: frozenset[str]
     """Of its frame."""
@@ -42,22 +46,28 @@ class Contact:
     """On the link; None where no units are read, or their readings at that time have not come yet."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
+    track: int | None = None
+    """Id that stays with the contact, of this link; None for a zone without a place, or in frames nobody followed."""
+    fold: float | None = None
+    """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
+    None: nothing was learned for this link, or at this angle, or the angle is not known."""
 
     def moved(self, pose: Pose, frame: str) -> Contact:
         """The same in a frame in which its own one lies at ``pose``."""
         return dataclasses.replace(
             self,
             frame=frame,
-            point_m=_vector(pose.apply(np.array(self.point_m))),
-            normal=_vector(pose.turn(np.array(self.normal))),
-            covariance_m2=pose.rotation @ self.covariance_m2 @ pose.rotation.T,
+            point_m=None if self.point_m is None else _vector(pose.apply(np.array(self.point_m))),
+            normal=None if self.normal is None else _vector(pose.turn(np.array(self.normal))),
+            covariance_m2=None if self.covariance_m2 is None else pose.rotation @ self.covariance_m2 @ pose.rotation.T,
             force_n=None if self.force_n is None else _vector(pose.turn(np.array(self.force_n))),
         )
 
     def to_dict(self) -> dict[str, object]:
         """All of it in plain Python values, ready for JSON."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        values |= {"covariance_m2": self.covariance_m2.tolist(), "flags": sorted(self.flags)}
+        spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
+        values |= {"covariance_m2": spread, "flags": sorted(self.flags)}
         return values | {"zone": dataclasses.asdict(self.zone)}
 
 
@@ -68,28 +78,45 @@ def placed(plan: Plan, x_mm: float, y_mm: float) -> tuple[Vector, Vector]:
     return _vector(plan.pose.apply(1e-3 * np.array(point_mm))), _vector(plan.pose.turn(np.array(normal)))
 
 
-def on_link(plan: Plan, state: LinkState) -> list[Contact]:
-    """The contacts in the link's frame. A zone without cells, which only a frame flagged ``mismatch`` can hold, lies
-    nowhere and is none."""
+def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = None) -> list[Contact]:
+    """The contacts in the link's frame, one per zone; with the joints' angles, they say how much of them is a fold."""
     zones = state.zones
     assert zones is not None
     assert state.frame_s is not None
     sigma_m = 1e-3 * math.hypot(plan.skin.pitch_x_mm, plan.skin.pitch_y_mm) / math.sqrt(24)
+    tracks = () if state.tracks is None else state.tracks.active
+    ids = {id(track.zone): track.id for track in tracks if not track.held}
     found = []
     for zone in zones:
-        if zone.x_mm is None or zone.y_mm is None:
-            continue
-        point, normal = placed(plan, zone.x_mm, zone.y_mm)
-        spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
-        when = (zones.time_us, state.frame_s)
-        found.append(Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags))
+        point = normal = spread = None
+        if zone.x_mm is not None and zone.y_mm is not None:
+            point, normal = placed(plan, zone.x_mm, zone.y_mm)
+            spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
+        when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
+        made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
+        found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
+    return _felt(plan, zones, found, sigma_m)
+
+
+def _felt(plan: Plan, zones: Zones, found: list[Contact], sigma_m: float) -> list[Contact]:
+    """The same with forces, where the units' readings have come, and each contact has a place."""
     if plan.units is None or zones.units is None or not found:
         return found
-    touches = [haptics.Touch(one.point_m, one.normal, plan.friction, sigma_m) for one in found]
+    places = [(one.point_m, one.normal) for one in found if one.point_m is not None and one.normal is not None]
+    if len(places) < len(found):
+        return found
+    touches = [haptics.Touch(point, normal, plan.friction, sigma_m) for point, normal in places]
     forces = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
     return [
         dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n) for one, force in zip(found, forces)
     ]
+
+
+def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:
+    if plan.folds is None or angles is None or plan.folds.joint not in angles:
+        return None
+    cells = cells_of(zones, zone)
+    return None if cells is None else plan.folds.share(angles[plan.folds.joint], cells)
 
 
 def _vector(values: Floats) -> Vector:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,7 +14,7 @@ from contactfpga.body.joints import Joints
 from contactfpga.body.plan import Plan
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
-from contactfpga.driver import driver
+from contactfpga.driver import driver, finding
 from contactfpga.driver.subscription import checked
 from contactfpga.errors import BoardClosed, ReadTimeout
 
@@ -42,6 +43,7 @@ class OpenBody:
         self._timeout, self._period_s = checked(timeout), period_s
         self._changed = threading.Condition()
         self._changes = self._given = 0
+        self._searching = threading.Lock()
         self._closing = False
         self._queues: list[SnapshotQueue] = []
         self._readers = {
@@ -57,7 +59,9 @@ class OpenBody:
             self._changed.wait_for(lambda: all(reader.tried for reader in self._readers.values()))
 
     def _open_board(self, plan: Plan) -> OpenBoard:
-        return driver.open(plan.port, plan.skin, timeout=self._timeout)
+        searched = plan.port is None or finding.searched(plan.port)
+        with self._searching if searched else contextlib.nullcontext():  # two searches would hold each other's ports
+            return driver.open(plan.port, plan.skin, timeout=self._timeout)
 
     @staticmethod
     def clock() -> float:

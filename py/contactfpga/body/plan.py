@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 from contactfpga import surfaces
 from contactfpga.body.answer import BodyError
+from contactfpga.body.folds import Folds
 from contactfpga.body.pose import Pose
 from contactfpga.driver import sim_address
 from contactfpga.driver.silence import longest_pause_s
@@ -48,8 +49,8 @@ class Plan:
     """Age in s from which on the newest frame is no word on what touches now."""
     silent_s: float
     """From which on the link is silent."""
-    folds: Path | None = None
-    """File of the cells that the folding cover presses (:mod:`contactfpga.body.folds`)."""
+    folds: Folds | None = None
+    """What the folding cover presses."""
 
     def __post_init__(self) -> None:
         if not 0 < self.late_s <= self.silent_s:
@@ -83,6 +84,11 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
     mirrored = values.get("mirrored", False)
     if not isinstance(mirrored, bool):
         raise BodyError(f"mirrored is {shown(mirrored)}; it must be true or false")
+    folds = Folds.load(folder / text(values, "folds")) if "folds" in values else None
+    if folds is not None and folds.lines != (skin.rows, skin.columns):
+        raise BodyError(f"folds are of {folds.lines} cells; the Skin has {(skin.rows, skin.columns)}")
+    if folds is not None and skin.report != "cells":
+        raise BodyError(f"report is {shown(skin.report)}; folds are marked cell by cell, with report = 'cells'")
     return Plan(
         name=name,
         frame=text(values, "frame", name),
@@ -95,7 +101,7 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         friction=_number(values, "friction", 0.5),
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
-        folds=folder / text(values, "folds") if "folds" in values else None,
+        folds=folds,
     )
 
 
@@ -121,6 +127,11 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Surface:
     table = Mesh.load(folder / values)
     if table.lines != (skin.rows, skin.columns):
         raise BodyError(f"surface {shown(values)} is of {table.lines} cells; the Skin has {(skin.rows, skin.columns)}")
+    if table.closed != skin.closed:
+        ends = ("lie apart", "meet")
+        raise BodyError(
+            f"surface {shown(values)}: its ends {ends[table.closed]}, those of the Skin {ends[skin.closed]}"
+        )
     return table
 
 

@@ -18,12 +18,15 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 RETRY_S = 0.5
 """From a failure to open a board to the next try."""
 WAIT_S = 0.1
 """How long a board is waited for at a time."""
+NO_TRACKS = Tracks(0, (), ())
 
 
 class OpenBoard(Protocol):
@@ -58,6 +61,7 @@ class LinkReader:
         self._retry_at = -math.inf
         self._down, self._reason = "lost", "it was not tried yet"  # said where no board is open
         self._zones: Zones | None = None
+        self._tracker, self._tracks = Tracker(), NO_TRACKS
         self._frame_s = self._open_s = -math.inf
         self._ever = False
 
@@ -78,6 +82,7 @@ class LinkReader:
         asked = self._asked
         try:
             zones = self._board.read(WAIT_S) if asked > self.answered else self._board.latest(WAIT_S)
+            tracks = self._tracker.update(zones)
             age_s = 0.0 if zones.host_time_s is None else max(0.0, self._board.clock() - zones.host_time_s)
         except (SkinMismatch, VersionMismatch) as error:
             self._drop("mismatch", error)
@@ -87,7 +92,8 @@ class LinkReader:
             self._drop("lost", error)
         else:
             with self._lock:
-                self._zones, self._frame_s, self._ever = zones, self._clock() - age_s, True
+                self._zones, self._tracks = zones, tracks
+                self._frame_s, self._ever = self._clock() - age_s, True
             self.answered = max(self.answered, asked)
         return 0.0
 
@@ -134,4 +140,4 @@ class LinkReader:
             if self._zones is None or age_s is None:
                 return LinkState(None, age_s, "late", "no frame since the port was opened")
             status = "ok" if age_s <= self.plan.late_s else "late"
-            return LinkState(self._zones, age_s, status, "", self._frame_s)
+            return LinkState(self._zones, age_s, status, "", self._frame_s, self._tracks)

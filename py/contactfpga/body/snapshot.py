@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactfpga import notebook
 from contactfpga.body import contact
 from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
 from contactfpga.body.contact import Contact
@@ -16,6 +17,7 @@ from contactfpga.body.kinematics import Kinematics
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.surfaces.shapes import Floats
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 STATUSES = ("ok", "late", "silent", "lost", "mismatch")
 BASE, LINK = "base", "link"
+LINK_PX = 200
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,6 +43,8 @@ class LinkState:
     """Why it is not ok."""
     frame_s: float | None = None
     """When the frame was scanned, on the body's clock."""
+    tracks: Tracks | None = None
+    """Its contacts over the frames that were taken, as :class:`~contactfpga.Tracker` follows them."""
 
     def __str__(self) -> str:
         age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"
@@ -85,7 +90,9 @@ class Snapshot:
             raise NoLinkData(missing)
         found: list[Contact] = []
         for name in asked:
-            mine = contact.on_link(self._body.links[name], self.links[name])
+            known = self._angles.get(name)
+            angles = None if isinstance(known, ContactFPGAError) else known
+            mine = contact.on_link(self._body.links[name], self.links[name], angles)
             if frame == BASE and mine:
                 pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
                 mine = [one.moved(pose, BASE) for one in mine]
@@ -96,6 +103,8 @@ class Snapshot:
         """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
         frame: three rows of its velocity, three of the link's angular velocity. Raises :class:`NoJoints`."""
         frame, angles = self._body.links[one.link].frame, self._angles_of(one.link)
+        if one.point_m is None:
+            raise BodyError(f"a contact on link {shown(one.link)} has no place, so nothing says how it moves")
         point = np.array(one.point_m)
         if one.frame != BASE:
             point = self._kinematics.pose(frame, angles).apply(point)
@@ -119,6 +128,12 @@ class Snapshot:
         if isinstance(found, ContactFPGAError):
             raise NoJoints(f"link {shown(name)}: {found}")
         return found
+
+    def _repr_html_(self) -> str:
+        """Every link's sheet in a notebook, with its state."""
+        rows = [[name, str(state)] for name, state in self.links.items()]
+        drawn = [(name, state.zones.svg(LINK_PX)) for name, state in self.links.items() if state.zones is not None]
+        return notebook.table(["link", "state"], rows, f"At {self.host_time_s:.3f} s") + notebook.beside(drawn)
 
     def __repr__(self) -> str:
         states = ", ".join(f"{name} {state.status}" for name, state in self.links.items())

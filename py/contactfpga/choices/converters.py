@@ -9,6 +9,20 @@ from contactfpga.choices.choice import Choice
 from contactfpga.choices.choice import find as find_choice
 
 
+@dataclasses.dataclass(frozen=True)
+class Pace:
+    """Of a converter that converts all channels by itself, at the pace of a clock that the board gives it."""
+
+    most_hz: int
+    """Of that clock."""
+    least_level_ns: int
+    """How long it must be high and low."""
+    period: int
+    """Its periods from one conversion to the next."""
+    delay_halves: int
+    """Halves of that, from the middle of what a conversion averages until it is ready."""
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Converter(Choice):
     """Pressure units in, readings out, in sweeps over all units.
@@ -31,13 +45,15 @@ class Converter(Choice):
     """High or low levels of the SPI clock in a sweep, for each unit."""
     spacing_levels: int
     """The same between the samples of two units; 0 where all are taken at once."""
+    pace: Pace | None = None
+    """None: it converts as it is asked."""
 
     def most_hz(self, supply_v: float) -> int:
         """The SPI clock at most; between two supplies of the data sheet that of the lower one counts."""
         return max((hz for volts, hz in self.limits if volts <= supply_v), default=0)
 
 
-ConverterName = Literal["mcp3208"]
+ConverterName = Literal["mcp3208", "ads131m08"]
 
 CONVERTERS: dict[str, Converter] = {
     converter.name: converter
@@ -54,6 +70,23 @@ CONVERTERS: dict[str, Converter] = {
             least_level_ns=250,
             sweep_levels=40,
             spacing_levels=40,
+        ),
+        # SBAS950B 6.6 and 6.7, 2.7 V and above: levels of 20 ns, and 20 ns until a bit is there; twice that leaves time
+        # for pins and wires. Its own clock up to 8.2 MHz with levels of 49 ns; 8.3.7: OSR 1024 at power-up, two
+        # of its periods per modulator sample, and a filter as long as three results.
+        Converter(
+            name="ads131m08",
+            title="ADS131M08",
+            gateware="contactfpga_hdl.units.ads131m08:Ads131m08",
+            golden="contactfpga_sim.golden.units:ADS131M08",
+            bits=24,
+            channels=8,
+            limits=((2.7, 25_000_000),),
+            most_v=3.6,
+            least_level_ns=40,
+            sweep_levels=0,
+            spacing_levels=0,
+            pace=Pace(most_hz=8_200_000, least_level_ns=49, period=2048, delay_halves=3),
         ),
     )
 }

@@ -57,8 +57,9 @@ LABELLERS: dict[str, Labeller] = {
             gateware="contactfpga_hdl.label.serial:SerialLabeller",
             golden="contactfpga_sim.golden.label:SERIAL",
             exact=True,
-            end_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2,
-            row_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2,
+            end_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
+            row_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
+            closed=True,
             empty_row_clocks=lambda derived: derived.skin.columns + 2,
         ),
         Labeller(

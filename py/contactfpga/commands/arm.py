@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, numbers, outputs, terminal
 from contactfpga.console.interrupt import Interrupted
+from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="Print one JSON object in SI units, and draw nothing.")
     charts = "Draw force, safe speed and thickness against latency instead."
     parser.add_argument("--charts", action="store_true", help=charts)
+    units = "Compare a force threshold of pressure units under the sheet with contact and torque limit instead."
+    parser.add_argument("--units", action="store_true", help=units)
     flags.workers(parser)
     flags.output(parser, "build/arm")
 
@@ -41,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
     case = Case.load(args.case)
     if args.charts:
         return _charts(args, case)
+    if args.units:
+        return _units(args, case)
     return _pushes(args, case) if case.control.behavior == "comply" else _contact(args, case)
 
 
@@ -60,6 +65,20 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
         terminal.say(note)
     for path in run_pictures.pictures(found, folder):
         print(path)
+    return 0
+
+
+def _units(args: argparse.Namespace, case: Case) -> int:
+    from contactfpga.console import tables
+    from contactfpga_sim.studies.arm import report
+
+    if args.skin is not None or case.control.behavior == "comply":
+        raise ContactFPGAError("--units runs its own Skin, with a case that reverses; leave --skin and such a case out")
+    lines = report.defense_lines(case)
+    if args.json:
+        print(json.dumps([dict(zip(lines[0], line)) for line in lines[1:]], indent=2))
+        return 0
+    tables.show(lines, title=f"Case {args.case}: {case.link.speed_m_s:g} m/s")
     return 0
 
 

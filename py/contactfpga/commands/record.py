@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
+import signal
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, numbers, terminal
+from contactfpga.console.forces import Forces
+from contactfpga.driver.board import Board
+from contactfpga.errors import ContactFPGAError
 
-HELP = "Record a board into an MCAP file."
+if TYPE_CHECKING:
+    from contactfpga.body import Body
+    from contactfpga.recordings.link_messages import Felt
+    from contactfpga.recordings.session import Session
+
+HELP = "Record a board, or all of a robot (ROBOT.toml in place of PORT), into an MCAP file."
 EXTRA = "record"
 
 SHOWN_S = 0.5
@@ -25,6 +39,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
     seconds = "Begin a new file after so many seconds."
     parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
+    units = "Add forces, from the board's pressure units in this TOML file (docs/haptics.md)."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    friction = "Of what touches: force along the surface over the push at most (default: 0.5); with --units."
+    parser.add_argument("--friction", type=numbers.number(0, 10), metavar="MU", help=friction)
     bare = "Leave out the messages for other programs: a file of a quarter of the size, from which all can be made."
     parser.add_argument("--bytes-only", action="store_true", help=bare)
 
@@ -34,14 +52,18 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.recordings.recorder import Split
     from contactfpga.recordings.session import Session
 
+    if args.friction is not None and args.units is None:
+        raise ContactFPGAError("--friction is of forces; add --units")
+    body = _body(args)
     split = None
     if args.split_mb is not None or args.split_s is not None:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
-    session = Session(args.file, split, args.bytes_only)
+    about = {} if body is None else {"robot": {"toml": Path(args.port).read_text(encoding="utf-8")}}
+    session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session)
     try:
-        with session:
-            session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout)
+        with _ended_by_term(), session:
+            _add(session, args, body)
             with contextlib.suppress(KeyboardInterrupt):  # the usual end
                 session.start(args.seconds)
                 while session.running:
@@ -52,10 +74,53 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+@contextlib.contextmanager
+def _ended_by_term() -> Iterator[None]:
+    """A service is stopped with TERM, which closes the file as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals are the main thread's
+        return
+    before = signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _body(args: argparse.Namespace) -> Body | None:
+    """The robot that is to be recorded; None: a board."""
+    if args.port is None or not args.port.endswith(".toml"):
+        return None
+    from contactfpga.body import Body
+
+    for name in ("skin", "baud", "units", "friction"):
+        if getattr(args, name) is not None:
+            raise ContactFPGAError(f"--{name} is of a board; {args.port} says it of each link")
+    return Body.load(args.port)
+
+
+def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
+    from contactfpga.recordings.mount import Mount
+
+    if body is None:
+
+        def felt(board: Board) -> Felt | None:
+            forces = Forces.of(board, args.units, args.friction)
+            return None if forces is None else forces.of_frame
+
+        session.add(args.port, args.skin, baud=args.baud, timeout=args.timeout, felt=felt)
+        return
+    from contactfpga.body.contact import placed
+
+    for plan in body.links.values():
+        mount = Mount(plan.frame, functools.partial(placed, plan))
+        session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount)
+
+
 class _Progress:
     """A line that is written over, where the terminal can do so, and the last word."""
 
-    def __init__(self, session) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, session: Session) -> None:
         self._session = session
         self._live = terminal.of(sys.stderr).live
         self._due_s = time.monotonic() + SHOWN_S
@@ -74,7 +139,8 @@ class _Progress:
         if session.links:
             terminal.say(f"{', '.join(map(str, session.files))}: {self._line()}")
         for link in session.links:
-            for note in link.notes:
+            lost = [f"{link.name}: {link.error}"] if link.error is not None and len(session.links) > 1 else []
+            for note in link.notes + lost:
                 terminal.say(f"contactfpga: {note}", sys.stderr, hang=2)
 
     def _line(self) -> str:

@@ -22,10 +22,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
     parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
     parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
-    by = "unrolling: around the frame's z axis, not stretched; projection: down along z (default: unrolling)."
+    by = "Around the frame's z axis and not stretched (unrolling, the default), or down along z (projection)."
     parser.add_argument("--by", choices=("unrolling", "projection"), default="unrolling", help=by)
-    closed = "With unrolling: the columns go all the way round."
-    parser.add_argument("--closed", action="store_true", help=closed)
     origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
     parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)
     rpy = "Its roll, pitch and yaw in rad (default: 0 0 0)."
@@ -36,14 +34,14 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    if args.closed and args.by != "unrolling":
-        raise ValueError("--closed goes with --by unrolling")
     skin = Skin() if args.skin is None else Skin.load(args.skin)
+    if skin.closed and args.by != "unrolling":
+        raise ValueError("the ends of the Skin's sheet meet, so it goes round; use --by unrolling")
     output = outputs.file(args.output, "TABLE.npz")
     triangles = Triangles.load(args.mesh, args.scale)
     pose = Pose.of(args.origin, args.rpy)
     laid = Laid(skin.rows, skin.columns, skin.pitch_x_mm, skin.pitch_y_mm, pose.rotation, np.array(args.origin, float))
-    table = laid.unrolled(triangles, closed=args.closed) if args.by == "unrolling" else laid.projected(triangles)
+    table = laid.unrolled(triangles, closed=skin.closed) if args.by == "unrolling" else laid.projected(triangles)
     table.save(output)
     (x_low, x_high), (y_low, y_high) = table.spacing_mm
     terminal.say(f"{output}: {skin.rows}x{skin.columns} cells on {len(triangles.corners_mm)} triangles")

@@ -3,27 +3,46 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
+import sys
 
-from contactfpga.console import flags, terminal
+from contactfpga.console import flags, numbers, terminal
 
-HELP = "Show the sheet in the browser, live or from a recording."
+HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
+
+WHAT = "Port, sim://, a recording, or a robot.toml (default: a virtual sheet to press)."
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    flags.connection(parser)
-    parser.add_argument("--host", default="127.0.0.1", help="Address to listen on (default: 127.0.0.1).")
-    parser.add_argument("--http-port", type=int, metavar="N", help="Port to listen on.")
+    flags.connection(parser, WHAT)
+    parser.add_argument("--link", metavar="NAME", help="Of a recording of several boards (default: the first).")
+    units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
+    parser.add_argument("--units", metavar="FILE", help=units)
+    host = "Address to listen on (default: 127.0.0.1, which this computer alone can reach)."
+    parser.add_argument("--host", default="127.0.0.1", help=host)
+    port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
+    parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)
+    parser.add_argument("--no-browser", action="store_true", help="Print the address only.")
+    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after so many seconds (default: at Ctrl-C).")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.view import opening
 
-    with opening.opened(args.port, args.skin, args.host, args.http_port, args.baud, args.timeout) as shown:
+    named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units)
+    with contextlib.suppress(KeyboardInterrupt), opening.opened(named, args.host, args.http_port) as shown:
         terminal.say(f"Open {shown.url}")
-        terminal.say("Ctrl-C ends it.")
-        while True:
-            shown.view.turn()
+        terminal.say("Whoever has this address can read and press. Ctrl-C ends it.", hang=2)
+        if not args.no_browser and _has_display():
+            opening.browse(shown.url)
+        opening.run(shown, args.seconds)
     return 0
+
+
+def _has_display() -> bool:
+    """Whether a browser would have a window: one in the terminal cannot show this."""
+    return not sys.platform.startswith("linux") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

@@ -14,9 +14,9 @@ PORT = (
 )
 
 
-def connection(parser: argparse.ArgumentParser) -> None:
-    """What :func:`opened` takes."""
-    parser.add_argument("port", nargs="?", metavar="PORT", help=PORT)
+def connection(parser: argparse.ArgumentParser, port: str = PORT) -> None:
+    """What :func:`opened` takes; ``port``: the help of its first argument."""
+    parser.add_argument("port", nargs="?", metavar="PORT", help=port)
     skin = "Require a board built from this Skin, and use its baud rate."
     parser.add_argument("--skin", metavar="FILE", help=skin)
     parser.add_argument("--baud", type=numbers.BAUD, help="Bits per second (default: the Skin's, or 3000000).")

@@ -11,7 +11,7 @@ from contactfpga.driver.link import Link
 from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
-from contactfpga.driver.transport import Transport
+from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReplayEnded
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT
@@ -134,6 +134,7 @@ class Board:
         """Counters since the port was opened."""
         stats = self._link.conversation.stats
         stats.dropped = self._frames.dropped
+        stats.net = counters_of(self._link.transport)
         return stats
 
     def clock(self) -> float:

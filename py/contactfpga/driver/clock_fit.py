@@ -144,8 +144,10 @@ class ClockFit:
         likely: np.ndarray = np.exp((exponents.min() - exponents) / 2)
         return likely
 
-    def line(self, arrived_s: float) -> HostLine:
-        """For frames that arrived then; after :meth:`arrived`."""
+    def line(self, arrived_s: float) -> HostLine | None:
+        """For frames that arrived then; None before the first :meth:`arrived`."""
+        if not self._pieces:
+            return None
         now_s = self._newest.device_s
         base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
         base_us = self._base_us + round(now_s * 1e6)

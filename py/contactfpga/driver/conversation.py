@@ -12,7 +12,7 @@ import random
 
 import numpy as np
 
-from contactfpga.driver.clock_fit import ClockFit
+from contactfpga.driver.host_clock import HostClock
 from contactfpga.driver.lines import Lines
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
@@ -76,8 +76,7 @@ class Conversation:
         self._live = live
         self._requests = Requests(rng)
         self._timeline = Timeline(self.stats, live)
-        self._clock = ClockFit() if live else None
-        self._byte_s = 0.0
+        self._clock = HostClock(live)
         self._reader = protocol.HelloReader()
         self._widths: Widths | None = None
         self._rest = b""
@@ -102,6 +101,11 @@ class Conversation:
     def end_command(self) -> None:
         """Do not send the command again."""
         self._requests.end_command()
+
+    def doubt(self, now: float) -> None:
+        """What is received from now on may be of much later than what came before, or may have waited for long."""
+        self._timeline.doubt(now)
+        self._doubted = now
 
     def data_to_send(self) -> bytes:
         """What has to be sent to the board now; look after each :meth:`ask` and each :meth:`receive`."""
@@ -129,9 +133,12 @@ class Conversation:
         self.stats.bytes += len(data)
         self._notice(now)
         *packets, self._rest = (self._rest + data).split(b"\0")
+        if packets:
+            self._clock.begin(now)
         return [packet for packet in packets if packet]
 
     def _end(self, now: float) -> None:
+        self._clock.end(now)
         if len(self._rest) > LONGEST_PACKET:
             self._refuse("noise")
             self._rest = b""
@@ -187,22 +194,12 @@ class Conversation:
         """A frame whose time is known carries these bits of a request's number: news of requests and clocks."""
         answered = self._requests.answered
         self._requests.take_frame(heard, now)
-        if self._clock is None:
-            return None
-        self._clock.arrived(time_us, now, (packet_bytes + 1) * self._byte_s)
-        if self._requests.answered > answered:
-            self._clock.answered(time_us, self._requests.answered_sent_s)
-        return self._clock.line(now)
-
-    def _forget_times(self) -> None:
-        """The board was restarted, or is another one."""
-        if self._clock is not None:
-            self._clock.forget()
+        asked_s = self._requests.answered_sent_s if self._requests.answered > answered else None
+        return self._clock.take(time_us, packet_bytes + 1, now, asked_s)
 
     def _notice(self, now: float) -> None:
         if self._live and now - self._noticed > MOST_S:
-            self._timeline.doubt(now)
-            self._doubted = now
+            self.doubt(now)
         self._noticed = now
 
     def _packet(self, packet: bytes, now: float) -> Event | None:
@@ -235,7 +232,7 @@ class Conversation:
             return None
         self.hello = self.sheet = self._widths = None
         self._timeline = Timeline(self.stats, self._live)
-        self._forget_times()
+        self._clock.forget()
         return VersionMismatch(
             f"{self.port} speaks protocol version 1, this host version {framing.VERSION}; "
             "load a bitstream and install a contactfpga of the same release"
@@ -294,7 +291,7 @@ class Conversation:
             self.lines.forget()
             self.units.forget()
             self._timeline = Timeline(self.stats, self._live)
-            self._forget_times()
+            self._clock.forget()
         expected = self._expected
         if expected is not None and hello.fingerprint != expected.fingerprint:
             self.sheet = self._widths = None
@@ -304,12 +301,12 @@ class Conversation:
         if self.stats.restarts > restarts:
             self.lines.forget()
             self.units.forget()
-            self._forget_times()
+            self._clock.forget()
         self.lines.take_hello(hello)
         self.units.take_hello(hello)
         self._requests.take_hello(hello.heard, hello.pulsed, now)
         longest = Widths(hello.sheet).max_frame_bytes
-        self._byte_s = 10 / hello.baud
+        self._clock.byte_s = 10 / hello.baud
         self._requests.retry_s = 0.25 + 4 * (longest + 100) * 10 / hello.baud
         if self.sheet != hello.sheet:
             self.sheet = hello.sheet

@@ -11,7 +11,7 @@ from typing import Protocol
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.silence import Silence
 from contactfpga.driver.told import Told
-from contactfpga.driver.transport import Transport
+from contactfpga.driver.transport import Transport, counters_of
 from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
@@ -176,6 +176,7 @@ class Link:
     def _turn(self, seconds: float) -> int:
         """Read once, with the lock held, which is released meanwhile; returns the number of bytes."""
         self._turning = threading.get_ident()
+        breaks = self._breaks()
         self.changed.release()
         try:
             data = self.transport.read(seconds)
@@ -186,8 +187,14 @@ class Link:
             if self._closing:
                 self.transport.close()
         self.check_open()
+        if self._breaks() != breaks:
+            self.conversation.doubt(self.transport.clock())
         self._take(data)
         return len(data)
+
+    def _breaks(self) -> int:
+        counters = counters_of(self.transport)
+        return 0 if counters is None else counters.passed_breaks
 
     def _take(self, data: bytes) -> None:
         for event in self.conversation.receive_runs(data, self.transport.clock()):

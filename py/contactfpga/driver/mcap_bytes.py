@@ -63,10 +63,10 @@ class McapBytes:
             raise RecordingError(f"{self.path} holds several links; name one of them: {names}")
         raise RecordingError(f"{self.path} has no link {link!r}; it has {names}")
 
-    def metadata(self) -> list[dict[str, str]]:
-        """What is known of each link besides its bytes."""
+    def texts(self, name: str) -> list[dict[str, str]]:
+        """The texts of this name that are kept beside the messages."""
         with self._opened() as reader:
-            return [dict(one.metadata) for one in reader.iter_metadata() if one.name == "contactfpga"]
+            return [dict(one.metadata) for one in reader.iter_metadata() if one.name == name]
 
     def pieces(self, link: str | None = None, start_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
         """(when the last byte came, bytes) of a link, in order; with ``start_ns`` from the last hello on that had come

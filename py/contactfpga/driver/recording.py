@@ -85,7 +85,10 @@ def parse(name: str) -> ReplayAddress:
     if pace == 0:
         raise PortNotFound(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
     link = unquote(found["link"]) if "link" in found else None
-    return ReplayAddress(Path(path).expanduser(), pace, start or 0.0, link)
+    try:
+        return ReplayAddress(Path(path).expanduser(), pace, start or 0.0, link)
+    except RuntimeError as error:  # ~nobody
+        raise PortNotFound(f"{name} cannot be opened: {error}") from None
 
 
 def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
@@ -112,7 +115,7 @@ def open_recorded(name: str) -> Recorded:
     except OSError as error:
         reason = error.strerror or told(error)
         raise PortNotFound(f"{name} cannot be opened: {reason}; is the path right?") from None
-    except (RuntimeError, ValueError) as error:  # ~nobody, a path with a zero byte
+    except ValueError as error:  # a path with a zero byte
         raise PortNotFound(f"{name} cannot be opened: {error}") from None
     if asked.start_s or asked.link is not None:
         file.close()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 
+from contactfpga.net.message import Counters
+
 
 @dataclasses.dataclass
 class Stats:
@@ -52,6 +54,10 @@ class Stats:
     bytes: int = 0
     """All bytes received."""
 
+    net: Counters | None = None
+    """What happened on the network, of a ``zenoh://`` port; None: there is none between."""
+
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""
-        return {**vars(self), "damaged": dict(self.damaged)}
+        net = None if self.net is None else dataclasses.asdict(self.net)
+        return {**vars(self), "damaged": dict(self.damaged), "net": net}

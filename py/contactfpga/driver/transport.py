@@ -11,6 +11,9 @@ from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.replay import ReplayTransport
 from contactfpga.errors import MissingExtra, PortLost, PortNotFound
+from contactfpga.net.address import SCHEME
+from contactfpga.net.message import Counters
+from contactfpga.net.port import ZenohPort
 from contactfpga.skin import Skin
 
 CHUNK = 65_536
@@ -160,6 +163,12 @@ class RecordingTransport:
         self._transport.close()
 
 
+def counters_of(transport: Transport) -> Counters | None:
+    """What a network between counts; None: there is none."""
+    inner = transport._transport if isinstance(transport, RecordingTransport) else transport
+    return inner.counters if isinstance(inner, ZenohPort) else None
+
+
 def connect(name: str | SimulatedPort, baud: int) -> Transport:
     """Open the transport that ``name`` asks for, or that a virtual board is."""
     if not isinstance(name, str):
@@ -168,6 +177,8 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
         return SimTransport.named(name)
     if name.startswith("replay:"):
         return ReplayTransport(name)
+    if name.startswith(SCHEME):
+        return ZenohPort(name)
     return SerialTransport(name, baud)
 
 

@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 
+from contactfpga import notebook
 from contactfpga.haptics.answer import Floats, HapticsError, Vector
 from contactfpga.haptics.surface import Center
 from contactfpga.haptics.wrench import ALARM, Wrench
@@ -195,7 +196,8 @@ class Contacts(Sequence[Contact]):
         self.beyond_friction = solution.beyond_friction
         """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
         Intervals then hold for pushes with any friction."""
-        seen = seen if seen.link else dataclasses.replace(seen, link=wrench.frame)
+        if wrench.frame and not seen.link:
+            seen = Seen(wrench.frame, seen.time_us, seen.tracks)
         made = []
         for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
             nx, ny, nz = touch.normal
@@ -255,6 +257,29 @@ class Contacts(Sequence[Contact]):
     def __len__(self) -> int:
         return len(self._contacts)
 
+    def _repr_html_(self) -> str:
+        """A table in a notebook; a push that is not known alone has its interval."""
+        head = ["contact", "x, mm", "y, mm", "z, mm", "push, N", "between, N"]
+        rows = [
+            [_name(number, one), *(f"{1e3 * each:.2f}" for each in one.point_m), *_push(one)]
+            for number, one in enumerate(self)
+        ]
+        return notebook.table(head, rows, f"{self.model}: {len(self)} contact{'' if len(self) == 1 else 's'}")
+
     def __repr__(self) -> str:
         chi2 = "" if self.chi2 is None else f", chi2 {self.chi2:.2f}"
         return "\n".join([f"<Contacts: {len(self)}, {self.model}, rank {self.rank}{chi2}", *map(str, self)]) + ">"
+
+
+def _name(number: int, contact: Contact) -> str:
+    return f"{number}" if contact.track is None else f"#{contact.track}"
+
+
+def _push(contact: Contact) -> list[str]:
+    if contact.normal_n is None:
+        return ["not measured", ""]
+    interval = contact.interval_n
+    if interval is None:
+        return [f"{contact.normal_n:.3f}", ""]
+    least, most = interval
+    return [f"{contact.normal_n:.3f}", f"{least:.3f} and {'any' if most is None else f'{most:.3f}'}"]

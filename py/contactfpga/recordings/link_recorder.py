@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import collections
 import contextlib
+import math
 import threading
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.silence import Silence
-from contactfpga.driver.told import Told
 from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinMismatch, VersionMismatch
-from contactfpga.recordings import messages
+from contactfpga.haptics import WithReadings
+from contactfpga.recordings.link_messages import LinkMessages
 from contactfpga.recordings.recorder import LinkFile
 from contactfpga.recordings.whole_file import RecordingFailed
-from contactfpga.ros import convert
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.markers import markers, outline
-from contactfpga.tracking.tracker import Tracker
-from contactfpga.wire.faults import Faults
-from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
 
 QUEUE = 1 << 16
@@ -27,11 +22,6 @@ TURN_S = 0.01
 """How often bytes are written."""
 BATCH_BYTES = 2048
 """Of which so many are written at once: about 100 frames with a zone each."""
-DRAWN_S = 1 / 30
-"""How often what 3-D programs show is written."""
-WORLD = "world"
-"""The frame that a board lies in which is on no robot."""
-NOWHERE = (0.0,) * 3, (0.0,) * 3
 
 
 class Buffer:
@@ -66,10 +56,12 @@ class Buffer:
 
 
 class LinkRecorder:
-    """Writes what a board says until it is stopped, the recording that it plays ends, or the port is lost."""
+    """Writes what a board says until it is stopped, the recording that it plays ends, or the port is lost. Without
+    ``said`` it writes the bytes alone. ``late``: a frame is taken once its readings of pressure units have come."""
 
-    def __init__(self, board: Board, buffer: Buffer, link: LinkFile, bytes_only: bool = False):
+    def __init__(self, board: Board, buffer: Buffer, link: LinkFile, said: LinkMessages | None, late: bool = False):
         self.board = board
+        self.name = link.name
         self.frames = 0
         """Frames that were taken."""
         self.seconds = 0.0
@@ -80,91 +72,72 @@ class LinkRecorder:
         """Why it ended before it was stopped."""
         self._buffer = buffer
         self._link = link
-        self._bytes_only = bytes_only
-        self._tracker = Tracker()
-        self._drawn_s = -1.0
+        self._said = said
+        self._late = late
         self._last_us = 0
         self._begun_s: float | None = None
-        self._rim = outline(board.sheet)
 
     def run(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Record, in a thread of its own."""
         try:
-            with self.board.events(QUEUE) as events:
+            with self.board.events(QUEUE) as self._events:
+                frames = WithReadings(self) if self._late else self
                 self._take(self.board.next())  # the answer to the first hello came before there were events
                 while not stop.is_set() and (seconds is None or self.seconds < seconds):
                     try:
-                        self._take(events.next(TURN_S))
+                        self._take(frames.next(TURN_S))
                     except ReadTimeout:
-                        self._take(None)
+                        self._pause()
                     except (SkinMismatch, VersionMismatch) as told:
                         self.notes.append(str(told))
-                if events.dropped:
+                if dropped := self._events.dropped:
                     self.notes.append(
-                        f"{self._link.name}: {events.dropped} frames came faster than messages could be written of "
-                        "them; their bytes are in the file. Leave messages out with --bytes-only"
+                        f"{self.name}: {dropped} frames came faster than messages could be written of them; their "
+                        "bytes are in the file. Leave messages out with --bytes-only"
                     )
         except ReplayEnded:
             pass
         except ContactFPGAError as error:
             self.error = error
 
+    def next(self, timeout: float = 1.0) -> Zones:
+        """The next frame; what comes before it is written."""
+        while True:
+            item = self._events.next(timeout)
+            if isinstance(item, Zones):
+                return item
+            clock_s = self._clock_s()
+            if self._said is not None and not isinstance(item, Silence):
+                self._said.told(item, clock_s)
+            self._drain()
+
     def finish(self) -> None:
         """Close the board and write what is left."""
         self.board.close()
         with contextlib.suppress(RecordingFailed):  # was told before
-            self._drain()
+            self._drain(rest=True)
 
-    def _take(self, item: Zones | Told | Silence | None) -> None:
-        clock_s = self._clock_s(item)
-        if isinstance(item, Zones):
-            self.frames += 1
-        if not self._bytes_only:
-            self._write(item, clock_s)
-        if self._buffer.due(clock_s):
-            self._drain()
-        if item is None:
-            self._link.turn()
+    def _take(self, zones: Zones) -> None:
+        self._last_us = zones.time_us
+        clock_s = self._clock_s()
+        self.frames += 1
+        if self._said is not None:
+            self._said.frame(zones, clock_s)
+        self._drain()
 
-    def _clock_s(self, item: object) -> float:
+    def _pause(self) -> None:
+        self._clock_s()
+        self._drain()
+        self._link.turn()
+
+    def _clock_s(self) -> float:
         """Now; of a recording, which has no clock, the time of its last frame."""
-        if isinstance(item, Zones):
-            self._last_us = item.time_us
         now_s = self.board.clock() if self.board.live else self._last_us / 1e6
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         self.seconds = max(self.seconds, now_s - self._begun_s)
         return now_s
 
-    def _drain(self) -> None:
-        data, clock_s = self._buffer.drain()
-        if data:
+    def _drain(self, rest: bool = False) -> None:
+        if self._buffer.due(math.inf if rest else self.board.clock()):
+            data, clock_s = self._buffer.drain()
             self._link.take_bytes(data, clock_s if self.board.live else self._last_us / 1e6)
-
-    def _write(self, item: Zones | Told | Silence | None, clock_s: float) -> None:
-        link = self._link
-        time_ns = link.time_ns(clock_s)
-        if isinstance(item, Zones):
-            self._write_frame(item, clock_s)
-        elif isinstance(item, Faults):
-            link.write("faults", messages.FAULTS, messages.of_faults(item.names, time_ns, link.name), clock_s)
-        elif isinstance(item, UnitSamples):
-            link.write("units", messages.UNITS, messages.of_units(item, time_ns, link.name), clock_s)
-
-    def _write_frame(self, zones: Zones, clock_s: float) -> None:
-        """A frame; contacts whenever something happens to them, and now and then, with what 3-D programs show."""
-        link = self._link
-        sampled_s = clock_s if zones.host_time_s is None else zones.host_time_s
-        head = convert.header(link.time_ns(sampled_s), link.name)
-        sigma_s = getattr(zones, "host_sigma_s", None)
-        link.write("zones", messages.ZONES, encode(messages.ZONES, convert.zones(zones, head, sigma_s)), clock_s)
-        tracks = self._tracker.update(zones)
-        drawn = clock_s - self._drawn_s >= DRAWN_S or clock_s < self._drawn_s
-        if drawn or tracks.events:
-            told = convert.tracks(tracks, tracks.events, tracks.restarted, head)
-            link.write("tracks", messages.TRACKS, encode(messages.TRACKS, told), clock_s)
-        if drawn:
-            self._drawn_s = clock_s
-            shown = markers(self._rim, tracks.active, head)
-            link.write("markers", messages.MARKERS, encode(messages.MARKERS, shown), clock_s)
-            world = convert.transform(convert.header(link.time_ns(clock_s), WORLD), link.name, *NOWHERE)
-            link.write("/tf", messages.TRANSFORMS, encode(messages.TRANSFORMS, world), clock_s)

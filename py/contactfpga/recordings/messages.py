@@ -8,7 +8,8 @@ from contactfpga.ros.convert import header
 from contactfpga.ros.types import PACKAGE
 from contactfpga.zones.units import UnitSamples
 
-BYTES, FAULTS, UNITS, ZONES, TRACKS = (f"{PACKAGE}/{name}" for name in ("Bytes", "Faults", "Units", "Zones", "Tracks"))
+BYTES, FAULTS, UNITS = (f"{PACKAGE}/{name}" for name in ("Bytes", "Faults", "Units"))
+ZONES, TRACKS, CONTACTS = (f"{PACKAGE}/{name}" for name in ("Zones", "Tracks", "Contacts"))
 TRANSFORMS, MARKERS, WRENCH = "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray", "geometry_msgs/WrenchStamped"
 
 

@@ -7,6 +7,7 @@ import json
 import re
 import threading
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.driver.board import Board
@@ -44,6 +45,7 @@ class Recorder:
         self.lock = threading.RLock()
         self._split = split
         self._links: list[LinkFile] = []
+        self._about: list[tuple[str, Mapping[str, str]]] = []
         self._old: McapFile | None = None
         self._sizes: dict[Path, int] = {}  # of the files that are closed
         self.files: list[Path] = []
@@ -64,8 +66,13 @@ class Recorder:
                 raise ContactFPGAError(f"two links are named {name!r}; give their Skins different names")
             link = LinkFile(self, name, facts(name, board), _epoch_ns(board))
             self._links.append(link)
-            self.file.metadata(METADATA, link.facts)
+            self.about(METADATA, link.facts)
             return link
+
+    def about(self, name: str, values: Mapping[str, str]) -> None:
+        """Keep texts in every file."""
+        self._about.append((name, values))
+        self.file.metadata(name, values)
 
     def turn(self) -> None:
         """Write what waits for long enough, and begin a new file where one is due. Call it often."""
@@ -78,8 +85,9 @@ class Recorder:
                 self._end_old(now_s)
             elif self._split is not None and self._split.due(self.file, now_s - self._begun_s):
                 self._old, self.file = self.file, self._begin()
+                for name, values in self._about:
+                    self.file.metadata(name, values)
                 for link in self._links:
-                    self.file.metadata(METADATA, link.facts)
                     link.wait_for_hello()
 
     def close(self) -> None:

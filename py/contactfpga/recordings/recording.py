@@ -9,9 +9,11 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from contactfpga import notebook
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
 from contactfpga.inputs.values import is_finite
+from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
@@ -19,6 +21,9 @@ from contactfpga.zones.zone import Zones
 
 Timed = tuple[float, str, Zones]
 """Seconds since the recording's beginning, the link, and its frame."""
+
+LAST_S = 0.2
+"""So long before the end of a recording each board has sent a frame: a keep-alive at least."""
 
 
 class Recording:
@@ -44,14 +49,22 @@ class Recording:
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
-        """The first hello of each link, whose ``sheet`` has lines and lengths."""
-        return {link: self._hello(link) for link in self._file.links}
+        """The first hello of each link, whose ``sheet`` has lines and lengths. A link that said none is left out: its
+        frames cannot be read. Raises :class:`ContactFPGAError` where there is no other."""
+        found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
+        if not found:
+            raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
+        return found
 
     @functools.cached_property
     def skins(self) -> dict[str, Skin | None]:
         """The Skin of each link; None where only its hello is known."""
-        texts = {facts.get("link"): facts.get("skin", "") for facts in self._file.metadata()}
-        return {link: _skin(texts.get(link, "")) for link in self._file.links}
+        texts = {facts.get("link"): facts.get("skin", "") for facts in self.texts(METADATA)}
+        return {link: _skin(texts.get(link, "")) for link in self.links}
+
+    def texts(self, name: str) -> list[dict[str, str]]:
+        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds."""
+        return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:
         """(seconds since the beginning, link, :class:`Zones`) from ``start_s`` on and before ``end_s``, in order; with
@@ -59,9 +72,20 @@ class Recording:
         for name, value in (("start_s", start_s), ("end_s", 0.0 if end_s is None else end_s)):
             if not is_finite(value) or value < 0:
                 raise ValueError(f"{name} is {value!r}; it must be a number of seconds, 0 or more")
-        links = self._file.links if link is None else [link]
+        links = list(self.links) if link is None else [link]
         every = [self._frames(one, float(start_s), math.inf if end_s is None else end_s) for one in links]
         return heapq.merge(*every, key=lambda timed: timed[0])
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {self.duration_s:.1f} s of {', '.join(self.links)}>"
+
+    def _repr_html_(self) -> str:
+        """Its links in a notebook, with the last frame of each."""
+        sheets = {link: hello.sheet for link, hello in self.links.items()}
+        rows = [[link, f"{sheet.rows}x{sheet.columns}", sheet.report] for link, sheet in sheets.items()]
+        table = notebook.table(["link", "cells", "report"], rows, f"{self.path.name}: {self.duration_s:.1f} s")
+        last = {link: zones for _, link, zones in self.frames(max(0.0, self.duration_s - LAST_S))}
+        return table + notebook.beside((link, zones.svg()) for link, zones in last.items())
 
     def raw_bytes(self, link: str | None = None) -> Iterator[tuple[float, bytes]]:
         """(seconds since the beginning, bytes that had come by then) of a link: all that came over its port."""
@@ -86,13 +110,13 @@ class Recording:
                 if last_s >= start_s:
                     yield last_s, link, zones
 
-    def _hello(self, link: str) -> Hello:
+    def _hello(self, link: str) -> Hello | None:
         conversation = Conversation(str(self.path), live=False)
         for _, data in self._file.pieces(link):
             conversation.receive(data, 0.0)
             if conversation.hello is not None:
                 return conversation.hello
-        raise RecordingError(f"{self.path}: link {link!r} holds no hello; its frames cannot be read")
+        return None
 
 
 def _skin(text: str) -> Skin | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -12,11 +13,25 @@ from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
+from contactfpga.recordings.link_messages import Felt, LinkMessages
 from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
+from contactfpga.recordings.mount import Mount
 from contactfpga.recordings.recorder import Recorder, Split, link_name
+from contactfpga.recordings.whole_file import RecordingFailed
 from contactfpga.skin import Skin
 
 SUFFIX = ".mcap"
+
+
+@dataclasses.dataclass(frozen=True)
+class _Opened:
+    """A link whose board is open."""
+
+    name: str
+    board: Board
+    buffer: Buffer
+    mount: Mount | None
+    felt: Felt | None
 
 
 class Session:
@@ -24,7 +39,8 @@ class Session:
 
     ``split``: when a new file begins; then ``touches.mcap`` becomes ``touches_0001.mcap`` and so on. ``bytes_only``
     leaves messages out: a quarter of the size, and nothing is lost, as they can be made of the bytes. The file must
-    not be there yet. Raises :class:`ContactFPGAError`.
+    not be there yet. ``about``: texts that are kept in it by name, beside those of each link.
+    Raises :class:`ContactFPGAError`.
     """
 
     def __init__(
@@ -33,18 +49,22 @@ class Session:
         split: Split | None = None,
         bytes_only: bool = False,
         *,
+        about: Mapping[str, Mapping[str, str]] | None = None,
         buffer: Callable[[], Buffer] = Buffer,
     ):
         check_new(path)
         self.links: list[LinkRecorder] = []
         self._path = Path(path)
         self._split = split
-        self._opened: list[tuple[str, Board, Buffer]] = []
+        self._opened: list[_Opened] = []
+        self._about = dict(about or {})
         self._recorder: Recorder | None = None
         self._bytes_only = bytes_only
         self._buffer = buffer
         self._stop = threading.Event()
         self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._left = 0  # links that are being recorded
         self._begun: threading.Event | None = None
         self._failure: BaseException | None = None
         self._threads: list[threading.Thread] = []
@@ -57,11 +77,22 @@ class Session:
         name: str | None = None,
         baud: int | None = None,
         timeout: float = 1.0,
+        mount: Mount | None = None,
+        felt: Callable[[Board], Felt | None] | None = None,
     ) -> None:
-        """Open a board, as :func:`contactfpga.open` does. ``name``: of its link; by default that of its Skin."""
+        """Open a board, as :func:`contactfpga.open` does.
+
+        ``name``: of its link; by default that of its Skin. ``mount``: where its sheet lies on a robot. ``felt``: from
+        the open board to what says the forces at a frame's zones.
+        """
         buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
-        self._opened.append((link_name(board.hello) if name is None else name, board, buffer))
+        try:
+            force = None if felt is None else felt(board)
+        except BaseException:
+            board.close()
+            raise
+        self._opened.append(_Opened(link_name(board.hello) if name is None else name, board, buffer, mount, force))
 
     def start(self, seconds: float | None = None) -> None:
         """Make the file, and record for so long, or until :meth:`stop`."""
@@ -76,11 +107,16 @@ class Session:
     def _begin(self, seconds: float | None, begun: threading.Event) -> None:
         try:
             self._recorder = Recorder(self._path, self._split)
-            for name, board, buffer in self._opened:
-                self.links.append(LinkRecorder(board, buffer, self._recorder.add(name, board), self._bytes_only))
+            for name, values in self._about.items():
+                self._recorder.about(name, values)
+            for one in self._opened:
+                file = self._recorder.add(one.name, one.board)
+                said = None if self._bytes_only else LinkMessages(one.board, file, one.mount, one.felt)
+                self.links.append(LinkRecorder(one.board, one.buffer, file, said, one.felt is not None))
         except BaseException as error:
             self._failure = error
         else:
+            self._left = len(self.links)
             for link in self.links:
                 thread = threading.Thread(target=self._run, args=(link, seconds), name="recorder", daemon=True)
                 thread.start()
@@ -92,15 +128,20 @@ class Session:
         try:
             link.run(self._stop, seconds)
         finally:
-            self._ended.set()
+            if isinstance(link.error, RecordingFailed):  # the others have no place to write to either
+                self._stop.set()
+            with self._lock:
+                self._left -= 1
+                if not self._left:
+                    self._ended.set()
 
     @property
     def running(self) -> bool:
-        """Whether all boards are still being recorded."""
+        """Whether a board is still being recorded."""
         return not self._ended.is_set()
 
     def wait(self, seconds: float) -> None:
-        """At most until something ends."""
+        """At most until all has ended."""
         self._ended.wait(seconds)
 
     def stop(self) -> None:
@@ -114,8 +155,8 @@ class Session:
             for link in self.links:
                 link.finish()
         finally:
-            for _, board, _ in self._opened:
-                board.close()
+            for one in self._opened:
+                one.board.close()
             if self._recorder is not None:
                 self._recorder.close()
         for link in self.links:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -33,7 +34,7 @@ def _bits(name: str, prefix: str) -> dict[str, int]:
 FLAGS = _bits("Zones", "FLAG_")
 REPORTS = _bits("Skin", "REPORT_")
 EVENTS = _bits("TrackEvent", "")
-ZONE_GHOST = message_type(f"{PACKAGE}/Zone").constant("FLAG_GHOST")
+ZONE_FLAGS = _bits("Zone", "FLAG_")
 
 
 def header(time_ns: int, frame: str) -> Message:
@@ -54,7 +55,7 @@ def skin(hello: Hello, head: Message) -> Message:
         "pitch_x": sheet.pitch_x_mm / 1000,
         "pitch_y": sheet.pitch_y_mm / 1000,
         "radius": (sheet.radius_mm or 0.0) / 1000,
-        "closed": getattr(sheet, "closed", False),
+        "closed": sheet.closed,
         "ghosts": sheet.ghosts,
         "connectivity": sheet.connectivity,
         "report": REPORTS[sheet.report],
@@ -70,7 +71,7 @@ def skin(hello: Hello, head: Message) -> Message:
 def zone(found: Zone) -> Message:
     """A ``Zone``."""
     return {
-        "position": vector(_NOWHERE if found.point_mm is None else [one / 1000 for one in found.point_mm]),
+        "position": vector(_NOWHERE) if found.point_mm is None else _point(found.point_mm),
         "normal": vector(found.normal or _NOWHERE),
         "x": _meters(found.x_mm),
         "y": _meters(found.y_mm),
@@ -78,7 +79,7 @@ def zone(found: Zone) -> Message:
         "area_cells": found.area_cells,
         "sum_x": found.sum_x or 0,
         "sum_y": found.sum_y or 0,
-        "flags": ZONE_GHOST * found.ghost,
+        "flags": ZONE_FLAGS["ghost"] * found.ghost | ZONE_FLAGS.get(found.winding, 0),
     }
 
 
@@ -89,7 +90,7 @@ def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
         "stamp_sigma": _NAN if sigma_s is None else sigma_s,
         "device_time_us": frame.time_us,
         "sequence": frame.sequence,
-        "flags": sum(bit for name, bit in FLAGS.items() if name in frame.flags),
+        "flags": _flag_bits(frame.flags),
         "overwritten": frame.overwritten,
         "pressed": frame.pressed,
         "total_zones": frame.total_zones,
@@ -97,6 +98,11 @@ def zones(frame: Zones, head: Message, sigma_s: float | None = None) -> Message:
         "zones": [zone(one) for one in frame],
         "cells": b"" if frame.cells is None else np.packbits(frame.cells).tobytes(),
     }
+
+
+@functools.cache
+def _flag_bits(flags: frozenset[str]) -> int:
+    return sum(FLAGS[name] for name in flags)
 
 
 def tracks(found: Tracks, events: Iterable[Event], restarted: bool, head: Message) -> Message:
@@ -174,10 +180,15 @@ def _meters(length_mm: float | None) -> float:
     return _NAN if length_mm is None else length_mm / 1000
 
 
+def _point(point_mm: tuple[float, float, float]) -> Message:
+    x, y, z = point_mm
+    return {"x": x / 1000, "y": y / 1000, "z": z / 1000}
+
+
 def vector(values: Sequence[float]) -> Message:
     """A ``geometry_msgs/Vector3`` or ``Point``."""
     x, y, z = values
-    return {"x": float(x), "y": float(y), "z": float(z)}
+    return {"x": x, "y": y, "z": z}
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Message:

@@ -44,7 +44,7 @@ class Publisher:
             return Domain(domain, config), DomainParticipant(domain)
 
         self._domain, self._participant = join() if network else kept_inside(join)
-        self._writers: dict[str, Any] = {}
+        self._writers = {name: self._writer(topic) for name, topic in TOPICS.items()}
 
     def topic(self, name: str) -> str:
         """The whole name of a topic."""
@@ -52,30 +52,22 @@ class Publisher:
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish a message by the name of its topic, a key of :data:`TOPICS`."""
-        if topic not in self._writers:
-            self._writers[topic] = self._writer(TOPICS[topic])
         writer, kind = self._writers[topic]
         sample = object.__new__(kind)
-        sample.serialize = lambda **_: data  # it is written by us already, forty times as fast
+        sample.serialize = lambda **_: data  # it is written already
         writer.write(sample)
 
-    def _writer(self, topic: Topic) -> tuple[Any, type]:
-        from cyclonedds.core import Policy, Qos
+    def subscribers(self, topic: str) -> int:
+        """How many take a topic now."""
+        return len(self._writers[topic][0].get_matched_subscriptions())
+
+    def _writer(self, topic: Topic) -> tuple[Any, Any]:
         from cyclonedds.pub import DataWriter
         from cyclonedds.topic import Topic as DdsTopic
-        from cyclonedds.util import duration
 
         kind = idl_type(topic.type)
-        qos = Qos(
-            Policy.Reliability.Reliable(duration(milliseconds=100)),
-            Policy.Durability.TransientLocal if topic.latched else Policy.Durability.Volatile,
-            Policy.History.KeepLast(topic.depth),
-            Policy.DataRepresentation(use_cdrv0_representation=True),
-            Policy.Userdata(f"typehash={type_hash(topic.type)};".encode()),
-        )
-        return DataWriter(
-            self._participant, DdsTopic(self._participant, f"rt{self.topic(topic.name)}", kind), qos=qos
-        ), kind
+        made = DdsTopic(self._participant, f"rt{self.topic(topic.name)}", kind)
+        return DataWriter(self._participant, made, qos=qos_of(topic)), kind
 
     def close(self) -> None:
         """Leave the domain."""
@@ -87,6 +79,20 @@ class Publisher:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def qos_of(topic: Topic) -> Any:
+    """Quality of service of a topic's writer; a reader's fits it."""
+    from cyclonedds.core import Policy, Qos
+    from cyclonedds.util import duration
+
+    return Qos(
+        Policy.Reliability.Reliable(duration(milliseconds=100)),
+        Policy.Durability.TransientLocal if topic.latched else Policy.Durability.Volatile,
+        Policy.History.KeepLast(topic.depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        Policy.Userdata(f"typehash={type_hash(topic.type)};".encode()),
+    )
 
 
 @functools.cache

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from contactfpga.driver.driver import Board
 
 OK, WARN, ERROR = range(3)
+WAITED_S = 0.25
+"""Frames that wait for longer until they are taken are told."""
+
 _COUNTED = ("frames", "lost", "dropped", "overwritten", "resynchronized", "restarts", "skin_changes")
 _TROUBLE = ("lost", "damaged", "dropped", "restarts")
 """Of these a new one since the last message is a warning."""
@@ -27,12 +30,15 @@ class Diagnostics:
         self._silence_s = silence_s + (MAX_KEEP_ALIVE_MS / 1000 if board.hello.send == "on_change" else 0)
         self._heard_s = self._since_s = board.clock()
         self._before: dict[str, int] = {}
+        self._waited_s = 0.0
         self._flags: set[str] = set()
         self._faults: tuple[str, ...] = ()
 
     def frame(self, zones: Zones) -> None:
         """A frame came."""
         self._heard_s = self._board.clock()
+        if zones.arrived_s is not None:
+            self._waited_s = max(self._waited_s, self._heard_s - zones.arrived_s)
         self._flags |= zones.flags
         self._faults = zones.faults
 
@@ -54,6 +60,7 @@ class Diagnostics:
         }
         found = _array(head, self._name, level, text, self._board.fingerprint.hex(), values | counts)
         self._before, self._since_s = counts, now
+        self._waited_s = 0.0
         self._flags.clear()
         return found
 
@@ -66,6 +73,8 @@ class Diagnostics:
             return ERROR, f"no frame for {now - self._heard_s:.1f} s; the sheet may be touched"
         said = [f"{counts[name] - self._before.get(name, 0)} {name}" for name in _TROUBLE if self._more(counts, name)]
         said += [f"flagged {flag}" for flag in ("mismatch", "overflow") if flag in self._flags]
+        if self._waited_s > WAITED_S:
+            said.append(f"frames waited for {self._waited_s:.1f} s: the computer is too busy")
         said += self._faults
         return (WARN, "; ".join(said)) if said else (OK, "frames come")
 

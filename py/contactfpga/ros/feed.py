@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 QUEUE = 4096
 """Frames that wait while others are published."""
+BEHIND_S, BEHIND_HZ = 0.02, 10.0
+"""A frame that waited for longer is published this often at most, so that those after it wait less."""
+EARLY = 0.1
+"""Periods by which a frame may come too early: boards whose frames come at the rate asked for are not exact."""
 POLL_S = 0.1
 """How long to wait for a frame before looking at what else is due."""
 
@@ -64,7 +68,7 @@ class Feed:
         self._rim = outline(board.sheet)
         self._last: tuple[Zones, Tracks] | None = None
         self._forces: Contacts | None = None
-        self._published = -1  # zones in the frame published last
+        self._published, self._published_s = -1, -1e300  # zones in the frame published last, and when that was
         self._due = dict.fromkeys(("zones", "markers", "diagnostics"), -1e300)
         self._diagnostics = Diagnostics(board, self._frame, self.settings.silence_s)
 
@@ -94,18 +98,26 @@ class Feed:
         self._events += tracks.events
         self._restarted |= tracks.restarted
         self._diagnostics.frame(zones)
-        if not self._is_due("zones", self.settings.zones_hz) and len(zones) == self._published:
+        if not self._wanted(zones) and len(zones) == self._published:
             self.left_out += 1
             return
-        self._published = len(zones)
+        self._published, self._published_s = len(zones), self._board.clock()
         self._forces = None if self._felt is None else self._felt(zones, tracks)
         head = convert.header(self._moments.of(zones), self._frame)
-        self._put("zones", convert.zones(zones, head, getattr(zones, "host_sigma_s", None)))
+        self._put("zones", convert.zones(zones, head, zones.host_sigma_s))
         self._put("tracks", convert.tracks(tracks, self._events, self._restarted, head))
         self._put("contacts", convert.contacts(tracks.active, head, self._forces))
         if self._forces is not None:
-            self._put("wrench", convert.wrench(self._forces.wrench, head))
+            total = self._forces.wrench
+            self._put("wrench", convert.wrench(total, head | {"frame_id": total.frame or self._frame}))
         self._events, self._restarted = [], False
+
+    def _wanted(self, zones: Zones) -> bool:
+        """Whether to publish a frame. Frames wait where the computer is busy, or was while the board was opened."""
+        now = self._board.clock()
+        if zones.arrived_s is not None and now - zones.arrived_s > BEHIND_S:
+            return now - self._published_s >= 1 / BEHIND_HZ
+        return self._is_due("zones", self.settings.zones_hz)
 
     def tick(self) -> None:
         """Publish what is due by the clock alone."""
@@ -125,9 +137,8 @@ class Feed:
 
     def _is_due(self, what: str, rate_hz: float) -> bool:
         """Whether it is time to do it, at this rate on average. What was missed is not made up for."""
-        now = self._board.clock()
-        if now < self._due[what]:
+        now, due, period_s = self._board.clock(), self._due[what], 1 / rate_hz
+        if now < due - EARLY * period_s:
             return False
-        following = self._due[what] + 1 / rate_hz
-        self._due[what] = following if following > now else now + 1 / rate_hz
+        self._due[what] = (due if due > now - period_s else now) + period_s
         return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -28,14 +28,21 @@ _EDGE = 16
 _GRAY, _BLUE, _ORANGE = (0.5, 0.5, 0.5, 1.0), (0.0, 0.45, 0.7, 0.9), (0.85, 0.37, 0.0, 1.0)
 
 
-def outline(sheet: Sheet) -> list[Message]:
-    """The rim of the sheet's cells in m, as points of a line."""
+Place = Callable[[float, float], tuple[Sequence[float], Sequence[float]]]
+"""From x and y on the sheet in mm to a point in m and the normal there."""
+
+
+def outline(sheet: Sheet, place: Place | None = None) -> list[Message]:
+    """The rim of the sheet's cells in m, as points of a line; ``place`` says where it lies that does not lie as its
+    Skin says."""
     x0, x1 = -sheet.pitch_x_mm / 2, (sheet.columns - 0.5) * sheet.pitch_x_mm
     y0, y1 = -sheet.pitch_y_mm / 2, (sheet.rows - 0.5) * sheet.pitch_y_mm
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
     places = [corners[0]]
     for (ax, ay), (bx, by) in pairwise(corners):
         places += [(ax + (bx - ax) * part / _EDGE, ay + (by - ay) * part / _EDGE) for part in range(1, _EDGE + 1)]
+    if place is not None:
+        return [vector(place(x, y)[0]) for x, y in places]
     lies = surfaces.of(sheet)
     return [vector([one / 1000 for one in lies.place(x, y)[0]]) for x, y in places]
 

@@ -45,8 +45,22 @@ class Units:
         return self.converter.spacing_levels * self.level_clocks
 
     @property
+    def pace_level_clocks(self) -> int:
+        """How long the clock is high, and how long low, that a converter with a pace of its own is given; else 0."""
+        pace, hz = self.converter.pace, self.skin.clock_hz
+        return 0 if pace is None else max(-(-hz // (2 * pace.most_hz)), -(-pace.least_level_ns * hz // 1_000_000_000))
+
+    @property
+    def delay_us(self) -> int:
+        """From the middle of what a conversion averages until it is ready, to the nearest us."""
+        pace = self.converter.pace
+        return 0 if pace is None else round(pace.delay_halves * self.sweep_clocks * 500_000 / self.skin.clock_hz)
+
+    @property
     def sweep_clocks(self) -> int:
         """From a unit's sample to its next one."""
+        if (pace := self.converter.pace) is not None:
+            return 2 * self.pace_level_clocks * pace.period
         return self.converter.sweep_levels * self.level_clocks * self.skin.units
 
     @functools.cached_property

@@ -124,7 +124,8 @@ LONGEST_PACKET = Widths(
         zone_capacity=MAX_LINES * MAX_LINES // 2,
         pitch_x_mm=1.0,
         pitch_y_mm=1.0,
-        radius_mm=None,
+        radius_mm=1.0,
+        closed=True,
         ghosts=False,
     )
 ).max_frame_bytes

@@ -166,7 +166,7 @@ class Laid:
         far = 2 * mesh.size_mm
         starts = self._placed(far * out + heights[:, None] * np.array([0.0, 0.0, 1.0]))
         points, normals = mesh.hit(starts, -out @ self.rotation.T)
-        beyond = np.linalg.norm(points - starts, axis=1) > far  # met behind the axis alone
+        beyond = np.linalg.norm(points - starts, axis=1) > far  # met beyond the axis alone
         points[beyond] = normals[beyond] = np.nan
         return points, normals
 

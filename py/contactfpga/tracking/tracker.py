@@ -86,7 +86,8 @@ class Tracker:
     def _step(self, zones: Zones) -> list[Zone]:
         """Returns the zones that no contact has."""
         pairs, lost, free = self._paired([zone for zone in zones if zone.x_mm is not None])
-        unsure = [zone for zone in free if zone.ghost]
+        winding = [zone for zone in zones if zone.winding]
+        unsure = [zone for zone in free if zone.ghost] + winding
         free = [zone for zone in free if not zone.ghost]
         merges: dict[Spot, list[Spot]] = {}
         parts: dict[Spot, list[Zone]] = {}
@@ -94,7 +95,8 @@ class Tracker:
             merges = joins.merged(pairs, lost, free, self._apart, self._gate_mm)
         if free and self._spots:
             parts = joins.parted(pairs, lost, free, merges, self._apart, self._expects, self._gate_mm)
-        self._spots = [spot for spot in lost if self._held(spot, "overflow" in zones.flags)]
+        hidden = bool(winding) or "overflow" in zones.flags
+        self._spots = [spot for spot in lost if self._held(spot, hidden)]
         for spot, zone in pairs:
             self._go_on(spot, zone, merges.get(spot), parts.get(spot))
         for spot, split in parts.items():

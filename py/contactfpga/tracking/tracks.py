@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Literal
 
+from contactfpga import notebook
 from contactfpga.zones.zone import Zone
 
 Kind = Literal["down", "move", "merge", "split", "up"]
@@ -26,7 +27,8 @@ class Track:
     """Its speed along x in mm/s, smoothed over some milliseconds."""
     vy_mm_s: float
     held: bool = False
-    """This frame does not show it. It bounces, or the frame leaves zones out (``overflow``, ``mismatch``)."""
+    """This frame does not show it. It bounces, the frame leaves zones out (``overflow``, ``mismatch``), or a zone that
+    winds around the sheet may hide it."""
     merged: tuple[int, ...] = ()
     """Ids of smaller contacts in the same zone; each gets its own zone again when they part."""
 
@@ -88,10 +90,21 @@ class Tracks:
     events: tuple[Event, ...]
     """What happened since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
-    """Zones that no contact has, because other pressed switches may have made them (:attr:`Zone.ghost`). They begin
-    no contact; one that is there goes on in such a zone."""
+    """Zones that no contact has: other pressed switches may have made them (:attr:`Zone.ghost`), or they lead around a
+    sheet whose ends meet and have no place along it (:attr:`Zone.winding`). They begin no contact. One that is there
+    goes on in a ghost, and is held while a zone winds."""
     restarted: bool = False
     """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
+
+    def _repr_html_(self) -> str:
+        """The contacts as a table in a notebook."""
+        rows = [
+            [f"#{track.id}", *(_mm(each) for each in (track.zone.x_mm, track.zone.y_mm)), f"{track.zone.area_cells}"]
+            + [f"{track.vx_mm_s:.0f}, {track.vy_mm_s:.0f}", f"{(self.time_us - track.since_us) / 1e6:.3f}"]
+            for track in self.active
+        ]
+        head = ["contact", "x, mm", "y, mm", "cells", "speed, mm/s", "for, s"]
+        return notebook.table(head, rows, f"At {self.time_us / 1e6:.6f} s")
 
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""
@@ -101,3 +114,7 @@ class Tracks:
             "unsure": len(self.unsure),
             "restarted": self.restarted,
         }
+
+
+def _mm(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.view.fingers import Hand
 from contactfpga.view.panel import Panel
-from contactfpga.view.sources import Source
+from contactfpga.view.sources import Moment, Source
 from contactfpga.view.stage import Stage
 from contactfpga.view.tiles import Tiles
 
@@ -23,9 +23,10 @@ class View:
 
     def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
         self._source = source
-        self.stage = Stage(server, Tiles(source.sheet))
+        self.stage = Stage(server, Tiles(source.sheet), source.cells)
         self.panel = Panel(server, source, hand)
         self._told_s = 0.0
+        self._moment: Moment | None = None
         self.drawn = 0
         """Moments drawn."""
         self.stage.look()
@@ -36,8 +37,9 @@ class View:
         """Wait for a moment and draw it."""
         moment = self._source.turn()
         if moment is not None:
+            self._moment = moment
             self.stage.draw(moment)
             self.drawn += 1
         if (now := time.monotonic()) - self._told_s > PANEL_S:
             self._told_s = now
-            self.panel.write(moment)
+            self.panel.write(self._moment)

@@ -47,7 +47,7 @@ class Guard:
         address = urlsplit(path)
         given = parse_qs(address.query).get("token", [""])[0]
         if given and not upgrade:
-            return self._welcome(address.path, port) if self._is_token(given) else _NO_TOKEN
+            return self._welcome(port) if self._is_token(given) else _NO_TOKEN
         return None if self._is_token(_cookie(headers, self.cookie(port))) else _NO_TOKEN
 
     def page_headers(self, headers: Mapping[str, str]) -> dict[str, str]:
@@ -91,12 +91,16 @@ class Guard:
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
-    def _welcome(self, path: str, port: int) -> Answer:
-        """Send the browser to the same page without the token, so that it stays out of the address line."""
+    def _welcome(self, port: int) -> Answer:
+        """Lead the browser to the same page without the token, so that it stays out of the address line. The page does
+        it by itself: after a redirect a browser that came by a link of another site would keep its cookie back."""
         cookie = f"{self.cookie(port)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-        return Answer(303, "", {"Location": "/" + path.lstrip("/"), "Set-Cookie": cookie, "Cache-Control": "no-store"})
+        page = f"<!doctype html><title>contactfpga</title><script>location.replace({_PAGE!r})</script>\n"
+        return Answer(200, page, {**_HEADERS, "Content-Type": "text/html; charset=utf-8", "Set-Cookie": cookie})
 
 
+_PAGE = "/"
+_HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY"}
 _NO_TOKEN = Answer(403, "The token is missing or is another one; open the whole address that the server printed.\n")
 
 

@@ -61,10 +61,13 @@ class Meter:
                 count, area = max(count, before_count), max(area, before_area)
             self._steps.append((int(step), int(count), float(area)))
 
-    def take_latency(self, batch: Batch) -> None:
-        """The same frames, of a board whose clock is the host's."""
+    def take_latency(self, batch: Batch, virtual: bool) -> None:
+        """The same frames; ``virtual``: the board's clock is that of its arrivals, and need not be estimated."""
         frames = batch.frames
-        self._late_s.append(float(np.median(frames["host_time_s"] - frames["time_us"] / 1e6)))
+        sampled_s = frames["time_us"] / 1e6 if virtual else frames["host_time_s"]
+        late_s = frames["arrived_s"] - sampled_s
+        if np.isfinite(late_s).any():
+            self._late_s.append(float(np.nanmedian(late_s)))
 
     @property
     def late_s(self) -> float | None:

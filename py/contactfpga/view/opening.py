@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import dataclasses
+import math
+import tempfile
+import threading
+import time
+import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
-from contactfpga.driver import driver, transport
+from contactfpga.driver import driver, sim_address, transport
+from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
+from contactfpga.view.bodies import BodySource, BodyView
 from contactfpga.view.fingers import Hand
 from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
@@ -21,8 +29,8 @@ from contactfpga.view.sources import BoardSource, Source
 if TYPE_CHECKING:
     import viser
 
-CLOCK_HZ = 6_000_000
-"""Of the virtual board that is shown where nothing is named: half the usual clock, which keeps up with real time."""
+SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
+"""Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
 
 FINGER = 0.9
 """Radius of the mouse's finger, of the pitch."""
@@ -34,50 +42,92 @@ class Shown:
 
     web: viser.ViserServer
     guard: Guard
-    view: View
-    source: Source
+    view: View | BodyView
+    source: Source | BodySource
     hand: Hand | None
     """The mouse's, on a virtual board."""
     url: str
     """With the token: whoever has it can read and press."""
 
 
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """What a user asks to see."""
+
+    port: str | None = None
+    """A port, ``sim://``, a recording; None: a virtual sheet."""
+    skin: str | Path | None = None
+    baud: int | None = None
+    timeout: float = 1.0
+    """Seconds for the hello."""
+    link: str | None = None
+    """Of a recording of several boards."""
+    units: str | Path | None = None
+    """File of the pressure units; by default what ``sim://`` names."""
+
+
 @contextlib.contextmanager
-def opened(
-    port: str | None = None,
-    skin: str | Path | None = None,
-    host: str = server.LOCAL,
-    http_port: int | None = None,
-    baud: int | None = None,
-    timeout: float = 1.0,
-    link: str | None = None,
-) -> Iterator[Shown]:
+def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int | None = None) -> Iterator[Shown]:
     """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
     does."""
-    source, hand = _source(port, skin, baud, timeout, link)
+    named = named or Named()
+    source: Source | BodySource
+    source, hand = (BodySource(named.port, named.timeout), None) if _is_body(named.port) else _source(named)
     try:
         web, guard = server.serve(host, http_port)
         try:
-            yield Shown(web, guard, View(web, source, hand), source, hand, guard.url(web.get_port()))
+            view = BodyView(web, source) if isinstance(source, BodySource) else View(web, source, hand)
+            yield Shown(web, guard, view, source, hand, guard.url(web.get_port()))
         finally:
             server.stop(web)
     finally:
         source.close()
 
 
-def _source(
-    port: str | None, skin: str | Path | None, baud: int | None, timeout: float, link: str | None
-) -> tuple[Source, Hand | None]:
-    if port is not None and is_recording(port):
-        return Player(load(port, link, timeout)), None
-    if port is not None and not port.startswith("sim:"):
-        return BoardSource(driver.open(port, skin, baud=baud, timeout=timeout), port), None
-    if port is None:
-        asked = Skin.load(skin) if skin is not None else Skin(clock_hz=CLOCK_HZ, send="on_change")
-        virtual: Any = transport.virtual_board("sim://?scene=nothing", asked)
-    else:
-        virtual = transport.virtual_board(port)
-    board = driver.open(virtual, skin, timeout=timeout)
+def run(shown: Shown, seconds: float | None = None) -> None:
+    """Draw moment after moment, for so long; None: until it is interrupted."""
+    until = math.inf if seconds is None else time.monotonic() + seconds
+    while time.monotonic() < until:
+        shown.view.turn()
+
+
+def _is_body(port: str | None) -> TypeGuard[str]:
+    return port is not None and port.endswith(".toml")
+
+
+def _source(named: Named) -> tuple[Source, Hand | None]:
+    if named.port is not None and is_recording(named.port):
+        return Player(load(named.port, named.link, named.timeout)), None
+    if named.port is not None and not named.port.startswith("sim:"):
+        board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)
+        return BoardSource(board, named.port, cells=_cells(named)), None
+    virtual = _virtual(named)
+    board = driver.open(virtual, None if named.port is None else named.skin, timeout=named.timeout)
     sheet = board.sheet
-    name = port or "sim://"
-    return BoardSource(board, name, virtual), Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+    hand = Hand(virtual, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+    return BoardSource(board, named.port or "a virtual sheet", virtual, _cells(named)), hand
+
+
+def _cells(named: Named) -> LoadCells | None:
+    """Raises :class:`~contactfpga.haptics.HapticsError`."""
+    path = named.units
+    if path is None and named.port is not None and named.port.startswith("sim:"):
+        path = sim_address.parse(named.port).units
+    return None if path is None else LoadCells.load(path)
+
+
+def _virtual(named: Named) -> Any:
+    """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
+    if named.port is not None:
+        return transport.virtual_board(named.port)
+    skin = Skin.load(named.skin) if named.skin is not None else Skin().replace(**SLOW)
+    return transport.virtual_board("sim://?scene=nothing", skin)
+
+
+def browse(url: str) -> None:
+    """Open it in the user's browser, by way of a page that only this user can read: all can read what a program is
+    called with."""
+    with tempfile.NamedTemporaryFile("w", suffix=".html", prefix="contactfpga-", delete=False) as file:
+        file.write(f"<!doctype html><title>contactfpga</title><script>location.replace({url!r})</script>\n")
+    atexit.register(Path(file.name).unlink, missing_ok=True)
+    threading.Thread(target=webbrowser.open, args=(Path(file.name).as_uri(),), daemon=True).start()

@@ -9,6 +9,11 @@ from collections.abc import Callable
 MAX_LAG_S = 0.1
 """A board that is later than this does not catch up any more: its time has slipped."""
 
+MOMENT_S = 0.04
+"""What one moment may take to simulate."""
+LEAST_S = 0.0005
+SMOOTHING = 0.2
+
 WINDOW_S = 2.0
 """Over which the share of real time is told."""
 
@@ -21,6 +26,7 @@ class Pace:
         self._begin = clock() - simulated_s  # when simulated time was 0, slip taken out
         self.slip_s = 0.0
         """Seconds by which simulated time has fallen behind for good."""
+        self._speed = 1.0
         self._seen: collections.deque[tuple[float, float]] = collections.deque([(clock(), simulated_s)])
 
     def due(self, simulated_s: float) -> float:
@@ -35,6 +41,17 @@ class Pace:
         while now - self._seen[0][0] > WINDOW_S:
             self._seen.popleft()
         return behind
+
+    def ran(self, simulated_s: float, seconds: float) -> None:
+        """So long it took to simulate so much."""
+        if seconds > 0:
+            self._speed += SMOOTHING * (simulated_s / seconds - self._speed)
+
+    @property
+    def most_s(self) -> float:
+        """Seconds of simulated time that this machine simulates within :data:`MOMENT_S`. Where it is slow a moment
+        holds less, so that it is shown as soon."""
+        return max(MOMENT_S * self._speed, LEAST_S)
 
     @property
     def share(self) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga import picture_style
+from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
 from contactfpga.view.player import SPEEDS, Player
 from contactfpga.view.sources import Moment, Source
@@ -33,6 +34,10 @@ TRUTH = (
 )
 """Of the legend: name and value of a color, its mark, what it means."""
 
+FORCE = ("purple", picture_style.PURPLE, "➜", f"the force of a contact, {picture.MM_PER_N:g} mm per newton")
+TITLE = 36
+MOST_N = 30.0
+"""Of the mouse's finger."""
 CAPTURE_S = 20.0
 
 
@@ -77,8 +82,13 @@ class Panel:
             server.gui.add_markdown(MOUSE)
             low, high = round(0.75 * pitch_mm, 1), round(4 * pitch_mm, 1)
             radius = server.gui.add_slider("finger mm", low, high, 0.1, min(max(hand.radius_mm, low), high))
+            force = None
+            if self._source.cells is not None:
+                force = server.gui.add_slider("force N", 0.5, MOST_N, 0.1, hand.force_n)
             lift = server.gui.add_button("Lift all")
         radius.on_update(lambda _: hand.resize(radius_mm=radius.value))
+        if force is not None:
+            force.on_update(lambda _: hand.resize(force_n=force.value))
         lift.on_click(lambda _: hand.lift())
 
     def _add_capture(self, server: viser.ViserServer) -> None:
@@ -130,13 +140,25 @@ class Timeline:
 def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
     """Names and values, as the panel shows them."""
     meter = source.meter
-    rows = [("source", f"`{source.title}`"), ("frames", f"{meter.frames_per_s:,.0f} per second")]
+    rows = [("source", shortened(source.title)), ("frames", f"{meter.frames_per_s:,.0f} per second")]
     if moment is not None:
         zones = moment.zones
         rows.append(("zones", f"{zones.total_zones}, {zones.pressed} cells pressed"))
+        if moment.felt is not None and moment.felt[0]:
+            rows.append(
+                (
+                    "forces",
+                    ", ".join("?" if one.normal_n is None else f"{one.normal_n:.2f} N" for one in moment.felt[0]),
+                )
+            )
         flags = sorted(zones.flags | set(zones.faults))
         rows += [("flags", ", ".join(flags))] if flags else []
     return rows + source.told()
+
+
+def shortened(title: str) -> str:
+    """At most a line; the end of a long name says most."""
+    return title if len(title) <= TITLE else f"… {title[-TITLE:]}"
 
 
 def legend(source: Source, virtual: bool) -> str:
@@ -145,6 +167,7 @@ def legend(source: Source, virtual: bool) -> str:
     cells = source.sheet.report == "cells"
     rows += [REPORTED] if cells else []
     rows += [GHOSTS] if cells and source.sheet.ghosts else []
+    rows += [FORCE] if source.cells is not None else []
     rows += [TRUTH] if virtual and not cells else []
     return "\n".join(f"{_MARK.format(color=color, mark=mark)} {what}  " for _, color, mark, what in rows)
 

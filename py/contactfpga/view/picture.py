@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 
 from contactfpga import picture_style
+from contactfpga.haptics import Contacts, LoadCells
 from contactfpga.surfaces import Surface
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.view.tiles import MM
@@ -85,6 +87,45 @@ def _circle(zone: Zone, surface: Surface, lift_mm: float) -> np.ndarray:
 def _lifted(surface: Surface, x_mm: np.ndarray, y_mm: np.ndarray, lift_mm: float) -> np.ndarray:
     points, normals = surface.place(x_mm, y_mm)
     return (points + lift_mm * normals) * MM
+
+
+MM_PER_N = 4.0
+"""Length of an arrow."""
+LEAST_N = 0.02
+"""Weaker forces have no arrow."""
+
+
+def pushes(contacts: Contacts, zones: Zones, cells: LoadCells, surface: Surface) -> np.ndarray:
+    """(n, 2, 3) arrows in m, one for each contact with a force, from outside to its zone's barycenter.
+
+    The units' surface has its own frame, and may be the outside of a foam: forces are taken along normal, rows and
+    columns there, and drawn along those of the sheet.
+    """
+    placed = [zone for zone in zones if zone.x_mm is not None]
+    arrows = []
+    for contact, zone in zip(contacts, placed):
+        if contact.force_n is None or math.hypot(*contact.force_n) < LEAST_N:
+            continue
+        assert zone.x_mm is not None
+        assert zone.y_mm is not None
+        shift_x, shift_y = cells.sheet_m
+        assert cells.surface is not None
+        theirs = _directions(cells.surface, zone.x_mm * MM + shift_x, zone.y_mm * MM + shift_y, 1.0)
+        ours = _directions(surface, zone.x_mm, zone.y_mm, 1 / MM)
+        force = (theirs @ np.array(contact.force_n)) @ ours
+        tip = np.array(surface.place(zone.x_mm, zone.y_mm)[0])
+        arrows.append(np.array([tip - MM_PER_N * force, tip]) * MM)
+    return np.array(arrows) if arrows else np.zeros((0, 2, 3))
+
+
+def _directions(surface: Any, x: float, y: float, unit: float) -> np.ndarray:
+    """(3, 3) unit vectors at a place: the normal, and the ways in which x and y grow."""
+    point, normal = (np.array(each) for each in surface.place(x, y))
+    step = 1e-4 * unit
+    across = np.array(surface.place(x, y + step)[0]) - point
+    across = across - (across @ normal) * normal
+    across = across / np.linalg.norm(across)
+    return np.stack([normal, np.cross(across, normal), across])
 
 
 class Trails:

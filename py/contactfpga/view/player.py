@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from contactfpga.driver.stats import Stats
+from contactfpga.haptics import LoadCells
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.view.meter import Meter
@@ -24,6 +25,8 @@ BEFORE_S = 0.25
 
 class Player:
     """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are for any thread."""
+
+    cells: LoadCells | None = None
 
     def __init__(self, recording: Recorded, clock: Callable[[], float] = time.monotonic):
         self.title, self.sheet, self.meter = recording.title, recording.sheet, Meter()

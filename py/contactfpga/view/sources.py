@@ -11,6 +11,7 @@ import numpy as np
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ReadTimeout
+from contactfpga.haptics import Contacts, LoadCells, felt
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
@@ -22,6 +23,9 @@ from contactfpga.zones.zone import Zones
 
 TURN_S = 0.02
 """A moment is shown for so long."""
+
+SILENT_S = 0.5
+"""After so long without a frame it is said; a board that works sends one at least every 0.1 s."""
 
 KEEPS_UP = 0.97
 """A board that reaches this share of real time is said to keep up."""
@@ -39,6 +43,9 @@ class Moment:
     tracks: Tracks
     truth: np.ndarray | None = None
     """(rows, columns) bool: what is closed on a virtual board."""
+    felt: tuple[Contacts, Zones] | None = None
+    """The newest forces that are known, with their frame, which is some milliseconds older than :attr:`zones`: the
+    readings after it have to come first."""
 
 
 class Source(Protocol):
@@ -54,6 +61,10 @@ class Source(Protocol):
     def told(self) -> list[tuple[str, str]]:
         """Further facts to show, as name and value."""
 
+    @property
+    def cells(self) -> LoadCells | None:
+        """Where pressure units are; None: there are none, or nothing is known of them."""
+
     def close(self) -> None:
         """Give the port back."""
 
@@ -61,8 +72,11 @@ class Source(Protocol):
 class BoardSource:
     """A board, or with ``virtual`` one in simulated time, which passes here as real time does."""
 
-    def __init__(self, board: Board, title: str, virtual: Touchable | None = None):
+    def __init__(self, board: Board, title: str, virtual: Touchable | None = None, cells: LoadCells | None = None):
         self.title, self.sheet = title, board.sheet
+        self.cells = cells
+        """Where the pressure units are, if they are known."""
+        self._felt_in: Zones | None = None
         self.meter = Meter()
         self._board, self._virtual = board, virtual
         self._frames = board.subscribe(WAITING)
@@ -75,7 +89,15 @@ class BoardSource:
             return None
         zones = self._board.latest()
         truth = None if self._virtual is None else self._virtual.pressed
-        return Moment(zones, self._tracker.update(zones), truth)
+        return Moment(zones, self._tracker.update(zones), truth, self._felt(zones))
+
+    def _felt(self, newest: Zones) -> tuple[Contacts, Zones] | None:
+        """Of the frame that was the newest a moment before."""
+        before, self._felt_in = self._felt_in, newest
+        if self.cells is None or before is None or before.units is None:
+            return None
+        found = felt(self.cells, before)
+        return None if found is None else (found, before)
 
     def _wait(self) -> bool:
         """Whether frames came."""
@@ -84,14 +106,17 @@ class BoardSource:
             due = self._pace.due(self._board.clock())
             if due < TURN_S:
                 time.sleep(TURN_S - due)
-            seconds = max(due, TURN_S)
+            seconds = min(max(due, TURN_S), self._pace.most_s)
+        came = False
+        began_s, began = self._board.clock(), time.monotonic()
         with contextlib.suppress(ReadTimeout):
             batch = self.frames(seconds)
             self.meter.take(batch, self._board.stats, self._frames.dropped)
-            if self._virtual is not None:  # whose clock is that of its arrivals
-                self.meter.take_latency(batch)
-            return True
-        return False
+            self.meter.take_latency(batch, self._virtual is not None)
+            came = True
+        if self._pace is not None:
+            self._pace.ran(self._board.clock() - began_s, time.monotonic() - began)
+        return came
 
     def frames(self, seconds: float) -> Batch:
         """All that come meanwhile. Raises :class:`~contactfpga.ReadTimeout` where none does."""
@@ -99,7 +124,9 @@ class BoardSource:
 
     def told(self) -> list[tuple[str, str]]:
         stats = self.meter.stats
-        rows = [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
+        silent_s = self._board.silence.seconds
+        rows = [("no data", f"for {silent_s:.1f} s; what is drawn is older")] if silent_s > SILENT_S else []
+        rows += [("lost", f"{stats.lost} frames; {sum(stats.damaged.values())} packets damaged")]
         if self.meter.dropped:
             rows.append(("not shown", f"{self.meter.dropped} frames, which came faster than they were read"))
         late = self.meter.late_s

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactfpga.haptics import LoadCells
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
@@ -38,7 +38,11 @@ FACES = np.array(
 class Stage:
     """Draws moments of one sheet."""
 
-    def __init__(self, server: viser.ViserServer, tiles: Tiles, node: str = NODE):
+    def __init__(self, server: viser.ViserServer, tiles: Tiles, load_cells: LoadCells | None = None, node: str = NODE):
+        self._load_cells = load_cells
+        self._arrows: Any = None
+        self.rotation, self.point_m = np.eye(3), np.zeros(3)
+        """Where the sheet's own frame lies in the world."""
         self._server, self.tiles, self._node = server, tiles, node
         sheet = tiles.sheet
         self._pitch_mm = min(sheet.pitch_x_mm, sheet.pitch_y_mm)
@@ -90,6 +94,8 @@ class Stage:
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
         self._draw_labels(moment.tracks)
+        if self._load_cells is not None:
+            self._draw_arrows(moment)
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -105,6 +111,24 @@ class Stage:
             return
         handle.points = lines.astype(np.float32)
         handle.visible = True
+
+    def _draw_arrows(self, moment: Moment) -> None:
+        assert self._load_cells is not None
+        arrows = np.zeros((0, 2, 3))
+        if moment.felt is not None:
+            arrows = picture.pushes(*moment.felt, self._load_cells, self.tiles.surface)
+        if len(arrows):
+            radius = 0.08 * self._pitch_mm * MM
+            self._arrows = self._server.scene.add_arrows(
+                f"{self._node}/forces",
+                arrows,
+                picture.PUSH,
+                shaft_radius=radius,
+                head_radius=2.2 * radius,
+                head_length=5 * radius,
+            )
+        elif self._arrows is not None:
+            self._arrows.visible = False
 
     def _draw_points(self, points: np.ndarray) -> None:
         if not len(points):
@@ -137,14 +161,16 @@ class Stage:
         for label in self._labels[len(shown) :]:
             label.visible = False
 
-    def press_with(self, hand: Hand, pressing: Callable[[], None] = lambda: None) -> None:
-        """Have the mouse press this sheet; ``pressing`` is called as it does."""
-        tiles = self.tiles
+    def _met(self, origin_m: Any, direction: np.ndarray) -> tuple[float, float] | None:
+        """Where a ray of the world meets the sheet."""
+        return self.tiles.met((np.array(origin_m) - self.point_m) @ self.rotation / MM, direction @ self.rotation)
+
+    def press_with(self, hand: Hand) -> None:
+        """Have the mouse press this sheet."""
 
         @self.cells.on_click
         async def click(event: Any) -> None:
-            pressing()
-            place = tiles.met(np.array(event.ray_origin) / MM, np.array(event.ray_direction))
+            place = self._met(event.ray_origin, np.array(event.ray_direction))
             if place is not None:
                 hand.click(*place)
 
@@ -153,11 +179,10 @@ class Stage:
             if event.phase == "end":
                 hand.drop(event.client_id)
                 return
-            pressing()
-            eye = np.array(event.client.camera.position) / MM
+            eye = np.array(event.client.camera.position)
             begins = event.phase == "start"
             to = event.start_position if begins else event.end_position
-            place = tiles.met(eye, np.array(to) / MM - eye)
+            place = self._met(eye, np.array(to) - eye)
             if place is not None:
                 hand.drag(event.client_id, *place)
 

@@ -45,6 +45,7 @@ class Cutter:
         at = find_hello(data)
         if at >= 0:
             self.held = b""
+            at -= data[max(0, at - 2) : at].count(0) == min(at, 2) > 0  # a hello has a delimiter at either end
             return data[:at], data[at:]
         end = data.rfind(0) + 1
         self.held = data[end:]

@@ -26,5 +26,6 @@ class HostLine:
     """Standard deviation of what :meth:`at` returns."""
 
     def at(self, time_us: Times) -> float | Times:
-        """The host's clock in s at a device time in us."""
-        return self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
+        """The host's clock in s at a device time in us, of frames that had arrived by :attr:`arrived_s`."""
+        at_s = self.base_s + (time_us - self.base_us) * (self.rate * 1e-6)
+        return np.minimum(at_s, self.arrived_s) if isinstance(at_s, np.ndarray) else min(at_s, self.arrived_s)

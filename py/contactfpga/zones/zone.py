@@ -10,7 +10,7 @@ from typing import overload
 
 import numpy as np
 
-from contactfpga import surfaces
+from contactfpga import notebook, surfaces
 from contactfpga.skin.sheet import Sheet
 from contactfpga.surfaces.shapes import Vector
 from contactfpga.wire.faults import STUCK
@@ -294,12 +294,31 @@ class Zones(Sequence[Zone]):
     def __iter__(self) -> Iterator[Zone]:
         return iter(self._zones)
 
-    def __repr__(self) -> str:
+    @property
+    def _head(self) -> tuple[str, str]:
         what = f"{len(self)} zone" + ("" if len(self) == 1 else "s")
         flags = "".join(f", {flag}" for flag in sorted(self.flags))
-        when = f"frame {self.sequence} at {self.time_us / 1e6:.6f} s"
-        head = f"<Zones: {what}, {self.pressed} cells pressed, {when}{flags}"
-        return "\n".join([head, *map(_line, self)]) + ">"
+        return f"{what}, {self.pressed} cells pressed", f"frame {self.sequence} at {self.time_us / 1e6:.6f} s{flags}"
+
+    def __repr__(self) -> str:
+        return "\n".join([f"<Zones: {', '.join(self._head)}", *map(_line, self)]) + ">"
+
+    def _repr_svg_(self) -> str:
+        """The sheet in a notebook: pressed cells where they are known, and a circle of each zone's area."""
+        return self.svg()
+
+    def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
+        """The same as a picture."""
+        circles = [
+            (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
+            for zone in self
+            if zone.x_mm is not None and zone.y_mm is not None
+        ]
+        sheet = self.sheet
+        pitch_mm = (sheet.pitch_x_mm, sheet.pitch_y_mm)
+        return notebook.sheet(
+            (sheet.rows, sheet.columns), pitch_mm, "\n".join(self._head), circles, self.cells, width_px
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""

@@ -7,13 +7,14 @@ What is published, and when, is decided by contactfpga.ros.feed, which hands ove
 from __future__ import annotations
 
 import importlib
+import signal
 import threading
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import Node, State, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 
 from contactfpga import ContactFPGAError
 from contactfpga import open as open_board
@@ -89,14 +90,18 @@ class Skin(Node):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: State) -> TransitionCallbackReturn:
-        self._end()
-        for speaker in self._speakers.values():
-            self.destroy_publisher(speaker)
-        self._speakers = {}
+        self.close()
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: State) -> TransitionCallbackReturn:
         return self.on_cleanup(state)
+
+    def close(self) -> None:
+        """Give the port back and end all topics."""
+        self._end()
+        for speaker in self._speakers.values():
+            self.destroy_lifecycle_publisher(speaker)
+        self._speakers = {}
 
     def _speaker(self, topic: Topic):
         package, _, short = topic.type.partition("/")
@@ -150,18 +155,19 @@ class Skin(Node):
 
 def main() -> None:
     """Run the node until it is told to end."""
-    rclpy.init()
+    # With rclpy's own handlers nothing could be published any more while the thread of the board still does.
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Skin()
     if node.get_parameter("autostart").value and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
         node.trigger_activate()
-    try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.on_cleanup(None)
-        node.destroy_node()
-        rclpy.try_shutdown()
+    while not ended.is_set():
+        rclpy.spin_once(node, timeout_sec=0.2)
+    node.close()
+    node.destroy_node()
+    rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

@@ -218,6 +218,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "ALIVE": int(skin.alive),
             "DIVIDED": int(skin.report == "barycenter"),
             "UNITS": skin.units,
+            "PACED": int(Derived(skin).units.converter.pace is not None),
         },
     )
 

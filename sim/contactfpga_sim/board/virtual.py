@@ -116,7 +116,10 @@ class VirtualBoard:
             contacts.Contact(shape=contacts.disc(one.radius_mm), x_mm=one.x_mm, y_mm=one.y_mm, force_n=one.force_n)
             for one in fingers
         ]
-        self._touch = Scene(tuple(placed)).on(self.skin, self._cover) if placed else None
+        scene = Scene(tuple(placed))
+        self._touch = scene.on(self.skin, self._cover) if placed else None
+        if isinstance(self._units, Felt):
+            self._units.touching = scene
 
     def advance(self, cycles: int) -> None:
         """Run clock cycles with the scene as it is now."""

@@ -42,8 +42,8 @@ class Stimulus:
     def __init__(self, skin: Skin, timeline: Timeline):
         self._sheet = Sheet(skin)
         self._converter = converter.converter_of(skin)
-        self.reads = self._sheet.reads + (converter.PINS if self._converter else ())
-        self.drives = (*self._sheet.drives, "rx", *(("spi_miso",) if self._converter else ()))
+        self.reads = self._sheet.reads + (self._converter.reads if self._converter else ())
+        self.drives = (*self._sheet.drives, "rx", *(self._converter.gives if self._converter else ()))
         self._units = list(reversed(timeline.units))
         self._pieces = list(reversed(timeline.pieces))
         self._cuts = list(reversed(timeline.cuts))
@@ -67,7 +67,7 @@ class Stimulus:
         if self._units and self._units[-1][0] <= cycle:
             _, readings = self._units.pop()
             self._converter.codes[: len(readings)] = readings
-        return (self._converter.step(*(pins[name] for name in converter.PINS)),)
+        return self._converter.step(*(pins[name] for name in self._converter.reads))
 
     def _rx(self, cycle: int) -> int:
         if self._received and self._received[-1][0] == cycle:

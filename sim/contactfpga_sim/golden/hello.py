@@ -49,9 +49,8 @@ def _units(facts: Facts) -> bytes:
     skin = facts.skin
     rule = converters.find(skin.converter).load_golden()
     most = max((sum(map(abs, row)) for row in skin.unit_sums), default=0) * (2**rule.bits - 1)
-    between = rule.levels * rule.level(facts)
     sizes = (skin.units, rule.bits, len(skin.unit_sums), most.bit_length())
-    return struct.pack("<BBBBHI", *sizes, between, between * skin.units)
+    return struct.pack("<BBBBHI", *sizes, *rule.spans(facts))
 
 
 class State:

@@ -102,4 +102,11 @@ RUN = LabellerRule(
     volume.run_clocks,
     LabellerRule(functools.partial(exact, strip_clocks=closed_run_clocks, closed=True), volume.closed_run_clocks),
 )
-SERIAL = LabellerRule(functools.partial(exact, strip_clocks=label_serial.cluster_clocks), label_serial.strip_clocks)
+SERIAL = LabellerRule(
+    functools.partial(exact, strip_clocks=label_serial.cluster_clocks),
+    label_serial.strip_clocks,
+    LabellerRule(
+        functools.partial(exact, strip_clocks=label_serial.closed_cluster_clocks, closed=True),
+        label_serial.closed_strip_clocks,
+    ),
+)

@@ -29,6 +29,15 @@ def cluster_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, in
     return leaves, over, over
 
 
+def closed_cluster_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:
+    """The same where the ends meet: two clocks more after the last column if cells are joined over the seam."""
+    leaves, busy, end = cluster_clocks(strip, connectivity)
+    first, last = strip[:, 0], strip[:, -1]
+    seam = 2 if (first.any() and last.any() if connectivity == 8 else (first & last).any()) else 0
+    leaves[:, -1][last] += seam
+    return leaves, busy + seam, end + seam
+
+
 def strip_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same for every row of (N, R, C) bool frames at once: (N, R, C), (N, R) and (N, R) int64."""
     above = np.zeros_like(frames)
@@ -45,3 +54,13 @@ def strip_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.
     for column in range(frames.shape[2] - 2, -1, -1):
         leaves[..., column] = np.where(joined[..., column + 1], leaves[..., column + 1], leaves[..., column])
     return leaves * (frames | above), busy, busy
+
+
+def closed_strip_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """:func:`strip_clocks` where the ends meet."""
+    leaves, busy, end = strip_clocks(frames, connectivity)
+    before = np.concatenate([np.zeros_like(frames[:, :1]), frames[:, :-1]], axis=1)
+    ends = np.stack([before[..., [0, -1]], frames[..., [0, -1]]])  # row before or new row, N, R, first or last column
+    seam = 2 * (ends.any(axis=0).all(axis=-1) if connectivity == 8 else ends.all(axis=-1).any(axis=0))
+    leaves[..., -1] += seam * (before | frames)[..., -1]
+    return leaves, busy + seam, end + seam

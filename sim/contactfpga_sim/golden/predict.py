@@ -114,7 +114,7 @@ class Stages:
     def labelling(self, cells: np.ndarray) -> label.Labelling:
         """The labeller's work on rows that are handed over as a frame."""
         skin = self._facts.skin
-        return label.labelling(cells, skin.connectivity, skin.labeller, skin.closed)
+        return label.labelling(cells, skin.connectivity, skin.labeller, skin.closed and self._facts.zones)
 
     @property
     def due(self) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from contactfpga.choices import converters
 from contactfpga_sim.golden.facts import Facts
@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 
 KIND, OVER, ARMED = 8, 1, 2
 SET_ZERO, SET_THRESHOLD, SET_SUM_THRESHOLD = 3, 4, 5
+
+
+class Taken(NamedTuple):
+    """A unit's reading."""
+
+    sampled: int
+    """Cycle of the input that it is of."""
+    done: int
+    """Cycle in which it is there."""
+    time_us: int
+    """As the packet says it of the sweep's first one."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,11 +54,69 @@ class ConverterRule:
         by_level = Fraction(self.least_level_ns * facts.skin.clock_hz, 10**9)
         return -(-max(by_rate, by_level) // 1)
 
+    def spans(self, facts: Facts) -> tuple[int, int]:
+        """Cycles from one unit to the next, and from sweep to sweep."""
+        between = self.levels * self.level(facts)
+        return between, between * facts.skin.units
+
+    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
+        """Those that begin before ``cycles``."""
+        level, begin = self.level(facts), self.first(facts)
+        while begin < cycles:
+            sweep = []
+            for _ in range(facts.skin.units):
+                sampled = begin + self.sampled * level
+                sweep.append(Taken(sampled, begin + self.last_bit * level + 2, sampled // facts.clocks_per_us))
+                begin += self.levels * level
+            yield sweep
+
     def first(self, facts: Facts) -> int:
         """The cycle in which the first conversion selects the converter: two levels after power-up, from a register."""
         return 2 * self.level(facts) + 1
 
 
+@dataclasses.dataclass(frozen=True)
+class PacedRule:
+    """A converter that converts all units by itself, at the pace of a clock from the board, and says when it did."""
+
+    bits: int
+    least_level_ns: int
+    pace_hz: int
+    pace_level_ns: int
+    periods: int
+    """Of that clock, from one conversion to the next."""
+    word_levels: int
+    """Of its SPI clock in a word; the first word is its status."""
+
+    def level(self, facts: Facts) -> int:
+        """Cycles of a level of the SPI clock."""
+        return -(-self.least_level_ns * facts.skin.clock_hz // 10**9)
+
+    def pace(self, facts: Facts) -> int:
+        """Cycles of a level of the clock that it is given."""
+        hz = facts.skin.clock_hz
+        return max(-(-hz // (2 * self.pace_hz)), -(-self.pace_level_ns * hz // 10**9))
+
+    def spans(self, facts: Facts) -> tuple[int, int]:
+        """Cycles from one unit to the next, and from sweep to sweep."""
+        return 0, 2 * self.periods * self.pace(facts)
+
+    def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
+        """The first conversion is left out; the n-th is that of what was there one and a half periods before."""
+        whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
+        late_us = round(1.5e6 * whole / facts.skin.clock_hz)
+        ready = 2 * whole - pace
+        while ready < cycles:
+            time_us = (ready + 3) // facts.clocks_per_us - late_us
+            sampled = ready - 3 * whole // 2
+            yield [
+                Taken(sampled, ready + 6 + (unit + 2) * self.word_levels * level, time_us)
+                for unit in range(facts.skin.units)
+            ]
+            ready += whole
+
+
+ADS131M08 = PacedRule(24, 40, 8_200_000, 49, periods=2048, word_levels=48)
 MCP3208 = ConverterRule(12, ((2.7, 1_000_000), (5.0, 2_000_000)), 250, levels=40, sampled=12, last_bit=37)
 
 
@@ -109,38 +178,32 @@ def play(facts: Facts, timeline: Timeline, requests: Sequence[Request], cycles: 
     skin = facts.skin
     if not skin.units:
         return Units()
-    rule: ConverterRule = converters.find(skin.converter).load_golden()
-    level = rule.level(facts)
+    rule: ConverterRule | PacedRule = converters.find(skin.converter).load_golden()
     settings = _Settings(facts, rule.bits, requests)
     found = Units(armed=settings.armed())
     hits: dict[tuple[int, int], bool] = {}
-    begin, sequence = rule.first(facts), 0
-    while begin < cycles:
-        readings, deviations, sampled = [], [], begin + rule.sampled * level
-        for unit in range(skin.units):
-            readings.append(timeline.units_at(begin + rule.sampled * level, unit))
-            done = begin + rule.last_bit * level + 2
+    for sequence, sweep in enumerate(rule.sweeps(facts, cycles)):
+        readings, deviations = [], []
+        for unit, (sampled, done, _) in enumerate(sweep):
+            readings.append(timeline.units_at(sampled, unit))
             deviations.append(readings[-1] - settings.at(SET_ZERO, unit, done)[0])
             hits[SET_THRESHOLD, unit] = settings.reached(SET_THRESHOLD, unit, done + 1, abs(deviations[-1]))
             _note(found.over, done + 2, hits)
-            begin += rule.levels * level
         for place, weights in enumerate(skin.unit_sums):
             total = sum(weight * deviation for weight, deviation in zip(weights, deviations, strict=True))
             hits[SET_SUM_THRESHOLD, place] = settings.reached(SET_SUM_THRESHOLD, place, done + 3 + place, abs(total))
             _note(found.over, done + 4 + place, hits)
         told = done + -(-rule.bits // 7) + 6
         over, armed = (bool(_level(changes, told)) for changes in (found.over, found.armed))
-        packet = _packet(facts, rule, readings, sampled, sequence, over, armed)
+        packet = _packet(facts, rule.bits, readings, sweep[0].time_us, sequence, over, armed)
         found.packets.append((told + 1, packet))
-        sequence += 1
     return found
 
 
 def _packet(
-    facts: Facts, rule: ConverterRule, readings: list[int], sampled: int, sequence: int, over: bool, armed: bool
+    facts: Facts, bits: int, readings: list[int], time_us: int, sequence: int, over: bool, armed: bool
 ) -> bytes:
-    time_us = sampled // facts.clocks_per_us
-    plain = [128 + reading // 128**place % 128 for reading in readings for place in range(-(-rule.bits // 7))]
+    plain = [128 + reading // 128**place % 128 for reading in readings for place in range(-(-bits // 7))]
     trailer = time_us % 2**24 + sequence % 256 * 2**24
     plain += [128 + trailer // 128**place % 128 for place in range(5)]
     packet = Packet()

@@ -67,9 +67,11 @@ def row_clocks(
     return _clocks(np.asarray(frames, bool), connectivity, labeller, closed)[1:]
 
 
-def last_record_clocks(frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run") -> np.ndarray:
+def last_record_clocks(
+    frames: np.ndarray, connectivity: int, labeller: LabellerName | Labeller = "run", closed: bool = False
+) -> np.ndarray:
     """(N,) int64: clocks from a frame's last row to the last record that leaves with it; 0 if none does."""
-    found = all_departures(frames, connectivity, labeller)
+    found = all_departures(frames, connectivity, labeller, closed)
     result = np.zeros(len(frames), int)
     final = found.row == frames.shape[1] - 1
     np.maximum.at(result, found.frame[final], found.clock[final])

@@ -37,7 +37,7 @@ class Failure(NamedTuple):
     faults: Faults = Faults()
 
 
-HALFWAY = {"x_mm": 85.0, "y_mm": 85.0}
+HALFWAY = report.HALFWAY
 BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 FAILURES = (
     Failure("nothing wrong", {}),
@@ -78,6 +78,11 @@ def failure_table() -> str:
 def push_table() -> str:
     """Pushes up to the fastest that the arm yields to, and a faster one."""
     return writer.table_of(report.push_lines(comply.pushes(Case.load("push"))[1]))
+
+
+def defense_table() -> str:
+    """Peak force by each line of defense."""
+    return writer.table_of(report.defense_lines(Case.load("paper")))
 
 
 def step_table() -> str:
@@ -142,6 +147,7 @@ def main() -> int:
         "set": lambda: set_table(found),
         "sheet": lambda: sheet_table(tasks, points),
         "speeds": lambda: speed_table(tasks, points),
+        "defense": defense_table,
         "pushes": push_table,
         "failures": failure_table,
         "steps": step_table,

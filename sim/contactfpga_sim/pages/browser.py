@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra, MissingTool
+from contactfpga.view.app import View
 from contactfpga.view.opening import Shown
 from contactfpga.view.tiles import MM
 
@@ -76,6 +77,7 @@ class Visitor:
     def place(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Where a place of the sheet is on the canvas, as shares of its width and height."""
         camera = next(iter(self._shown.web.get_clients().values())).camera
+        assert isinstance(self._shown.view, View)
         point, _ = self._shown.view.stage.tiles.surface.place(x_mm, y_mm)
         x, y, z = turned(camera.wxyz, np.array(point) * MM - camera.position)
         scale = 0.5 / np.tan(camera.fov / 2) / z

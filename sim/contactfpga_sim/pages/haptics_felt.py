@@ -52,13 +52,13 @@ def felt_table() -> str:
 
 def pairs_table() -> str:
     """Forces of two contacts."""
-    rows = [["apart", "two zones in", "error of a push", "95 % interval"]]
-    for apart in APART_MM:
-        each = [felt.two(apart, seed) for seed in range(CONTACTS)]
-        off = np.array([one for pair in each for one in pair.off_n])
-        middle, low, high = interval(off)
-        share = sum(one.zones == 2 for one in each) / len(each)
-        rows.append([f"{apart:g} mm", f"{100 * share:.0f} %", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
+    rows = [["contacts", "apart", "error of a push", "95 % interval"]]
+    for kind in felt.KINDS:
+        for apart in APART_MM:
+            each = [felt.two(apart, seed, kind) for seed in range(CONTACTS)]
+            off = np.array([one for pair in each for one in pair.off_n])
+            middle, low, high = interval(off)
+            rows.append([kind, f"{apart:g} mm", f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
     return writer.table_of(rows)
 
 
@@ -112,9 +112,12 @@ def _front(path: Path) -> Path:
             for (method, errors), color, mark in zip(found(setting).items(), COLORS, MARKS):
                 middle = [1e3 * interval(errors[:, at])[0] for at in range(len(TIMES_S))]
                 panel.loglog([1e3 * one for one in TIMES_S], middle, marker=mark, ms=4, color=color, label=method)
-            name, _, noise = setting.name.partition(", ")
-            panel.set_title(f"pitch {name}" + (f",\n{noise}" if noise else ""), loc="left", fontsize=style.NORMAL)
-            panel.set(xlabel="ms after the first switch closed")
+            noisy = ", noisy" if setting.spread else ""
+            panel.set_title(f"pitch {setting.pitch_mm:g} mm{noisy}", loc="left", fontsize=style.NORMAL)
+            panel.set(xlabel="ms after the first switch closed", xticks=(0.3, 1, 3, 10), yticks=(0.01, 0.1, 1))
+            panel.minorticks_off()
+            panel.xaxis.set_major_formatter("{x:g}")
+            panel.yaxis.set_major_formatter("{x:g}")
         panels[0].set(ylabel="error of the place, mm")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(METHODS))
         return style.save(figure, path)

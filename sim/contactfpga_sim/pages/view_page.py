@@ -11,19 +11,24 @@ import dataclasses
 import functools
 import statistics
 import sys
+import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from contactfpga.console import interrupt, outputs
+from contactfpga.driver import driver
 from contactfpga.driver.link import Link
-from contactfpga.view import opening
+from contactfpga.skin.sheet import Sheet
+from contactfpga.view import opening, plot, replayed
+from contactfpga.view.app import View
 from contactfpga.view.opening import Shown
 from contactfpga.zones.batch import Batch
 from contactfpga_sim.pages import browser, writer
 
 CLICKS = 20
+PACED_S = 4.0
 WAIT_S = 0.7
 """Between two clicks: two of them at once would be a drag."""
 
@@ -67,6 +72,8 @@ class Stopwatch:
 
     def __init__(self, shown: Shown):
         assert shown.hand is not None
+        assert isinstance(shown.view, View)
+        self._stage = shown.view.stage
         self.times: dict[str, float] = {}
         self._shown = shown
         self._virtual: Any = shown.hand.board
@@ -75,13 +82,13 @@ class Stopwatch:
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
         """While it does, what the click passes through is wrapped."""
-        source, stage = self._shown.source, self._shown.view.stage
+        source = self._shown.source
         wrapped: list[tuple[Any, str, Callable[..., Any]]] = [
             (self._virtual, "touch", self._touch),
             (Link, "_take", self._take),
             (source, "frames", self._frames),
             (source, "turn", self._turn),
-            (stage, "draw", self._draw),
+            (self._stage, "draw", self._draw),
         ]
         with contextlib.ExitStack() as stack:
             for where, name, noted in wrapped:
@@ -104,7 +111,7 @@ class Stopwatch:
         batch: Batch = frames(*args)
         closed = batch.frames[batch.frames["pressed"] > 0]
         if len(closed) and "clock" in self.times:
-            self.times.setdefault("arrived", float(closed["host_time_s"][0]))
+            self.times.setdefault("arrived", float(closed["arrived_s"][0]))
         return batch
 
     def _turn(self, turn: Any) -> Any:
@@ -124,9 +131,15 @@ def _method(noted: Any, kept: Any) -> Any:
     return lambda *args: noted(kept, *args)
 
 
+def sheet_of(shown: Shown) -> Sheet:
+    """What is shown."""
+    assert isinstance(shown.view, View)
+    return shown.view.stage.tiles.sheet
+
+
 def clicks(shown: Shown, visitor: browser.Visitor, count: int = CLICKS) -> list[Click]:
     """Click cells one after the other, and lift the finger in between."""
-    watch, sheet, found = Stopwatch(shown), shown.source.sheet, []
+    watch, sheet, found = Stopwatch(shown), sheet_of(shown), []
     assert shown.hand is not None
     with watch.running():
         for index in range(count):
@@ -154,9 +167,53 @@ def click_table(found: list[Click]) -> str:
     return writer.table_of(rows)
 
 
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """Processor time per second of board time, all in s."""
+
+    board: float
+    """Simulating the board."""
+    rest: float
+    """Driver and view, without a browser."""
+
+
+def load_of(shown: Shown, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+    """While these fingers press. Processor time does not depend on what else the computer does."""
+    assert shown.hand is not None
+    virtual: Any = shown.hand.board
+    spent, read = [0.0], virtual.read
+
+    def timed(wanted_s: float) -> bytes:
+        started = time.thread_time()
+        data: bytes = read(wanted_s)
+        spent[0] += time.thread_time() - started
+        return data
+
+    for place in fingers:
+        shown.hand.click(*place)
+    virtual.read = timed
+    began_s, began = virtual.clock(), time.thread_time()
+    while virtual.clock() - began_s < seconds:
+        shown.view.turn()
+    passed_s, used = virtual.clock() - began_s, time.thread_time() - began
+    virtual.read = read
+    shown.hand.lift()
+    return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
+
+
+def load_table(shown: Shown) -> str:
+    """Untouched and touched."""
+    rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
+    for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
+        load = load_of(shown, fingers)
+        both = load.board + load.rest
+        rows.append([name, *(f"{share:.0%}".replace("%", " %") for share in (load.board, load.rest, both))])
+    return writer.table_of(rows)
+
+
 def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
     """Three fingers, one of them on its way."""
-    pitch_mm = shown.source.sheet.pitch_x_mm
+    pitch_mm = sheet_of(shown).pitch_x_mm
     assert shown.hand is not None
     shown.hand.resize(radius_mm=1.6 * pitch_mm)
     visitor.click(3.4 * pitch_mm, 11.3 * pitch_mm)
@@ -166,6 +223,18 @@ def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
     visitor.page.wait_for_timeout(1500)
     browser.screenshot(visitor, path, before=lambda: visitor.drag(*((pitch_mm * x, pitch_mm * y) for x, y in WAY)))
 
+
+def plotted(path: Path) -> None:
+    """A finger that circles, recorded and drawn."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "moving.rec"
+        with driver.open("sim://?scene=moving", record=file) as board:
+            while board.clock() < PLOTTED_S:
+                board.next()
+        plot.draw(replayed.load(str(file)), path)
+
+
+PLOTTED_S = 2.0
 
 WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
 """Of the finger that moves, in pitches."""
@@ -179,14 +248,17 @@ def main() -> int:
     args = parser.parse_args()
     try:
         page = writer.page(args.page)
-        image = outputs.file(args.images / "view.png", "images")
+        image, drawn = (outputs.file(args.images / name, "images") for name in ("view.png", "plot.svg"))
     except outputs.OutputError as error:
         print(f"make view-page: {error}", file=sys.stderr)
         return 1
+    plotted(drawn)
+    with opening.opened(http_port=0) as shown:
+        loads = load_table(shown)
     with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
         found = clicks(shown, visitor)
         picture(shown, visitor, image)
-    writer.write(page, {"view_clicks": lambda: click_table(found)})
+    writer.write(page, {"view_load": lambda: loads, "view_clicks": lambda: click_table(found)})
     return 0
 
 

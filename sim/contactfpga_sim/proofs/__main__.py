@@ -13,6 +13,7 @@ from contactfpga_sim.proofs import (
     label_serial,
     link,
     odometer,
+    paced_units,
     pack,
     precharge,
     pulses,
@@ -59,6 +60,7 @@ CASES: tuple[Case, ...] = (
     *pulses.CASES,
     *dual.CASES,
     *units.CASES,
+    *paced_units.CASES,
     *upset.CASES,
 )
 _WIDTHS = (34, 32, 16, 8, 16, 10)

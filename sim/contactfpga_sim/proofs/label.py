@@ -7,7 +7,7 @@ from amaranth.hdl import Array, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
-from contactfpga_hdl.label.steps import nesting, place_of
+from contactfpga_hdl.label.steps import place_of, waiting
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.util.stack import Stack
@@ -17,8 +17,9 @@ from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.proof import Proof
 
 
-def skin_of(rows: int, columns: int, connectivity: int) -> Skin:
-    return Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=100, zone_capacity=1)
+def skin_of(rows: int, columns: int, connectivity: int, closed: bool = False) -> Skin:
+    flat = Skin(rows=rows, columns=columns, connectivity=connectivity, settle_us=100, zone_capacity=1)
+    return flat.replace(surface="cylinder", radius_mm=10.0, closed=True, zone_capacity=1) if closed else flat
 
 
 def rows_into(proof: Proof, dut: RunLabeller):
@@ -33,7 +34,7 @@ def rows_into(proof: Proof, dut: RunLabeller):
     return valid, cells, last
 
 
-def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
+def nothing_overflows(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come; ``stalls_change_nothing`` shows that this
     is no restriction.
 
@@ -42,7 +43,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     table or on a stack.
     """
     m = proof.m
-    dut = RunLabeller(skin_of(2, columns, connectivity))
+    dut = RunLabeller(skin_of(2, columns, connectivity, closed))
     derived = dut.derived
     inside = proof.put(dut)
     valid, cells, last = rows_into(proof, dut)
@@ -53,7 +54,7 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int) -> None:
     with m.If(works & stack.pop):
         proof.claim(stack.level != 0)
     with m.If(works & stack.push & ~stack.pop):
-        proof.claim(stack.level < nesting(derived))
+        proof.claim(stack.level < waiting(derived))
 
     # Which places of the table hold an open zone; all of it comes one clock after the stack of `join`.
     summing = join.join_valid & ~joined.end
@@ -126,14 +127,14 @@ def _brackets(m, row, earlier, later):
     return nests & (depth == 0), [starts[x] & ~Array(earlier)[numbers[x]] for x in range(len(row))]
 
 
-def stalls_change_nothing(proof: Proof, columns: int, connectivity: int) -> None:
+def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, closed: bool = False) -> None:
     """Free: any rows at any time, and when records are taken.
 
     Claimed: while a record waits it stays as it is, no row is taken and nothing changes inside. So the records are
     those that would come without the stall.
     """
     m = proof.m
-    dut = RunLabeller(skin_of(4, columns, connectivity))
+    dut = RunLabeller(skin_of(4, columns, connectivity, closed))
     inside = proof.put(dut)
     rows_into(proof, dut)
     m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
@@ -205,6 +206,14 @@ CASES = (
              _OVERFLOW_BUGS if (columns, connectivity) == (4, 8) else (), bug_clocks=14, campaign=columns == 8)
         for columns, connectivity, clocks in ((4, 8, 9), (4, 4, 12), (8, 8, 14), (8, 4, 24))
     ),
+    *(
+        Case("nothing overflows, nothing is left", f"{columns} columns, {connectivity}-connected, closed",
+             partial(nothing_overflows, columns=columns, connectivity=connectivity, closed=True), clocks,
+             _OVERFLOW_BUGS[:2] if columns == 4 else (), bug_clocks=14, campaign=True)
+        for columns, connectivity, clocks in ((3, 8, 9), (4, 8, 10), (4, 4, 13))
+    ),
+    Case("a stall changes nothing", "8 columns, 8-connected, closed",
+         partial(stalls_change_nothing, columns=8, connectivity=8, closed=True), 2),
     Case("a stall changes nothing", "8 columns, 8-connected",
          partial(stalls_change_nothing, columns=8, connectivity=8), 2, _STALL_BUGS, bug_clocks=16),
     Case("a stall changes nothing", "8 columns, 4-connected",

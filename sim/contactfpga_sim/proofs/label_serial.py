@@ -7,28 +7,27 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
+from contactfpga_hdl.payloads import moments_layout
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.label import rows_into
+from contactfpga_sim.proofs.label import rows_into, skin_of
 from contactfpga_sim.proofs.proof import Proof
 from contactfpga_sim.proofs.zones import OpenRow, next_row, open_rows_agree
 
 
-def _skin(rows: int, columns: int, connectivity: int) -> Skin:
-    return Skin(
-        rows=rows, columns=columns, connectivity=connectivity, labeller="serial", settle_us=100, zone_capacity=1
-    )
+def _skin(rows: int, columns: int, connectivity: int, closed: bool) -> Skin:
+    return skin_of(rows, columns, connectivity, closed).replace(labeller="serial", zone_capacity=1)
 
 
-def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
     """Free and assumed: as below.
 
     Claimed: what is wanted of the memory is there, nothing is written to a place in use or outside the table, no word
     is used that was read while it was written, the brackets nest no deeper than there is room, and after a frame no
     place is in use.
     """
-    dut, inside, open_row = _labeller(proof, columns, connectivity, rows, proof.lemma)
+    dut, inside, open_row = _labeller(proof, columns, connectivity, rows, closed, proof.lemma)
     m, places = proof.m, dut.derived.open_zones
     live = Signal(places)  # in use: by zones of the row before that are to come or of the new row, or groups that wait
     groups, wanted, whole, final = inside.part("groups"), inside["wanted"], inside["whole"], inside["last"]
@@ -49,8 +48,10 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
             m.d.sync += lost.eq(written.en & (written.addr == port.addr))
         proof.claim(~(inside["begins"] & lost))
         proof.claim(~written.en | (written.addr < places))
-    depth = Signal(range(nesting(dut.derived) + 1))
+    depth = Signal(range(nesting(dut.derived) + 1))  # of zones; the seam is one more
     joins, earlier, later = inside["joins"], inside["earlier"], inside["later"]
+    if closed:
+        joins &= ~inside["at_seam"]
     opens, closes = joins & later & ~earlier, joins & earlier & ~later
     m.d.sync += depth.eq(depth + opens - closes)
     proof.claim(~opens | (depth < nesting(dut.derived)))
@@ -62,25 +63,26 @@ def nothing_overflows(proof: Proof, columns: int, connectivity: int, rows: int =
         proof.lemma(depth == 0)
 
 
-def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
     """Free: any rows at any time. Assumed: records are taken as they come.
 
     Claimed: when a row can be taken, the zones that end with the one before have left, each once, and after a last row
     one end mark; that is so after C + e + 2 clocks at most.
     """
-    _labeller(proof, columns, connectivity, rows, proof.claim)
+    _labeller(proof, columns, connectivity, rows, closed, proof.claim)
 
 
 def _labeller(
-    proof: Proof, columns: int, connectivity: int, rows: int, claim
+    proof: Proof, columns: int, connectivity: int, rows: int, closed: bool, claim
 ) -> tuple[SerialLabeller, Inside, OpenRow]:
     """The labeller beside the specification, and what is said of both."""
     m = proof.m
-    dut = SerialLabeller(_skin(rows, columns, connectivity))
+    dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
     inside = proof.put(dut)
     valid, cells, last = rows_into(proof, dut)
     m.d.comb += dut.records.ready.eq(1)
-    wanted = proof.chosen(len(dut.records.payload.zone.as_value()), "wanted")
+    moments = moments_layout(dut.derived).size  # they come first in records and words
+    wanted = proof.chosen(moments, "wanted")
     handed, record = valid & dut.rows.ready, dut.records.payload
 
     y = Signal(range(rows))
@@ -88,9 +90,9 @@ def _labeller(
     after, ended = next_row(m, dut.derived, open_row, cells, last, y, wanted)
     expected, expected_end = Signal(range(2 * columns + 1)), Signal()
     seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
-    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
+    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value()[:moments] == wanted))
     ends_now = seen_ends + (dut.records.valid & record.end)
-    longest = columns + dut.derived.open_zones + 2
+    longest = columns + dut.derived.open_zones + 2 + 2 * closed
     age = Signal(range(longest + 2), init=longest)
     with m.If(handed):
         m.d.sync += [*open_row.copy(after, when=~last), expected.eq(ended), expected_end.eq(last)]
@@ -124,7 +126,8 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
             proof.lemma(inside.word("later", place) == later)
         with proof.m.If(starts[x] & ~earlier):
             word = inside.word("groups", place)
-            proof.lemma(word[:moments] == open_row.moments[x].as_value())
+            of_zone = open_row.moments[x].as_value()
+            proof.lemma(word[: len(of_zone)] == of_zone)
             proof.lemma(~word[moments])  # has_run
     proof.lemma(inside["before"] == open_row.cells << 1)
     proof.lemma((inside["cells"] == 0) & ~inside["cell_left"] & ~inside["before_left"])
@@ -135,12 +138,12 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
     proof.lemma(~started | (found == 0))
 
 
-def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4) -> None:
+def stalls_change_nothing(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:
     """Free: any rows at any time, and when records are taken.
 
     Claimed: while a record waits no row is taken, no bracket is written, and no register changes.
     """
-    dut = SerialLabeller(_skin(rows, columns, connectivity))
+    dut = SerialLabeller(_skin(rows, columns, connectivity, closed))
     inside = proof.put(dut)
     rows_into(proof, dut)
     proof.m.d.comb += dut.records.ready.eq(proof.free(1, "ready"))
@@ -189,10 +192,11 @@ _OVERFLOW_BUGS = (
 )  # fmt: skip
 
 
-def _case(claim, columns: int, connectivity: int, clocks: int, rows: int = 4, **options) -> Case:
-    build = partial(claim, columns=columns, connectivity=connectivity, rows=rows)
+def _case(claim, columns: int, connectivity: int, clocks: int, rows: int = 4, closed: bool = False, **options) -> Case:
+    build = partial(claim, columns=columns, connectivity=connectivity, rows=rows, closed=closed)
     title = f"serial: {claim.__name__.replace('_', ' ')}"
-    return Case(title, f"{columns} columns, {rows} rows, {connectivity}-connected", build, clocks, **options)
+    size = f"{columns} columns, {rows} rows, {connectivity}-connected{', closed' * closed}"
+    return Case(title, size, build, clocks, **options)
 
 
 CASES = (
@@ -207,4 +211,5 @@ CASES = (
     _case(nothing_overflows, 3, 8, 12, bugs=_OVERFLOW_BUGS, bug_clocks=17),
     _case(stalls_change_nothing, 8, 8, 2, bugs=_STALL_BUGS, bug_clocks=16),
     _case(stalls_change_nothing, 8, 4, 2),
+    _case(stalls_change_nothing, 8, 4, 2, closed=True),
 )

@@ -6,6 +6,7 @@ together is its closure. :func:`rows_find_the_zones` shows that these are the zo
 
 from amaranth.hdl import Cat, Elaboratable, Module, Mux, Signal
 
+from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
 from contactfpga_sim.proofs.proof import Proof
@@ -49,7 +50,7 @@ class RowStep(Elaboratable):
         m = Module()
         columns = range(self.derived.skin.columns)
         before, after = self.before, self.after
-        reach = _closure(m, before, self.cells, self.derived.skin.connectivity)
+        reach = _closure(m, before, self.cells, self.derived.skin)
         m.d.comb += after.cells.eq(self.cells)
         for x in columns:
             old, new = reach[len(columns) + x][: len(columns)], reach[len(columns) + x][len(columns) :]
@@ -77,13 +78,13 @@ def next_row(m: Module, *given) -> tuple[OpenRow, Signal]:
     return step.after, step.ended
 
 
-def _closure(m: Module, before: OpenRow, cells, connectivity: int) -> list:
+def _closure(m: Module, before: OpenRow, cells, skin: Skin) -> list:
     """For each cell of two rows, first those of the row before, the cells of both rows that belong to its zone."""
     count = len(cells)
     pressed = [*before.cells, *cells]
 
     def adjacent(x, other):
-        return abs(x - other) <= (1 if connectivity == 8 else 0)
+        return _apart(x, other, skin) <= (1 if skin.connectivity == 8 else 0)
 
     reach = []
     for x in range(count):
@@ -91,7 +92,7 @@ def _closure(m: Module, before: OpenRow, cells, connectivity: int) -> list:
         reach.append(Cat(before.reach[x], Mux(before.cells[x], down, 0)))
     for x in range(count):
         up = Cat(before.cells[j] & adjacent(x, j) for j in range(count))
-        beside = Cat(cells[j] & (abs(x - j) <= 1) for j in range(count))
+        beside = Cat(cells[j] & (_apart(x, j, skin) <= 1) for j in range(count))
         reach.append(Mux(cells[x], Cat(up, beside), 0))
     for through in range(len(pressed)):
         closer = [Signal(len(pressed), name=f"through_{through}_{i}") for i in range(len(pressed))]
@@ -99,6 +100,12 @@ def _closure(m: Module, before: OpenRow, cells, connectivity: int) -> list:
             m.d.comb += closed.eq(reach[i] | Mux(reach[i][through], reach[through], 0))
         reach = closer
     return reach
+
+
+def _apart(x: int, other: int, skin: Skin) -> int:
+    """Columns from one to the other, around the cylinder if that is shorter and the ends meet."""
+    apart = abs(x - other)
+    return min(apart, skin.columns - apart) if skin.closed else apart
 
 
 def flood_fill(m: Module, derived: Derived, frame, wanted):
@@ -112,7 +119,8 @@ def flood_fill(m: Module, derived: Derived, frame, wanted):
     for turn in range(len(cells) - 1):
         spread = [Signal(len(cells), name=f"spread_{turn}_{i}") for i in range(len(cells))]
         for i, (y, x) in enumerate(cells):
-            beside = [reach[cells.index((y + dy, x + dx))] for dy, dx in steps if (y + dy, x + dx) in cells]
+            around = [(y + dy, (x + dx) % skin.columns if skin.closed else x + dx) for dy, dx in steps]
+            beside = [reach[cells.index(place)] for place in around if place in cells]
             found = reach[i]
             for other in beside:
                 found = found | other

@@ -102,7 +102,7 @@ def _save(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
         shown = np.where(labels > 0, (labels - 1) % len(COLORS) + 1, 0)
         panel.imshow(palette[shown], extent=extent, interpolation="nearest")
         if out.frame is not None and len(out.frame.moments):
-            area, sum_x, sum_y = out.frame.moments.T
+            area, sum_x, sum_y = out.frame.moments.T[:3]
             x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
             panel.plot(x_mm, y_mm, "k+", markersize=7, markeredgewidth=1.4)
         panel.set_title(out.scene, fontsize=style.SMALL)

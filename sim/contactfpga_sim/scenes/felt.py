@@ -26,6 +26,8 @@ class Felt:
         if cells.surface is None:
             raise ValueError("the units have no surface; give units.toml a table [surface] with the bumper's outside")
         self._scene, self._cells, self._surface = scene, cells, cells.surface
+        self.touching = Scene(())
+        """What touches besides the scene."""
         outside = cells.surface.radius_m if isinstance(cells.surface, Cylinder) else None
         # A sheet around a cylinder lies under the foam, on whose outside things push.
         self._wider = 1e3 * outside / skin.radius_mm if outside and skin.radius_mm else 1.0
@@ -39,7 +41,8 @@ class Felt:
 
     def wrench(self, seconds: float) -> Floats:
         """(6,): what all contacts exert on the link."""
-        return sum((self._of(one, seconds) for one in self._scene.contacts), np.zeros(6))
+        contacts = (*self._scene.contacts, *self.touching.contacts)
+        return sum((self._of(one, seconds) for one in contacts), np.zeros(6))
 
     def _of(self, contact: Contact, seconds: float) -> Floats:
         """Each of its parts pushes along the normal at its middle."""

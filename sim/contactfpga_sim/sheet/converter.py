@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING
 
 from contactfpga.choices import converters
 from contactfpga.errors import SkinError
+from contactfpga_sim.sheet.ads131m08 import Ads131m08
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-PINS = ("spi_clock", "spi_select_n", "spi_mosi")
-
 
 class Mcp3208:
     """Microchip DS21298E, chapter 5: single-ended channels, bits on falling edges, the highest first."""
+
+    reads: tuple[str, ...] = ("spi_clock", "spi_select_n", "spi_mosi")
+    gives: tuple[str, ...] = ("spi_miso",)
 
     def __init__(self, codes: Sequence[int]):
         self.codes = list(codes)
@@ -25,8 +27,8 @@ class Mcp3208:
         self._command: list[int] = []
         self._held = self._output = 0
 
-    def step(self, clock: int, select_n: int, mosi: int) -> int:
-        """The level that it gives in this cycle."""
+    def step(self, clock: int, select_n: int, mosi: int) -> tuple[int, ...]:
+        """The levels that it gives in this cycle."""
         rose, fell = clock and not self._clock, self._clock and not clock
         if select_n:
             self._rises, self._command, self._output = 0, [], 0
@@ -36,7 +38,7 @@ class Mcp3208:
         elif fell and self._rises:
             self._fall()
         self._clock, self._select_n, self._mosi = clock, select_n, mosi
-        return self._output
+        return (self._output,)
 
     def _fall(self) -> None:
         if self._rises == 6:  # the fifth clock after the start bit
@@ -48,10 +50,11 @@ class Mcp3208:
             self._output = self._held >> 18 - self._rises & 1
 
 
-_MODELS = {"mcp3208": Mcp3208}
+Model = Mcp3208 | Ads131m08
+_MODELS: dict[str, type[Model]] = {"mcp3208": Mcp3208, "ads131m08": Ads131m08}
 
 
-def converter_of(skin: Skin) -> Mcp3208 | None:
+def converter_of(skin: Skin) -> Model | None:
     """The one of a Skin, or None without units."""
     if not skin.units:
         return None

@@ -104,6 +104,7 @@ def followed(frames: Iterator[Moment], fit: ClockFit | None = None) -> Frames:
         if moment.asked_s is not None:
             fit.answered(moment.time_us, moment.asked_s)
         line = fit.line(moment.arrived_s)
+        assert line is not None
         rows.append((line.at(moment.time_us), line.sigma_s, moment.arrived_s, moment.sampled_s))
     return Frames(*np.array(rows).T)
 

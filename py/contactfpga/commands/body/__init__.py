@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.body import register, show
+from contactfpga.commands.body import learn, register, show
 
 HELP = "Show contacts of all links of a robot in one frame."
 EXTRA = None
 
-TOPICS = {"show": show, "register": register}
+TOPICS = {"show": show, "register": register, "learn": learn}
 USUAL_TOPIC = "show"
 """What `contactfpga body ROBOT.toml` is short for."""
 

@@ -83,8 +83,12 @@ def _print(snapshot: Snapshot, frame: str, as_json: bool) -> None:
 
 
 def _line(one: Contact) -> str:
-    x, y, z = (f"{1e3 * value:.1f}" for value in one.point_m)
-    nx, ny, nz = (f"{round(value, 2) + 0.0:.2f}" for value in one.normal)
+    where = "no single place"
+    if one.point_m is not None and one.normal is not None:
+        x, y, z = (f"{1e3 * value:.1f}" for value in one.point_m)
+        nx, ny, nz = (f"{round(value, 2) + 0.0:.2f}" for value in one.normal)
+        where = f"{one.frame} ({x}, {y}, {z}) mm, normal ({nx}, {ny}, {nz})"
     push = "" if one.normal_n is None else f", pushes {one.normal_n:.2f} N"
-    marked = f", {', '.join(sorted(one.flags))}" if one.flags else ""
-    return f"{one.frame} ({x}, {y}, {z}) mm, normal ({nx}, {ny}, {nz}), {one.zone.area_mm2:.0f} mm2{push}{marked}"
+    marks = sorted(one.flags) + ([f"{one.fold:.0%} as the cover folds"] if one.fold else [])
+    marked = f", {', '.join(marks)}" if marks else ""
+    return f"{where}, {one.zone.area_mm2:.0f} mm2{push}{marked}"

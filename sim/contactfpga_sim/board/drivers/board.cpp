@@ -2,7 +2,7 @@
 // Compiled for one Skin: ROWS, COLUMNS, GUARD lines, LINE_OF_ROW, LINE_OF_COLUMN, COL2ROW, BIT_CLOCKS; ROW_CHAINS and
 // COLUMN_CHAINS, 0 for direct lines; PROBES is 0 for a netlist, which has the pins only; DIVIDED is 1 where items are
 // apart from records; ALIVE is 1 where there is that pin; PRECHARGE is 1 where columns can be driven, REVERSAL where
-// rows can be let go and are read. UNITS pressure units are read by an MCP3208. KEEPS: clocks for which columns that a
+// rows can be let go and are read. UNITS pressure units are read by an MCP3208, or, PACED, by an ADS131M08. KEEPS: clocks for which columns that a
 // self-test discharged stay so when they are let go, 0 where there is no self-test. With MUTANTS the gateware has an
 // input that picks a mutant. With STATE each of its
 // bits can be flipped, and a moment kept and returned to.
@@ -239,12 +239,18 @@ class Board {
 #if UNITS
     bool put_miso() {
         const auto &top = model_.top;
+#if PACED
+        const bool level = converter.step(get(top.p_spi__clock), get(top.p_spi__select__n), get(top.p_spi__pace));
+        const bool changed = level != miso_ || converter.ready_n != ready_n_;
+        put(model_.top.p_spi__ready__n, ready_n_ = converter.ready_n);
+#else
         const bool level = converter.step(get(top.p_spi__clock), get(top.p_spi__select__n), get(top.p_spi__mosi));
         const bool changed = level != miso_;
+#endif
         put(model_.top.p_spi__miso, miso_ = level);
         return changed;
     }
-    bool miso_ = false;
+    bool miso_ = false, ready_n_ = false;
 #else
     bool put_miso() { return false; }
 #endif
@@ -307,7 +313,11 @@ class Board {
 
 public:
 #if UNITS
+#if PACED
+    Ads131m08 converter;
+#else
     Mcp3208 converter;
+#endif
 #endif
     Matrix matrix;
     Sender sender;

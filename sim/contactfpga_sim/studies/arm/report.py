@@ -131,3 +131,29 @@ def push_lines(pushes: list[Push]) -> list[list[str]]:
             [f"{push.speed_m_s:.3f}", *(f"{value:.2f}" for value in numbers), f"{1e3 * push.yields_m:.1f}", back, ends]
         )
     return lines
+
+
+HALFWAY = {"x_mm": 85.0, "y_mm": 85.0}
+DEFENDED: dict[str, dict[str, Any]] = {
+    "on a switch": {},
+    "halfway between four switches": {"touch": (HALFWAY,)},
+    "that, 0.1 m from the joint": {"touch": (HALFWAY | {"lever_m": 0.1},)},
+    "the patch's pressure, not a point force": {"model": "hertz"},
+}
+"""Touches, as changes to the case."""
+
+DEFENSES = {"torque limit alone": "torque", "contact": "pin", "force threshold": "force", "both": "both"}
+DEFENSE_HEADINGS = ("touch", *(f"{name}: reacts, ms / peak, N" for name in DEFENSES))
+
+
+def defense_lines(case: Case) -> list[list[str]]:
+    """Reaction and peak force of touches by each line of defense; headings first."""
+    lines = [list(DEFENSE_HEADINGS)]
+    for name, changes in DEFENDED.items():
+        cells = []
+        for way in DEFENSES.values():
+            found = run(case.but(**changes), way).outcome
+            reacts = "never" if found.reacts_s is None else f"{1e3 * found.reacts_s:.2f}"
+            cells.append(f"{reacts} / {found.peak_force_n:.1f}" + (" (flat)" if found.bottomed else ""))
+        lines.append([name, *cells])
+    return lines

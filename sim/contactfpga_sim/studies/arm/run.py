@@ -11,13 +11,16 @@ from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.arm.case import Case, CaseError
 from contactfpga_sim.studies.arm.plant_transport import PlantTransport
-from contactfpga_sim.studies.arm.world import WAYS, Faults, Moment, World
+from contactfpga_sim.studies.arm.world import PINS, UNITS, WAYS, Faults, Moment, World
 
 AFTER_S = 0.25e-3
 """So long after the reaction the torque is looked at again."""
 
 SLOW_M_S = 1e-3
 """An arm that the controller holds counts as at rest below this speed."""
+
+WITH_UNITS = Skin(units=3, unit_sums=((1, 1, 1),), baud=6_000_000)
+"""The reference Skin on three pressure units."""
 
 STAY_S = 20e-3
 """A run ends when the arm was at rest for so long."""
@@ -77,13 +80,16 @@ def run(
     """Let the arm run into what it touches.
 
     ``way``: one of :data:`contactfpga_sim.studies.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
-    the sheet, by default the reference Skin. The first run of a Skin by ``pin`` or ``uart`` compiles its gateware.
+    the sheet, by default the reference Skin, with units where the way needs them. The first run of a Skin by ``pin``,
+    ``uart``, ``force`` or ``both`` compiles its gateware.
     """
     if way not in WAYS:
         raise CaseError(f"way is {way!r}; it must be one of {', '.join(WAYS)}")
-    skin = skin or Skin()
+    skin = skin or (WITH_UNITS if way in UNITS else Skin())
+    if way in UNITS and not (skin.units == 3 and skin.unit_sums and set(skin.unit_sums[0]) == {1}):
+        raise CaseError(f"units is {skin.units}; the way {way!r} needs units = 3, and unit_sums with [1, 1, 1] first")
     cycles = case.run.step_s * skin.clock_hz
-    if way in ("pin", "uart") and abs(cycles - round(cycles)) > 1e-6:
+    if way in (*PINS, "uart") and abs(cycles - round(cycles)) > 1e-6:
         raise CaseError(f"step_s is {case.run.step_s:g}; it must be a whole number of clocks of {skin.clock_hz} Hz")
     _on_sheet(case, skin)
     if way == "uart" and skin.send == "on_change" and 1e-3 * skin.keep_alive_ms >= case.control.watchdog_s:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +15,16 @@ from contactfpga_sim.studies.arm.case import Case
 from contactfpga_sim.studies.arm.control import Controller, Sensed
 from contactfpga_sim.studies.arm.plant import Plant, finite
 from contactfpga_sim.studies.arm.switches import Switches
+from contactfpga_sim.studies.arm.under import Under
 from contactfpga_sim.studies.arm.usb import Chip
 
-WAYS = ("latency", "pin", "uart", "torque")
+WAYS = ("latency", "pin", "uart", "torque", "force", "both")
 """How a contact comes to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;
-zones over UART and the host; not at all, so that the torque limit alone is left."""
+zones over UART and the host; not at all, so that the torque limit alone is left; the pin of a board with pressure units
+and no switches; that of one with both."""
+
+PINS = ("pin", "force", "both")
+UNITS = ("force", "both")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +72,11 @@ class World:
         self._way, self._latency_s = way, latency_s
         self._plant = Plant(case)
         self._switches = Switches(case, skin)
-        self._board = CompiledBoard(skin, capture=("contact",)) if way in ("pin", "uart") else None
+        self._board = CompiledBoard(skin, capture=("contact",)) if way in (*PINS, "uart") else None
+        self._under = Under(case, skin) if way in UNITS else None
+        if self._board is not None and self._under is not None:
+            self._board.load(self._under.readings([0.0] * len(case.touch)))
+            self._board.send(self._under.commands())
         self._clock_hz = skin.clock_hz
         self._chip = Chip(case.usb)
         self._bytes = b""
@@ -111,8 +121,9 @@ class World:
         case, now = self.case, self.time_s
         forces = self._plant.forces(now, self._state)
         self._press(self._switches.at(now, forces.contact_n))
+        self._load(forces.contact_n)
         tick = self._number % self._ticks == 0
-        if tick and self._way == "pin":
+        if tick and self._way in PINS:
             self._catch_up()
         self._learn(now)
         theta, omega, current = self._state[:3]
@@ -149,9 +160,15 @@ class World:
         self._cells, before, self._closed = cells, self._closed, bool(cells.any())
         if self._way == "latency" and self._closed != before:
             self._changes.append((self.time_s + self._latency_s, self._closed))
-        if self._board is not None:
+        if self._board is not None and self._way != "force":
             self._catch_up()
             self._board.press(cells)
+
+    def _load(self, forces_n: Sequence[float]) -> None:
+        """What the units feel changes with every step."""
+        if self._under is not None and self._board is not None and not self._dead():
+            self._catch_up()
+            self._board.load(self._under.readings(forces_n))
 
     def _learn(self, now: float) -> None:
         """Bring what has come to the controller by now into its input; a pin is looked at when it samples."""
@@ -170,7 +187,7 @@ class World:
         until = self.clock() if dies is None else min(self.clock(), dies + lead)
         board.run(max(0, round(until * hz) - board.cycle))
         for cycle, level, _ in board.take("contact").tolist():
-            if self._way == "pin":
+            if self._way in PINS:
                 self._changes.append((cycle / hz - lead, bool(level)))
         for cycle, value, _ in board.take("received").tolist():
             self._chip.put(cycle / hz, self._noisy(cycle / hz - lead, value))

@@ -23,10 +23,11 @@ class Span(NamedTuple):
 def placed(values: Sequence[float], left: float, wide: float) -> tuple[list[Span], str]:
     """The values' places, in the order in which they are turned, and what is to be said of the scale.
 
-    Values that are evenly spaced lie so; others in powers of ten, where a first value of 0 stands apart.
+    Values that are evenly spaced or reach below 0 lie so; others in powers of ten, where a first value of 0 stands
+    apart.
     """
     steps = np.diff(values)
-    if np.allclose(steps, steps[0]):
+    if np.allclose(steps, steps[0]) or min(values[1:]) <= 0:
         places, scale = np.array(values, float), ""
     elif values[0] == 0:
         after = np.log10(values[1:])

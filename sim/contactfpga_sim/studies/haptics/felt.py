@@ -13,12 +13,15 @@ import math
 import numpy as np
 
 import contactfpga
-from contactfpga.haptics import ClosingWatch, LoadCells, Locator, Plane, felt
+from contactfpga.haptics import ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
 from contactfpga.haptics.answer import Floats
 from contactfpga.haptics.layouts import tripod
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.scenes.contacts import Contact, disc
+from contactfpga_sim.scenes.felt import Felt
+from contactfpga_sim.scenes.scene import Scene
 from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
 
 RATE_N_S = 1600.0
@@ -73,40 +76,34 @@ SETTINGS = (
 
 @dataclasses.dataclass(frozen=True)
 class Touching:
-    """Point forces on the sheet, each with its push over time."""
+    """A point force on the sheet whose push rises."""
 
     setting: Setting
-    places_m: Floats
-    """(n, 2)"""
-    pushes_n: tuple[float, ...]
-    rate_n_s: float | None
-    """None: all of the push at once."""
+    place_m: Floats
+    """(2,)"""
     seed: int
 
     @functools.cached_property
-    def per_push(self) -> Floats:
-        """(n, rows, columns): the share of what closes a switch that a newton of each contact brings."""
+    def closing_n(self) -> Floats:
+        """(rows, columns): the push that closes each switch."""
         along = 1e-3 * self.setting.pitch_mm * np.arange(self.setting.lines)
         x, y = np.meshgrid(along, along)
         spread = 1 + self.setting.spread * np.random.default_rng([self.seed, 7]).standard_normal(x.shape)
-        each = [1 / reach_of(POINT).closing_n(np.hypot(x - px, y - py)) for px, py in self.places_m]
-        return np.asarray(np.array(each) / np.maximum(spread, 0.1))
+        return reach_of(POINT).closing_n(np.hypot(x - self.place_m[0], y - self.place_m[1])) * np.maximum(spread, 0.1)
 
-    def forces(self, seconds: float) -> Floats:
-        """(n,) in N."""
-        since = max(0.0, seconds - BEGIN_S)
-        risen = np.inf if self.rate_n_s is None and since > 0 else since * (self.rate_n_s or 0.0)
-        return np.minimum(self.pushes_n, risen)
+    def push(self, seconds: float) -> float:
+        """In N."""
+        return min(MOST_N, RATE_N_S * max(0.0, seconds - BEGIN_S))
 
     def pressed(self, seconds: float) -> np.ndarray:
-        """Stress under a half-space is in proportion to force, and that of several contacts adds up."""
-        found: np.ndarray = np.tensordot(self.forces(seconds), self.per_push, 1) >= 1
+        """(rows, columns) bool."""
+        found: np.ndarray = self.closing_n <= self.push(seconds)
         return found
 
     @property
     def first_s(self) -> float:
-        """When the first switch closes, for a single contact."""
-        return BEGIN_S + 1 / float(self.per_push.max()) / (self.rate_n_s or math.inf)
+        """When the first switch closes."""
+        return BEGIN_S + float(self.closing_n.min()) / RATE_N_S
 
     def board(self) -> VirtualBoard:
         """That feels it."""
@@ -115,9 +112,8 @@ class Touching:
         sigma = self.setting.unit_sigma_n / GAIN_N
 
         def readings(seconds: float) -> list[int]:
-            exerted = np.zeros(6)
-            for (x, y), push in zip(self.places_m + np.array(cells.sheet_m), self.forces(seconds)):
-                exerted += np.array([0, 0, -push, -push * y, push * x, 0])
+            push, (x, y) = self.push(seconds), self.place_m + np.array(cells.sheet_m)
+            exerted = np.array([0, 0, -push, -push * y, push * x, 0])
             noisy = turn @ exerted + ZERO + sigma * rng.standard_normal(3)
             steps: list[int] = np.clip(np.rint(noisy), 0, 4095).astype(int).tolist()
             return steps
@@ -151,8 +147,7 @@ def heard(touching: Touching, until_s: float) -> list[Heard]:
 
 def ramp(setting: Setting, seed: int) -> Touching:
     """One contact anywhere in a cell in the middle."""
-    place = (MIDDLE + np.random.default_rng(seed).random((1, 2))) * 1e-3 * setting.pitch_mm
-    return Touching(setting, place, (MOST_N,), RATE_N_S, seed)
+    return Touching(setting, (MIDDLE + np.random.default_rng(seed).random(2)) * 1e-3 * setting.pitch_mm, seed)
 
 
 def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
@@ -162,7 +157,7 @@ def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
     assert cells.noise.covariance is not None
     push_sigma = math.sqrt(float(cells.noise.covariance[2, 2]) + (RATE_N_S * 0.15e-3) ** 2 / 12)
     finder = Locator(setting.skin.sheet, reach_of(POINT), setting.spread, push_sigma)
-    truth = touching.places_m[0]
+    truth = touching.place_m
     found: dict[str, list[float]] = {method: [] for method in METHODS}
     watch, taken = ClosingWatch(cells), 0
     for time_s in TIMES_S:
@@ -207,18 +202,42 @@ class Forces:
     """Of each push, where there are two zones."""
 
 
-def two(apart_mm: float, seed: int, push_n: float = 12.0) -> Forces:
-    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found."""
-    setting, rng = SETTINGS[0], np.random.default_rng([seed, 9])
-    turn = rng.uniform(0, 2 * math.pi)
-    half = 0.5e-3 * apart_mm * np.array([math.cos(turn), math.sin(turn)])
-    middle = (MIDDLE + rng.random(2)) * 1e-3 * setting.pitch_mm
-    touching = Touching(setting, np.array([middle - half, middle + half]), (push_n, push_n), None, seed)
-    frames = [one.zones for one in heard(touching, BEGIN_S + 1.2e-3) if one.zones.units is not None]
-    zones = frames[-1]
-    found = felt(setting.cells, zones, friction=0.0)
+FINGER_MM = 6.0
+KINDS = ("point", f"finger of {2 * FINGER_MM:g} mm")
+
+
+def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) -> Forces:
+    """Two contacts this far apart at a random place and angle of the sheet of 10 mm, each of which alone closes a
+    switch, and their pushes as found."""
+    setting = SETTINGS[0]
+    cells, skin = setting.cells, setting.skin
+    places = _pair(setting, apart_mm, push_n, np.random.default_rng([seed, 9]))
+    fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
+    units = Felt(Scene(fingers), cells, skin, seed)
+    if kind == KINDS[0]:
+        each = np.array([1 / Touching(setting, 1e-3 * np.array(place), seed).closing_n for place in places])
+        closed = push_n * each.sum(axis=0) >= 1
+        board = VirtualBoard(skin, lambda seconds: closed, units=units)
+    else:
+        board = VirtualBoard(skin, Scene(fingers), units=units)
+    with contactfpga.open(board, skin) as opened:
+        frames = WithReadings(opened)
+        zones = [frames.next() for _ in range(4)][-1]
+    found = felt(cells, zones, friction=0.0)
     if found is None or len(zones) != 2:
         return Forces(len(zones), ())
-    places = touching.places_m + np.array(setting.cells.sheet_m)
-    pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in places]
+    true_m = 1e-3 * np.array(places) + np.array(cells.sheet_m)
+    pairs = [min(found, key=lambda one: math.dist(one.point_m[:2], place)) for place in true_m]
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
+
+
+def _pair(setting: Setting, apart_mm: float, push_n: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Places in mm."""
+    pitch, reach_mm = setting.pitch_mm, 1e3 * reach_of(POINT).reach_m(push_n)
+    while True:
+        turn, half = rng.uniform(0, 2 * math.pi), apart_mm / 2
+        x, y = (MIDDLE + rng.random(2)) * pitch
+        places = [(x + side * half * math.cos(turn), y + side * half * math.sin(turn)) for side in (-1, 1)]
+        off = [math.hypot(x - pitch * round(x / pitch), y - pitch * round(y / pitch)) for x, y in places]
+        if max(off) < reach_mm:
+            return places

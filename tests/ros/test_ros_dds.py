@@ -25,21 +25,12 @@ def publisher():
 
 
 def reader(publisher, name):
-    from cyclonedds.core import Policy, Qos
     from cyclonedds.sub import DataReader
     from cyclonedds.topic import Topic
-    from cyclonedds.util import duration
 
     topic, participant = TOPICS[name], publisher._participant
-    kept = Policy.Durability.TransientLocal if topic.latched else Policy.Durability.Volatile
-    qos = Qos(
-        Policy.Reliability.Reliable(duration(seconds=1)),
-        kept,
-        Policy.History.KeepLast(10),
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-    )
     made = Topic(participant, f"rt{publisher.topic(name)}", dds.idl_type(topic.type))
-    return DataReader(participant, made, qos=qos)
+    return DataReader(participant, made, qos=dds.qos_of(topic))
 
 
 def taken(reader):

@@ -14,6 +14,7 @@ from contactfpga.haptics import LoadCells, Plane, Unit, contacts
 from contactfpga.ros.feed import Feed
 from contactfpga.ros.moments import Moments
 from contactfpga.ros.settings import TOPICS, Settings
+from contactfpga.zones.host_line import HostLine
 
 NOW_NS = 1_795_000_000_000_000_000
 
@@ -40,7 +41,7 @@ class Board:
             self.now_s += timeout
             raise ReadTimeout("silent")
         self.now_s = zones.time_us / 1e6
-        zones.host_time_s = self.now_s
+        zones._line = HostLine(self.now_s, 0, 0.0, 1.0, 2e-6)
         self.stats.frames += 1
         return zones
 
@@ -55,8 +56,8 @@ class Sent(list):
         return [message for name, message in self if name == topic]
 
 
-def fed(frames, settings=None, skin=SKIN, felt=None):
-    board, sent = Board(frames, skin), Sent()
+def fed(frames, settings=None, skin=SKIN, felt=None, board=Board):
+    board, sent = board(frames, skin), Sent()
     feed = Feed(board, sent, settings, felt, lambda: NOW_NS + round(board.now_s * 1e9))
     feed.run(board)
     return sent, feed
@@ -75,7 +76,7 @@ def test_the_stamp_is_the_moment_of_the_sample():
     sent, _ = fed([frame(250_000, [])])
     (zones,) = sent.of("zones")
     assert zones.header.stamp.sec * 10**9 + zones.header.stamp.nanosec == NOW_NS + 250_000_000
-    assert zones.device_time_us == 250_000
+    assert (zones.device_time_us, zones.stamp_sigma) == (250_000, 2e-6)
 
 
 def test_clocks_are_compared_where_nothing_came_between():
@@ -97,9 +98,46 @@ def test_faster_frames_are_left_out_and_counted_and_no_event_is_lost():
 
 
 def test_a_touch_shorter_than_the_period_is_published():
-    frames = [frame(100 * number, [(3, 4)] if 55 <= number < 57 else []) for number in range(100)]
+    frames = [frame(100 * number, [(3, 4)] if 55 <= number < 57 else []) for number in range(85)]
     sent, _ = fed(frames, Settings(zones_hz=100))
     assert [len(one.zones) for one in sent.of("zones")] == [0, 1, 0]
+
+
+class Busy(Board):
+    """Frames waited for 400 ms before they are taken."""
+
+    def next(self, timeout=1.0):
+        zones = super().next(timeout)
+        self.now_s += 0.4
+        return zones
+
+
+def test_a_feed_that_is_behind_leaves_frames_out_until_it_is_not():
+    quick = [frame(1000 * number, [(3, 4)] if number == 500 else []) for number in range(1000)]
+    sent, feed = fed(quick, Settings(zones_hz=1000), board=Busy)
+    assert 10 <= len(sent.of("zones")) <= 13
+    assert feed.left_out + len(sent.of("zones")) == 1000
+    assert [len(one.zones) for one in sent.of("zones")].count(1) == 1
+    assert "frames waited for 0.4 s: the computer is too busy" in sent.of("/diagnostics")[-1].status[0].message
+
+
+class Interrupted(Board):
+    """The computer rests for 100 ms at frame 500, and takes what waited meanwhile at once."""
+
+    def next(self, timeout=1.0):
+        zones = super().next(timeout)
+        if 500_000 <= zones.time_us < 600_000:
+            self.now_s = 0.6
+        return zones
+
+
+def test_a_feed_that_caught_up_publishes_at_its_rate_again():
+    sent, feed = fed([frame(1000 * number, []) for number in range(1000)], Settings(zones_hz=1000), board=Interrupted)
+    times_us = [one.device_time_us for one in sent.of("zones")]
+    old = [one for one in times_us if 500_000 <= one < 580_000]
+    assert old == [500_000]
+    assert [one for one in times_us if one > 600_000] == [1000 * number for number in range(601, 1000)]
+    assert feed.left_out == 1000 - len(times_us)
 
 
 def test_markers_come_at_their_rate_and_vanish_without_news():
@@ -148,13 +186,14 @@ def test_the_sheets_frame_is_published_where_its_parent_is_named():
 
 def test_forces_are_published_at_their_contacts():
     around = [(0.0, 0.1, 0.0), (0.1, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="skin")
+    cells = LoadCells([Unit(point_m=place, axis=(0.0, 0.0, 1.0)) for place in around], frame="bumper")
 
     def felt(zones, tracks):
         return contacts(cells.wrench([1.0, 2.0, 3.0]), zones, Plane(), tracks=tracks)
 
     sent, _ = fed([frame(0, [(3, 2)])], felt=felt)
     (wrench,), (found,) = sent.of("wrench"), sent.of("contacts")
+    assert (wrench.header.frame_id, found.header.frame_id) == ("bumper", "skin")
     assert wrench.wrench.force.z == pytest.approx(-6.0)
     assert found.contacts[0].wrench.force.z == pytest.approx(-6.0, rel=1e-3)
 

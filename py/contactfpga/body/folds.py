@@ -1,0 +1,133 @@
+"""Cells that the folding cover presses at a joint: learned with nobody near, per joint angle, then marked.
+
+Cells and not zones: a finger beside a crease makes one zone with it, which area and barycenter hardly tell from the
+crease alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contactfpga.body.answer import BodyError
+from contactfpga.inputs.files import open_regular
+from contactfpga.inputs.values import is_finite, shown, whole
+from contactfpga.zones import around, labels
+from contactfpga.zones.zone import Zone, Zones
+
+STEP_RAD = 0.05
+"""Angles are told apart this finely."""
+MAX_BYTES = 20_000_000
+
+Cells = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Folds:
+    """What was learned of one joint and one sheet."""
+
+    joint: str
+    step_rad: float
+    lines: tuple[int, int]
+    """Rows and columns."""
+    frames: dict[int, int]
+    """By the number of the step: how many frames were seen there."""
+    cells: dict[int, Cells]
+    """(rows, columns): which cells were pressed in any of them."""
+
+    def step_of(self, angle_rad: float) -> int:
+        """The number of the step that an angle lies in."""
+        return math.floor(angle_rad / self.step_rad)
+
+    def share(self, angle_rad: float, zone: Cells) -> float | None:
+        """Which share of a zone's cells the fold presses at this angle as it was learned. None: nothing was learned at
+        this angle, or the zone has no cells."""
+        # The steps beside it count nothing: with them twice as many fingers that touch a crease pass for it.
+        step = self.step_of(angle_rad)
+        if not self.frames.get(step) or not zone.any():
+            return None
+        return float((zone & self.cells[step]).sum() / zone.sum())
+
+    def save(self, path: str | Path) -> None:
+        """Write a JSON file that :meth:`load` reads."""
+        steps = [
+            {"step": step, "frames": count, "cells": np.argwhere(self.cells[step]).tolist()}
+            for step, count in sorted(self.frames.items())
+        ]
+        values = {"joint": self.joint, "step_rad": self.step_rad, "lines": self.lines, "steps": steps}
+        Path(path).write_text(json.dumps(values) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Folds:
+        """Read what :meth:`save` wrote. Raises :class:`BodyError`, OSError."""
+        with open_regular(path) as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise BodyError(f"{path}: longer than {MAX_BYTES:,} bytes; is it a file of `contactfpga body learn`?")
+        try:
+            return _read(json.loads(data))
+        except (ValueError, RecursionError, KeyError, TypeError, IndexError) as error:
+            reason = f"{error} is missing" if isinstance(error, KeyError) else error
+            raise BodyError(f"{path}: not a file of `contactfpga body learn`: {reason}") from None
+
+
+def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = STEP_RAD) -> Folds:
+    """From angles in rad and the frames that came at them, while nobody was near. Raises :class:`BodyError` for frames
+    without cells."""
+    if not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
+        raise BodyError(f"step_rad is {shown(step_rad)}; it must be a number from 0.0001 to 1")
+    counts: dict[int, int] = {}
+    cells: dict[int, Cells] = {}
+    lines = (0, 0)
+    for angle, zones in frames:
+        if zones.cells is None:
+            raise BodyError(
+                f"the board reports {zones.sheet.report!r}; folds are learned cell by cell: build its Skin with "
+                "report = 'cells'"
+            )
+        step = math.floor(angle / step_rad)
+        lines = (zones.sheet.rows, zones.sheet.columns)
+        counts[step] = counts.get(step, 0) + 1
+        cells[step] = cells.get(step, np.zeros(lines, bool)) | zones.cells
+    return Folds(joint, step_rad, lines, counts, cells)
+
+
+def cells_of(zones: Zones, zone: Zone) -> Cells | None:
+    """(rows, columns) bool of one zone; None where the board sends no cells."""
+    if zones.cells is None:
+        return None
+    reach = zones.sheet.connectivity
+    numbers = around.label(zones.cells, reach)[0] if zones.sheet.closed else labels.label(zones.cells, reach)
+    found = np.zeros(zones.cells.shape, bool)
+    for number, (area, sum_x, sum_y) in enumerate(zones.records.tolist(), 1):
+        if (area, sum_x, sum_y) == (zone.area_cells, zone.sum_x, zone.sum_y):
+            found |= numbers == number
+    return found
+
+
+def _read(values: Any) -> Folds:
+    joint, step_rad = values["joint"], values["step_rad"]
+    rows, columns = (whole(one) for one in values["lines"])
+    if not isinstance(joint, str) or not is_finite(step_rad) or not 1e-4 <= step_rad <= 1:
+        raise BodyError("joint must be a text, and step_rad a number from 0.0001 to 1")
+    if rows is None or columns is None or not (0 <= rows <= 64 and 0 <= columns <= 64):
+        raise BodyError(f"lines is {shown(values['lines'])}; it must be rows and columns, 64 at most")
+    frames: dict[int, int] = {}
+    cells: dict[int, Cells] = {}
+    for step in values["steps"]:
+        number, count = whole(step["step"]), whole(step["frames"])
+        if number is None or count is None or count < 1:
+            raise BodyError(f"a step is {shown(step)}; its step and frames must be whole numbers")
+        frames[number], cells[number] = count, np.zeros((rows, columns), bool)
+        for row, column in step["cells"]:
+            if whole(row) is None or whole(column) is None or not (0 <= row < rows and 0 <= column < columns):
+                raise BodyError(f"a cell is {shown([row, column])}; the sheet has {rows}x{columns}")
+            cells[number][row, column] = True
+    return Folds(joint, float(step_rad), (rows, columns), frames, cells)

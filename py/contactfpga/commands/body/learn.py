@@ -1,0 +1,77 @@
+"""`contactfpga body learn`: cells that the folding cover presses, over a joint's range."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator
+from typing import TextIO
+
+import numpy as np
+
+from contactfpga.body import Body, folds
+from contactfpga.body.open_body import OpenBody
+from contactfpga.commands.body.register import link
+from contactfpga.console import numbers, outputs, terminal
+from contactfpga.zones.zone import Zones
+
+HELP = "Learn which cells the folding cover presses over a joint's range, with nobody near."
+MAX_LINE = 200
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the topic's flags to its parser."""
+    parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
+    parser.add_argument("link", metavar="LINK", help="Name of the link whose sheet folds.")
+    parser.add_argument("joint", metavar="JOINT", help="Name of the joint that folds it.")
+    output = "File to write; robot.toml names it as the link's folds."
+    parser.add_argument("output", metavar="FOLDS.json", help=output)
+    step = f"How finely angles are told apart (default: {folds.STEP_RAD:g})."
+    parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
+    parser.epilog = (
+        "Reads the joint's angle in rad from standard input, a line each time that the robot says it, until it ends."
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the topic."""
+    body = Body.load(args.robot)
+    plan = link(body, args.link)
+    output = outputs.file(args.output, "FOLDS.json")
+    terminal.say(f"move {args.joint} slowly over its whole range, there and back, with nobody near", sys.stderr)
+    alone = Body({plan.name: plan})
+    with alone.open() as opened:
+        found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
+    if not found.frames:
+        raise ValueError("no angle came on standard input; let the robot write one per line")
+    found.save(output)
+    low, high = min(found.frames) * found.step_rad, (max(found.frames) + 1) * found.step_rad
+    cells = np.any(list(found.cells.values()), axis=0).sum()
+    gaps = max(found.frames) - min(found.frames) + 1 - len(found.frames)
+    terminal.say(
+        f"{output}: {sum(found.frames.values())} frames from {low:.2f} to {high:.2f} rad, {cells} cells "
+        f"pressed somewhere, at {sum(one.any() for one in found.cells.values())} of {len(found.frames)} steps",
+        hang=2,
+    )
+    if gaps:
+        terminal.say(f"{gaps} steps between were not visited: there nothing will be marked; move more slowly", hang=2)
+    return 0
+
+
+def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
+    """Each angle with a frame that was scanned after it came. A link without data ends it: what is not seen is not
+    learned to be free."""
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            angle = float(line[:MAX_LINE])
+        except ValueError:
+            angle = math.nan
+        if not math.isfinite(angle):
+            raise ValueError(f"line {number} of standard input is {numbers.shortened(line.strip())!r}, no angle in rad")
+        state = opened.read().links[name]
+        if state.status != "ok" or state.zones is None:
+            raise ValueError(f"link {name!r}: {state}; nothing can be learned without data")
+        yield angle, state.zones

@@ -1,0 +1,83 @@
+"""`contactfpga publish`: a board's bytes for other programs and machines."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import threading
+
+from contactfpga.console import flags, numbers, terminal
+from contactfpga.driver import driver
+from contactfpga.driver.transport import Transport, connect
+from contactfpga.errors import ContactFPGAError
+from contactfpga.net import address
+from contactfpga.wire.hello import Hello
+
+HELP = "Publish a board over the network (Eclipse Zenoh); zenoh://KEY reads it."
+EXTRA = "net"
+
+
+def add_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the command's flags to its parser."""
+    flags.connection(parser)
+    key = "What it is called on the network (default: contactfpga/ and the board's name, or its fingerprint)."
+    parser.add_argument("--key", help=key)
+    listen = f"Listen here; anything but this machine must be named (default: {address.ENDPOINT})."
+    parser.add_argument("--listen", metavar="ENDPOINT", help=listen)
+    parser.add_argument("--connect", metavar="ENDPOINT", help="Listen nowhere; connect to the router there.")
+    parser.add_argument("--config", metavar="FILE", help="Zenoh's own configuration (JSON5): TLS, users, access.")
+    batch = "Collect bytes for so long before they are sent (default: 2; 0: send at once)."
+    parser.add_argument("--batch-ms", type=numbers.number(0, 1000, "ms"), default=2.0, metavar="T", help=batch)
+    slow = "Where the network is too slow: block until it takes more, or drop (default: block)."
+    parser.add_argument("--congestion", choices=("block", "drop"), default="block", help=slow)
+    allow = "Pass commands on to the board, not requests for frames alone."
+    parser.add_argument("--allow-commands", action="store_true", help=allow)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command until Ctrl-C."""
+    if args.listen and args.connect:
+        raise ContactFPGAError("--listen and --connect are two ways to one network; give one of them")
+    from contactfpga.net import session
+    from contactfpga.net.publisher import Publisher
+
+    key = address.checked_key(args.key) if args.key else None
+    hello, device = _look(args)
+    key = key or address.key_of(hello.name, hello.fingerprint)
+    here = args.connect or args.listen or address.ENDPOINT
+    transport = _transport(args, device, hello)
+    try:
+        open_session = session.connected if args.connect else session.listening
+        with open_session(args.connect or args.listen, args.config) as network:
+            batch_s, block = args.batch_ms / 1000, args.congestion == "block"
+            publisher = Publisher(transport, network, key, batch_s=batch_s, block=block, commands=args.allow_commands)
+            print(f"{address.SCHEME}{key}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
+            _warn(args, here)
+            publisher.run(threading.Event())
+    except KeyboardInterrupt:  # which is how it is meant to end
+        pass
+    finally:
+        transport.close()
+    return 0
+
+
+def _look(args: argparse.Namespace) -> tuple[Hello, str]:
+    """What the board says of itself, and the device it is on."""
+    if args.port is not None and args.port.startswith(("replay:", address.SCHEME)):
+        raise ContactFPGAError(f"port is {args.port!r}; a board is published, no recording and nothing published")
+    with driver.open(args.port, args.skin, baud=args.baud, timeout=args.timeout) as board:
+        return board.hello, board.port
+
+
+def _transport(args: argparse.Namespace, device: str, hello: Hello) -> Transport:
+    return connect(device, args.baud or hello.baud)
+
+
+def _warn(args: argparse.Namespace, here: str) -> None:
+    if args.listen and not address.is_loopback(here) and args.config is None:
+        terminal.say(
+            f"whoever reaches {here} can read this board; docs/net.md says how to ask for certificates and users",
+            sys.stderr,
+        )
+    if args.allow_commands:
+        terminal.say("commands are passed on to the board", sys.stderr)

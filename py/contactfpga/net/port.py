@@ -1,0 +1,118 @@
+"""The port ``zenoh://KEY``: a board somewhere else."""
+
+from __future__ import annotations
+
+import collections
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from contactfpga.errors import ContactFPGAError, PortLost, PortNotFound
+from contactfpga.net import session
+from contactfpga.net.address import parse
+from contactfpga.net.message import Counters, Stream
+
+if TYPE_CHECKING:
+    import zenoh
+
+MOST_WAITING = 1 << 24
+"""Bytes that wait to be read; beyond, the oldest are left out."""
+FOUND_S = 2.0
+"""How long a publisher may take to show."""
+
+
+class ZenohPort:
+    """Bytes from a publisher, in order, and requests to it; a transport of the driver."""
+
+    live = threaded = True
+
+    def __init__(self, name: str):
+        self.name = name
+        self.counters = Counters()
+        self._address = address = parse(name)
+        self._changed = threading.Condition()
+        self._pieces: collections.deque[tuple[bytes, bool]] = collections.deque()
+        self._waiting = 0
+        self._alive: set[str] = set()
+        self._gone_s: float | None = None  # since when nobody publishes
+        self._stream = Stream(self.counters)
+        try:
+            self._session = session.connected(address.connect, address.config)
+        except ContactFPGAError as error:
+            raise PortNotFound(f"{name}: {error}") from None
+        try:
+            self._asks = self._session.declare_publisher(f"{address.key}/ask", express=True)
+            self._bytes = self._session.declare_subscriber(f"{address.key}/bytes", self._take)
+            self._life = self._session.liveliness().declare_subscriber(
+                f"{address.key}/alive/*", self._note, history=True
+            )
+            self._find()
+        except BaseException:
+            self.close()
+            raise
+
+    def _find(self) -> None:
+        with self._changed:
+            if not self._changed.wait_for(lambda: self._alive, FOUND_S):
+                raise PortNotFound(f"{self.name}: nobody publishes it; is `contactfpga publish` running with this key?")
+
+    def read(self, timeout_s: float) -> bytes:
+        """What is there, waiting at most ``timeout_s`` for the first byte."""
+        with self._changed:
+            if not self._pieces:
+                self._changed.wait(timeout_s)
+            data = b""
+            while self._pieces and not (data and self._pieces[0][1]):
+                piece, after_break = self._pieces.popleft()
+                self.counters.passed_breaks += after_break
+                self._waiting -= len(piece)
+                data += piece
+            if not data and self._gone_s is not None and time.monotonic() - self._gone_s > self._address.wait_s:
+                raise PortLost(
+                    f"{self.name} is gone: its publisher ended, or the network is broken; open it again when it is back"
+                )
+            return data
+
+    def write(self, data: bytes) -> None:
+        """Ask the board."""
+        self._asks.put(data)
+
+    def clock(self) -> float:
+        """Of this machine."""
+        return time.monotonic()
+
+    def close(self) -> None:
+        """Leave the network; may be called twice."""
+        self._session.close()
+
+    def _take(self, sample: zenoh.Sample) -> None:
+        with self._changed:
+            piece, after_break = self._stream.take(sample.payload.to_bytes())
+            if not piece:
+                return
+            self._pieces.append((piece, after_break))
+            self._waiting += len(piece)
+            while self._waiting > MOST_WAITING:
+                self._leave_out()
+            self._changed.notify_all()
+
+    def _leave_out(self) -> None:
+        oldest, _ = self._pieces.popleft()
+        self._waiting -= len(oldest)
+        self.counters.left_out += len(oldest)
+        self.counters.breaks += 1
+        following, _ = self._pieces[0]
+        self._pieces[0] = (following if following.startswith(b"\0") else b"\0" + following), True
+        self._waiting += len(self._pieces[0][0]) - len(following)
+
+    def _note(self, sample: zenoh.Sample) -> None:
+        """A publisher begins or ends."""
+        import zenoh
+
+        with self._changed:
+            if sample.kind == zenoh.SampleKind.PUT:
+                self._alive.add(str(sample.key_expr))
+            else:
+                self._alive.discard(str(sample.key_expr))
+            self._gone_s = None if self._alive else time.monotonic()
+            self._changed.notify_all()

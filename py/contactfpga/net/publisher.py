@@ -1,0 +1,120 @@
+"""Publishes a board's bytes, and passes requests on to it."""
+
+from __future__ import annotations
+
+import collections
+import random
+import threading
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+from contactfpga.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Message
+from contactfpga.wire.asked import Asked, asked_in
+
+if TYPE_CHECKING:
+    import zenoh
+
+SIMULATED_S = 0.002
+"""The most simulated time that passes at once."""
+
+
+class Source(Protocol):
+    """A transport of the driver."""
+
+    threaded: bool
+
+    def read(self, timeout_s: float) -> bytes: ...
+
+    def write(self, data: bytes) -> None: ...
+
+    def clock(self) -> float: ...
+
+
+class Publisher:
+    """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` as long as this runs.
+
+    ``batch_s``: how long bytes are collected before they are sent. ``block``: where the network is too slow, wait and
+    let the port overflow; else Zenoh drops messages. Both are counted by who reads. ``commands``: pass commands on as
+    well, not requests alone.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        session: zenoh.Session,
+        key: str,
+        *,
+        batch_s: float = 0.002,
+        block: bool = True,
+        commands: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        import zenoh
+
+        self.denied = self.passed = self.sent = 0
+        """Messages to the board that were not passed on, and that were; messages from it."""
+        self._source, self._batch_s, self._commands, self._clock = source, batch_s, commands, clock
+        self._number = random.SystemRandom().getrandbits(64)
+        self._offset = 0
+        self._begun_s = time.monotonic() - source.clock()
+        self._asked: collections.deque[bytes] = collections.deque(maxlen=64)
+        control = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
+        self._out = session.declare_publisher(f"{key}/bytes", congestion_control=control, express=True)
+        self._in = session.declare_subscriber(f"{key}/ask", self._take)
+        self._token = session.liveliness().declare_token(f"{key}/alive/{self._number:016x}")
+
+    def run(self, stop: threading.Event) -> None:
+        """Publish until told to stop. Raises :class:`~contactfpga.PortLost` where the board is gone."""
+        try:
+            while not stop.is_set():
+                self.turn()
+        finally:
+            self._token.undeclare()
+            self._in.undeclare()
+            self._out.undeclare()
+
+    def turn(self) -> None:
+        """Send what comes next."""
+        data = self._read(BEAT_S)
+        read_us = round(self._clock() * 1e6)
+        if data and self._batch_s:
+            if self._source.threaded:
+                time.sleep(self._batch_s)
+                data += self._read(0.0)
+            else:
+                until = self._source.clock() + self._batch_s
+                while (left := until - self._source.clock()) > 0 and len(data) < MOST_BYTES:
+                    data += self._read(left)
+        for start in range(0, max(1, len(data)), MOST_BYTES):
+            self._send(data[start : start + MOST_BYTES], read_us)
+
+    def _send(self, data: bytes, read_us: int) -> None:
+        message = Message(self._number, self.sent, self._offset, read_us, self.denied & 0xFFFFFFFF, data)
+        self.sent += 1
+        self._offset += len(data)
+        self._out.put(message.encode())
+
+    def _read(self, timeout_s: float) -> bytes:
+        if self._source.threaded:
+            return self._source.read(timeout_s)
+        data, until = b"", self._source.clock() + timeout_s  # a simulated board is held to the time that passes
+        while not data and (left := until - self._source.clock()) > 0:
+            while self._asked:
+                self._source.write(self._asked.popleft())
+            data = self._source.read(min(left, SIMULATED_S))
+            time.sleep(max(0.0, self._begun_s + self._source.clock() - time.monotonic()))
+        return data
+
+    def _take(self, sample: zenoh.Sample) -> None:
+        """Someone asks the board."""
+        data = sample.payload.to_bytes()
+        asked = asked_in(data) if len(data) <= MOST_ASKED else Asked.OTHER
+        if asked is Asked.OTHER or (asked is Asked.COMMAND and not self._commands):
+            self.denied += 1
+            return
+        self.passed += 1
+        if self._source.threaded:
+            self._source.write(data)
+        else:
+            self._asked.append(data)

@@ -1,0 +1,76 @@
+"""Zenoh sessions that nobody on another machine can reach unless that was asked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.net.address import ENDPOINT
+
+if TYPE_CHECKING:
+    import zenoh
+
+LEASE_MS = 1000
+"""After this long without a sign of life a peer counts as gone."""
+CONNECT_MS = 2000
+"""How long a connection may take."""
+
+
+def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
+    """A session that others connect to, and that passes on between them: a router."""
+    return _open({"mode": "router", "listen/endpoints": [endpoint or ENDPOINT]}, endpoint, config, "listen")
+
+
+def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
+    """A session that connects to a router, and listens nowhere."""
+    settings = {"mode": "client", "connect/endpoints": [endpoint or ENDPOINT], "connect/timeout_ms": CONNECT_MS}
+    return _open(settings, endpoint, config, "connect")
+
+
+def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, what: str) -> zenoh.Session:
+    """What a configuration file says comes first; but an endpoint that is named by itself comes before it."""
+    try:
+        import zenoh
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"zenoh:// ({error})", "net") from None
+    settings = settings | {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/link/tx/lease": LEASE_MS,
+    }
+    found, given = zenoh.Config(), {}
+    if config is not None:
+        if not Path(config).is_file():
+            raise ContactFPGAError(f"config is {config!r}; there is no such file")
+        try:
+            found = zenoh.Config.from_file(config)
+        except zenoh.ZError as error:
+            raise ContactFPGAError(f"config {config!r}: {_reason(error)}") from None
+        given = {name: found.get_json(name) for name in settings} | {"mode": "null"}
+    usual = zenoh.Config()
+    for name, value in settings.items():
+        as_usual = given.get(name, "null") in ("null", "[]", usual.get_json(name))
+        if as_usual or (endpoint is not None and name == f"{what}/endpoints"):
+            found.insert_json5(name, json.dumps(value))
+    places = json.loads(found.get_json(f"{what}/endpoints"))
+    try:
+        return zenoh.open(found)
+    except zenoh.ZError as error:
+        raise ContactFPGAError(f"{_where(places)}: cannot {what} there: {_reason(error)}; {_step(what)}") from None
+
+
+def _where(places: Any) -> str:
+    return ", ".join(map(str, places)) if isinstance(places, list) else str(places)
+
+
+def _step(what: str) -> str:
+    if what == "listen":
+        return "where another publisher listens already, connect to it: --connect ENDPOINT"
+    return "is `contactfpga publish` running there?"
+
+
+def _reason(error: Exception) -> str:
+    """Without the places in Zenoh's sources."""
+    return str(error).split(" at /")[0].strip("[] ") or type(error).__name__

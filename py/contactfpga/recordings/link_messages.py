@@ -1,0 +1,79 @@
+"""The messages that a recording holds of a board, for programs that know nothing of us."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from contactfpga.driver.board import Board
+from contactfpga.driver.told import Told
+from contactfpga.haptics import Contacts
+from contactfpga.recordings import messages
+from contactfpga.recordings.mount import Mount
+from contactfpga.recordings.recorder import LinkFile
+from contactfpga.ros import convert
+from contactfpga.ros.cdr import encode
+from contactfpga.ros.markers import markers, outline
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
+from contactfpga.wire.faults import Faults
+from contactfpga.zones.units import UnitSamples
+from contactfpga.zones.zone import Zones
+
+Felt = Callable[[Zones, Tracks], Contacts | None]
+"""The forces at the zones of a frame; None: no readings belong to it."""
+
+DRAWN_S = 1 / 30
+"""How often what 3-D programs show is written."""
+WORLD = "world"
+"""The frame that a board lies in which is on no robot."""
+_ORIGIN = (0.0, 0.0, 0.0)
+
+
+class LinkMessages:
+    """Writes them for one link, in order."""
+
+    def __init__(self, board: Board, link: LinkFile, mount: Mount | None = None, felt: Felt | None = None):
+        self._link = link
+        self._mount = mount
+        self._felt = felt
+        self._frame = link.name if mount is None else mount.frame
+        self._tracker = Tracker()
+        self._drawn_s = -1.0
+        self._rim = outline(board.sheet, None if mount is None else mount.place)
+
+    def told(self, item: Told, clock_s: float) -> None:
+        """What came between frames."""
+        time_ns = self._link.time_ns(clock_s)
+        if isinstance(item, Faults):
+            self._link.write("faults", messages.FAULTS, messages.of_faults(item.names, time_ns, self._frame), clock_s)
+        elif isinstance(item, UnitSamples):
+            self._link.write("units", messages.UNITS, messages.of_units(item, time_ns, self._frame), clock_s)
+
+    def frame(self, zones: Zones, clock_s: float) -> None:
+        """A frame; contacts whenever something happens to them, and now and then, with what 3-D programs show."""
+        sampled_s = clock_s if zones.host_time_s is None else zones.host_time_s
+        head = convert.header(self._link.time_ns(sampled_s), self._frame)
+        tracks = self._tracker.update(zones)
+        forces = None if self._felt is None else self._felt(zones, tracks)
+        made = convert.zones(zones, head, zones.host_sigma_s)
+        if self._mount is not None:
+            made["zones"] = [convert.zone(self._mount.zone(zone)) for zone in zones]
+            tracks = self._mount.tracks(tracks)
+        self._put("zones", messages.ZONES, made, clock_s)
+        if forces is not None:
+            self._put("contacts", messages.CONTACTS, convert.contacts(tracks.active, head, forces), clock_s)
+            self._put("wrench", messages.WRENCH, convert.wrench(forces.wrench, head), clock_s)
+        drawn = clock_s - self._drawn_s >= DRAWN_S or clock_s < self._drawn_s
+        if drawn or tracks.events:
+            told = convert.tracks(tracks, tracks.events, tracks.restarted, head)
+            self._put("tracks", messages.TRACKS, told, clock_s)
+        if drawn:
+            self._drawn_s = clock_s
+            self._put("markers", messages.MARKERS, markers(self._rim, tracks.active, head, forces), clock_s)
+            if self._mount is None:  # where the links of a robot are, the robot says
+                world = convert.header(self._link.time_ns(clock_s), WORLD)
+                here = convert.transform(world, self._frame, _ORIGIN, _ORIGIN)
+                self._put("/tf", messages.TRANSFORMS, here, clock_s)
+
+    def _put(self, what: str, kind: str, message: convert.Message, clock_s: float) -> None:
+        self._link.write(what, kind, encode(kind, message), clock_s)

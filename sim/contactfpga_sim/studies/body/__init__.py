@@ -1,0 +1,1 @@
+"""What docs/body.md says of links, registration and folds, by simulation."""

@@ -1,0 +1,182 @@
+"""Runs links through a router, in four processes: boards with their publishers, the router, and two that read half of
+the links each."""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import socket
+import threading
+import time
+from contextlib import ExitStack
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import contactfpga
+from contactfpga.net import session
+from contactfpga.net.publisher import Publisher
+from contactfpga_sim.studies.net import source
+
+SECONDS = 5.0
+FULL_HZ = 10_000.0
+"""The rate of one link beside the others."""
+RATE_HZ = 1000.0
+BARE_BYTES = 100
+"""Of a message of the bare pair."""
+LONG_S = 120.0
+
+
+class Load(NamedTuple):
+    """What a run showed; times in s."""
+
+    links: int
+    share: float
+    """Of the frames that were sent, those received by the end; the others are on their way, or lost."""
+    frames: float
+    """Received, per second."""
+    lost: int
+    """Frames and messages that did not come."""
+    messages: float
+    """Per second."""
+    cpu: dict[str, float]
+    """Share of a core that publishers, router and readers took."""
+    latency: tuple[float, float]
+    """p50 and p99 from a frame being due at the port to its reader, of one link."""
+    bare: tuple[float, float]
+    """The same of the bare pair of Zenoh, from put to callback."""
+
+
+def measure(links: int, batch_s: float, full: bool = False, seconds: float = SECONDS) -> Load:
+    """Links of 1 kHz; ``full``: and one of 10 kHz."""
+    context: Any = multiprocessing.get_context("spawn")
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{one.getsockname()[1]}"
+    with ExitStack() as stack:
+        pipes = {}
+        every = range(links + full)
+        for name, work, mine in (
+            ("router", _route, every),
+            ("publishers", _publish, every),
+            ("reader", _read, every[::2]),
+            ("other reader", _read, every[1::2]),
+        ):
+            pipes[name], theirs = context.Pipe()
+            arguments = (theirs, endpoint, mine, batch_s, full, seconds)
+            process = context.Process(target=work, args=arguments, daemon=True)
+            process.start()
+            stack.callback(process.kill)
+            assert _answer(pipes[name]) == "ready"
+        for pipe in pipes.values():
+            pipe.send("go")
+        begun_s, firsts = _answer(pipes["publishers"])
+        for name in ("reader", "other reader"):
+            pipes[name].send((begun_s, firsts[0]))
+        found = {name: _answer(pipe) for name, pipe in pipes.items()}
+    cpu = {name: value[0] / seconds for name, value in found.items()}
+    frames, lost, messages = (np.array(found["reader"][1]) + found["other reader"][1]).tolist()
+    sent = (RATE_HZ * links + FULL_HZ * full) * seconds
+    return Load(links + full, frames / sent, frames / seconds, lost, messages / seconds, cpu, *found["reader"][2:])
+
+
+def _answer(pipe: Connection) -> Any:
+    if not pipe.poll(LONG_S):
+        raise TimeoutError("a process of the study does not answer")
+    return pipe.recv()
+
+
+def _route(pipe: Connection, endpoint: str, _links: range, _batch_s: float, _full: bool, seconds: float) -> None:
+    with session.listening(endpoint):
+        pipe.send("ready")
+        pipe.recv()
+        used_s = time.process_time()
+        time.sleep(seconds)
+        pipe.send((time.process_time() - used_s,))
+        time.sleep(LONG_S)
+
+
+def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full: bool, seconds: float) -> None:
+    for low in range(8):
+        source.frames(low)
+    boards = [source.Steady() for _ in links]
+    with session.connected(endpoint) as network:
+        stop = threading.Event()
+        for number, board in enumerate(boards):
+            publisher = Publisher(board, network, f"load/{number}", batch_s=batch_s)
+            threading.Thread(target=publisher.run, args=(stop,), daemon=True).start()
+        bare = network.declare_publisher("bare/pair", express=True)
+        pipe.send("ready")
+        pipe.recv()
+        begun_s, rng = time.monotonic() + 0.1, random.Random(1)
+        rates = [RATE_HZ] * len(links)
+        if full:
+            rates[-1] = FULL_HZ
+        pipe.send(
+            (
+                begun_s,
+                [board.go(begun_s + rng.random() / rate, rate) for board, rate in zip(boards, rates, strict=True)],
+            )
+        )
+        used_s = time.process_time()
+        _beat(bare, begun_s + seconds)
+        pipe.send((time.process_time() - used_s,))
+        time.sleep(LONG_S)
+
+
+def _beat(bare: Any, until_s: float) -> None:
+    """The bare pair: a message with its time, 1,000 times per second."""
+    while (now_s := time.monotonic()) < until_s:
+        bare.put(np.float64(now_s).tobytes() + bytes(BARE_BYTES - 8))
+        time.sleep(1 / RATE_HZ)
+
+
+def _read(pipe: Connection, endpoint: str, links: range, batch_s: float, full: bool, seconds: float) -> None:
+    bare: list[float] = []
+    with session.connected(endpoint) as network, ExitStack() as stack:
+        network.declare_subscriber(
+            "bare/pair",
+            lambda sample: bare.append(time.monotonic() - np.frombuffer(sample.payload.to_bytes()[:8])[0]),
+        )
+        boards = []
+        for number in links:
+            port = f"zenoh://load/{number}?connect={endpoint}"
+            boards.append(stack.enter_context(contactfpga.open(port, timeout=LONG_S)))
+        pipe.send("ready")
+        pipe.recv()
+        begun_s, first = _answer(pipe)
+        before = [_counted(board) for board in boards]
+        used_s, found = time.process_time(), []
+        if 0 in links:
+            found = _probed(boards[0], first, begun_s, begun_s + seconds)
+        time.sleep(max(0.0, begun_s + seconds - time.monotonic()))
+        used_s = time.process_time() - used_s
+        counts = [_counted(board) for board in boards]
+        total = np.array([*counts, (0, 0, 0)]).sum(axis=0) - np.array([*before, (0, 0, 0)]).sum(axis=0)
+        pipe.send((used_s, total.tolist(), _quantiles(found), _quantiles(bare)))
+        time.sleep(LONG_S)
+
+
+def _probed(board: contactfpga.Board, first: int, begun_s: float, until_s: float) -> list[float]:
+    """How late each frame of one link is."""
+    found = []
+    with board.subscribe(maxsize=1 << 16) as frames:
+        while time.monotonic() < until_s:
+            number = source.number_of(frames.next(LONG_S).time_us) - first
+            if number >= 0:
+                found.append(time.monotonic() - (begun_s + (number + 1) / RATE_HZ))
+    return found
+
+
+def _counted(board: contactfpga.Board) -> tuple[int, int, int]:
+    stats = board.stats
+    assert stats.net is not None
+    return stats.frames, stats.lost + stats.unexplained + stats.net.lost_messages, stats.net.messages
+
+
+def _quantiles(found: list[float]) -> tuple[float, float]:
+    if not found:
+        return 0.0, 0.0
+    middle, most = np.quantile(found, [0.5, 0.99]).tolist()
+    return middle, most

@@ -1,0 +1,142 @@
+"""Cells that the folding cover presses: learned over the joint's range, marked, never dropped."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import numpy as np
+import pytest
+from model_board import DirectPort
+
+import contactfpga
+from contactfpga import cli
+from contactfpga.body import BodyError, Snapshot
+from contactfpga.body.body import Body
+from contactfpga.body.folds import Folds, cells_of, learn
+from contactfpga.body.snapshot import LinkState
+from contactfpga.wire.protocol import Frame, no_records
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.studies.body import folding
+
+SKIN = contactfpga.Skin(rows=4, columns=6, report="cells")
+ROBOT = '[[links]]\nname = "arm"\nskin = "skin.toml"\nport = "a"\n'
+
+
+def frame(*cells, skin=SKIN):
+    bitmap = np.zeros((skin.rows, skin.columns), bool)
+    for cell in cells:
+        bitmap[cell] = True
+    return Zones(Frame(0, 0, frozenset(), 0, 0, 0, len(cells), no_records(skin.sheet), bitmap), skin.sheet, 0)
+
+
+CREASE = [(0, 1), (0, 2), (0, 3)]
+SEEN = [(0.01, frame()), (0.11, frame(*CREASE[:2])), (0.12, frame(*CREASE[1:])), (0.31, frame(*CREASE))]
+
+
+@pytest.fixture
+def robot(tmp_path):
+    (tmp_path / "skin.toml").write_text(SKIN.to_toml())
+    learn("elbow", SEEN, 0.1).save(tmp_path / "folds.json")
+    (tmp_path / "robot.toml").write_text(ROBOT + 'folds = "folds.json"\n')
+    return tmp_path / "robot.toml"
+
+
+def snapshot(robot, zones, joints):
+    return Snapshot(Body.load(robot), 1.0, {"arm": LinkState(zones, 0.0, "ok", "", 1.0)}, joints)
+
+
+def test_contacts_say_how_much_of_them_the_cover_presses(robot):
+    zones = frame(*CREASE, (1, 4), (3, 0), (3, 1))
+    for angle, expected in ((0.15, [3 / 4, 0.0]), (0.05, [0.0, 0.0]), (0.25, [None, None]), (-2.0, [None, None])):
+        found = snapshot(robot, zones, lambda _, angle=angle: {"elbow": angle}).contacts("link")
+        assert [one.fold for one in found] == expected, angle
+        assert [one.zone.area_cells for one in found] == [4, 2], "marked, and there"
+    (only,) = snapshot(robot, frame(*CREASE), lambda _: {"elbow": 0.15}).contacts("link")
+    assert only.fold == 1.0
+
+
+def test_fold_over_the_seam_of_a_closed_sheet():
+    skin = SKIN.replace(closed=True, surface="cylinder", radius_mm=30.0)
+    crease, finger = [(0, 5), (0, 0)], [(3, 2)]
+    known = learn("elbow", [(0.0, frame(*crease, skin=skin))], 0.1)
+    shown = frame(*crease, *finger, skin=skin)
+    found = [known.share(0.0, cells_of(shown, zone)) for zone in shown]
+    assert found == [1.0, 0.0]
+
+
+def test_without_the_angle_nothing_is_marked(robot):
+    for joints in (None, lambda _: {"wrist": 0.15}):
+        (only,) = snapshot(robot, frame(*CREASE), joints).contacts("link")
+        assert only.fold is None
+
+
+def test_file_comes_back(robot):
+    found = Folds.load(robot.parent / "folds.json")
+    assert (found.joint, found.step_rad, found.lines) == ("elbow", 0.1, (4, 6))
+    assert found.frames == {0: 1, 1: 2, 3: 1}
+    assert np.argwhere(found.cells[1]).tolist() == [list(cell) for cell in CREASE]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"joint": 3}, "joint must be a text"),
+        ({"step_rad": 0}, "step_rad a number from 0.0001 to 1"),
+        ({"lines": [4, 600]}, "lines is [4, 600]; it must be rows and columns, 64 at most"),
+        ({"steps": [{"step": 0, "frames": 1, "cells": [[4, 0]]}]}, "a cell is [4, 0]; the sheet has 4x6"),
+        ({"steps": [{"step": 0, "frames": 0, "cells": []}]}, "its step and frames must be whole numbers"),
+        ({"steps": [{"step": 0, "frames": 1}]}, "'cells' is missing"),
+        ({"steps": 7}, "not a file of `contactfpga body learn`"),
+        ({"lines": [4, 5]}, "folds are of (4, 5) cells; the Skin has (4, 6)"),
+    ],
+)
+def test_odd_files_are_refused_in_one_line(robot, capsys, change, says):
+    path = robot.parent / "folds.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    assert cli.main(["body", str(robot)]) == 1
+    assert says in capsys.readouterr().err.replace("\n  ", " ")
+
+
+def test_folds_are_of_cells(robot):
+    (robot.parent / "skin.toml").write_text(SKIN.replace(report="moments").to_toml())
+    with pytest.raises(BodyError, match="folds are marked cell by cell, with report = 'cells'"):
+        Body.load(robot)
+    board = DirectPort(contactfpga.Skin())
+    with contactfpga.open(board) as opened, pytest.raises(BodyError, match="the board reports 'moments'"):
+        learn("elbow", [(0.0, opened.read())])
+
+
+def test_command_learns_from_angles_on_standard_input(robot, capsys, monkeypatch):
+    monkeypatch.setattr("contactfpga.driver.driver.open", lambda *_, **__: contactfpga.Board(Sweeping(), SKIN))
+    robot.write_text(ROBOT)
+    output = robot.parent / "new.json"
+    asked = ["body", "learn", str(robot), "arm", "elbow", str(output), "--step", "0.1"]
+    monkeypatch.setattr("sys.stdin", io.StringIO("0.05\n0.15\n\n0.35\n"))
+    assert cli.main(asked) == 0
+    printed = capsys.readouterr().out
+    assert "new.json: 3 frames from 0.00 to 0.40 rad, 12 cells pressed somewhere, at 3 of 3 steps" in printed
+    assert "1 steps between were not visited: there nothing will be marked" in printed
+    assert Folds.load(output).frames == {0: 1, 1: 1, 3: 1}
+    for text, says in (("x\n", "line 1 of standard input is 'x', no angle in rad"), ("", "no angle came on standard")):
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+        assert cli.main(asked) == 1
+        assert says in capsys.readouterr().err.replace("\n  ", " ")
+
+
+class Sweeping(DirectPort):
+    """A transport of its own: every other column is pressed."""
+
+    name, live, threaded = "sweeping", True, False
+
+    def __init__(self):
+        super().__init__(SKIN)
+
+
+def test_rates_in_simulation():
+    """Few fingers pass for a crease, unless it hides them; nothing is marked where nothing folds."""
+    found = folding.rates(2, count=150)
+    assert found.folds > 0.95
+    assert found.joined < 0.15
+    assert found.within > 0.9
+    assert (found.apart, found.straight) == (0, 0)

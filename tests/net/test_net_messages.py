@@ -1,0 +1,208 @@
+"""Messages and what is missing between them, without a network: nothing wrong is delivered, what is lost is counted."""
+
+import random
+
+import pytest
+from model_board import ModelBoard
+
+import contactfpga
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.net.address import is_loopback, key_of, parse
+from contactfpga.net.message import MOST_BYTES, Counters, Message, Stream
+from contactfpga.wire.asked import Asked, asked_in
+from contactfpga.wire.command import Command, encode_command
+from contactfpga.wire.protocol import encode_request
+
+SKIN = contactfpga.Skin()
+
+
+class Sender:
+    """A publisher in simulated time."""
+
+    def __init__(self, rng):
+        self.number, self.sequence, self.offset, self.rng = rng.getrandbits(64), 0, 0, rng
+
+    def send(self, data, now_s):
+        message = Message(self.number, self.sequence, self.offset, round(now_s * 1e6), 0, data)
+        self.sequence += 1
+        self.offset += len(data)
+        return message.encode()
+
+
+class Receiver:
+    """What a ``zenoh://`` port and the driver make of messages."""
+
+    def __init__(self):
+        self.counters = Counters()
+        self.stream = Stream(self.counters)
+        self.host = Conversation("x")
+        self.frames = []
+
+    def take(self, payload, now_s):
+        data, after_break = self.stream.take(payload)
+        if after_break:
+            self.host.doubt(now_s)
+        self.frames += [event.zones for event in self.host.receive(data, now_s) if isinstance(event, Arrival)]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_is_lost_nothing_wrong_is_delivered(seed):
+    """Holes of up to 40 s, in which a frame's time wraps; jams, after which all comes at once; messages twice and late;
+    publishers that start again."""
+    rng = random.Random(seed)
+    board, sender, receiver = ModelBoard(SKIN), Sender(rng), Receiver()
+    begun_s, now_s, sent, last_hello_s, old, jam = 0.0, 0.0, set(), -1.0, [], []
+    jammed = 0
+    for turn in range(2000):
+        step_s = rng.choice([0.01, 0.01, 0.01, 0.3, rng.uniform(0, 40)]) if rng.random() < 0.03 else 0.01
+        lost = turn > 20 and (step_s > 0.02 or rng.random() < 0.05)
+        jammed = rng.randrange(100) if rng.random() < 0.005 else jammed - 1
+        now_s += step_s
+        board.time_us = round((now_s - begun_s) * 1e6)
+        data = b""
+        if now_s > last_hello_s + 0.5:
+            data, last_hello_s = board.hello(), now_s
+        for _ in range(rng.randrange(1, 5)):
+            sent.add((board.time_us, board.sent % 256))
+            data += board.frame()
+        cut = rng.randrange(len(data))
+        payloads = [sender.send(data[:cut], now_s), sender.send(data[cut:], now_s)]
+        old.append(payloads[0])
+        for payload in payloads:
+            if not lost and (turn < 20 or rng.random() > 0.02):
+                jam.append(payload)
+        while jam and jammed <= 0:
+            receiver.take(jam.pop(0), now_s)
+        if rng.random() < 0.02:
+            receiver.take(rng.choice(old), now_s)  # comes again
+        if rng.random() < 0.01:
+            sender = Sender(rng)
+            old.clear()
+    assert {(zones.time_us, zones.sequence) for zones in receiver.frames} <= sent
+    times = [zones.time_us for zones in receiver.frames]
+    assert times == sorted(set(times))
+    assert len(times) > 100
+    stats = receiver.host.stats
+    for payload in (*jam, sender.send(board.hello(), now_s)):
+        receiver.take(payload, now_s)
+    assert stats.frames + stats.lost + stats.unexplained == len(sent)
+    assert receiver.counters.lost_messages > 20
+    assert receiver.counters.breaks > 3
+    assert stats.restarts == 0
+
+
+def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
+    rng, counters = random.Random(1), Counters()
+    sender, stream = Sender(rng), Stream(counters)
+    assert stream.take(sender.send(b"abc", 0.0)) == (b"\0abc", False)
+    assert stream.take(sender.send(b"def", 0.1)) == (b"def", False)
+    sender.send(b"12345", 0.2)
+    sender.send(b"67", 0.3)
+    assert stream.take(sender.send(b"ghi", 0.4)) == (b"\0ghi", False)
+    assert (counters.lost_messages, counters.lost_bytes, counters.breaks, counters.messages) == (2, 7, 0, 3)
+
+
+@pytest.mark.parametrize("step_s", [-0.001, -3600.0, 2.1, 3600.0])
+def test_a_step_of_the_publishers_clock_is_a_break(step_s):
+    """Or its process stood still, and its port ran over meanwhile: the same from here."""
+    counters, sender = Counters(), Sender(random.Random(1))
+    stream = Stream(counters)
+    stream.take(sender.send(b"a", 1000.0))
+    assert stream.take(sender.send(b"b", 1000.0 + step_s)) == (b"\0b", True)
+    assert stream.take(sender.send(b"c", 1000.1 + step_s)) == (b"c", False)
+    assert counters.breaks == 1
+
+
+def test_what_is_no_message_is_refused_and_counted():
+    counters, sender = Counters(), Sender(random.Random(1))
+    stream = Stream(counters)
+    whole = sender.send(b"x", 0.0)
+    for bad in (b"", b"cfp1", b"zzzz" + whole[4:], whole + bytes(MOST_BYTES), b"\x80\x04pickled"):
+        assert stream.take(bad) == (b"", False)
+    assert (counters.refused, counters.messages) == (5, 0)
+    stream.take(whole)
+    stream.take(whole)
+    assert (counters.refused, counters.messages) == (6, 1)
+
+
+def test_a_board_restarts_behind_a_publisher_that_restarts():
+    rng, board, receiver = random.Random(1), ModelBoard(SKIN), Receiver()
+    sender = Sender(rng)
+    board.time_us, board.heard = 5_000_000, 3
+    receiver.take(sender.send(board.hello() + board.frame(), 5.0), 5.0)
+    board.power_up()
+    receiver.take(Sender(rng).send(board.frame(), 5.5), 5.5)
+    assert [zones.time_us for zones in receiver.frames] == [5_000_000]
+    assert (receiver.counters.publishers, receiver.counters.breaks) == (2, 1)
+
+
+# ---- what may go to a board
+
+
+def test_requests_pass_in_both_forms_and_commands_are_told_apart():
+    for pulsed in (False, True):
+        request = encode_request(0x10101, hello=True, pulsed=pulsed)
+        command = encode_command(0x10101, Command(1, 5), pulsed=pulsed)
+        assert asked_in(request) is Asked.REQUEST
+        assert asked_in(request + request) is Asked.REQUEST
+        assert asked_in(command) is Asked.COMMAND
+        assert asked_in(request + command) is Asked.COMMAND
+        for cut in range(1, len(request)):
+            assert asked_in(request[:cut]) is Asked.OTHER
+            assert asked_in(request[cut:]) is Asked.OTHER
+
+
+def test_bytes_with_a_flipped_bit_do_not_pass(rng):
+    command = encode_command(0x10101, Command(1, 5))
+    for data in (command, encode_request(0x10101, pulsed=True), encode_command(0x10101, Command(2, 9), pulsed=True)):
+        for _ in range(300):
+            broken = bytearray(data)
+            broken[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+            assert asked_in(bytes(broken)) is Asked.OTHER
+    assert asked_in(b"") is Asked.OTHER
+    assert asked_in(bytes(20)) is Asked.OTHER
+
+
+# ---- addresses
+
+
+def test_addresses():
+    address = parse("zenoh://contactfpga/left?connect=tcp/10.0.0.2:7447&wait=30&config=a%26b.json5")
+    assert (address.key, address.connect, address.wait_s) == ("contactfpga/left", "tcp/10.0.0.2:7447", 30.0)
+    assert address.config == "a&b.json5"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("zenoh://", "key is ''"),
+        ("zenoh://a/*", "key is 'a/*'"),
+        ("zenoh://a//b", "key is 'a//b'"),
+        ("zenoh://a?wait=-1", "wait is '-1'"),
+        ("zenoh://a?wait=nan", "wait is 'nan'"),
+        ("zenoh://a?speed=1", "'speed=1' is no option"),
+        ("zenoh://a?wait=1&wait=2", "given twice"),
+    ],
+)
+def test_addresses_that_cannot_be_are_refused_before_anything_is_opened(name, said):
+    with pytest.raises(contactfpga.PortNotFound) as caught:
+        contactfpga.open(name)
+    assert said in str(caught.value)
+
+
+def test_which_endpoints_are_this_machine_alone():
+    here = ["tcp/127.0.0.1:7447", "tls/localhost:1", "tcp/[::1]:7447", "unixsock-stream//tmp/x", "udp/127.3.2.1:1?x=y"]
+    there = [
+        "tcp/0.0.0.0:7447",
+        "tcp/[::]:7447",
+        "tcp/192.168.0.1:7447",
+        "tls/robot.local:7447",
+        "tcp/127.0.0.1.nip.io:1",
+    ]
+    assert all(map(is_loopback, here))
+    assert not any(map(is_loopback, there))
+
+
+def test_keys_come_from_names():
+    assert key_of("left forearm", b"\1\2") == "contactfpga/left-forearm"
+    assert key_of("", b"\1\2") == "contactfpga/0102"

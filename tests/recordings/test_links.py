@@ -1,0 +1,204 @@
+"""Several boards in one file: those of a robot."""
+
+import numpy as np
+import pytest
+from fake_board import FakeBoard, wait_until
+from model_board import ModelBoard
+from recorded_stream import StreamPort
+from rosbags.highlevel import AnyReader
+
+import contactfpga
+from contactfpga import Skin, cli
+from contactfpga.body import Body
+from contactfpga.body.contact import placed
+from contactfpga.recordings import Recording, Session
+from contactfpga.recordings.recorder import Split
+from contactfpga.wire.hellos import Cutter
+
+SKIN = Skin()
+LONG = 60.0
+NAMES = ("left arm", "chest")
+
+
+def recorded(file, **options):
+    """The ports of two boards that differ in what they send."""
+    ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200, hello_every=30, gap_us=1404)]
+    session = Session(file, **options)
+    with session:
+        for name, port in zip(NAMES, ports):
+            session.add(port, name=name)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
+    return ports, session
+
+
+def test_each_link_is_there_to_the_byte(tmp_path):
+    ports, _ = recorded(tmp_path / "x.mcap")
+    recording = Recording(tmp_path / "x.mcap")
+    assert set(recording.links) == set(NAMES)
+    assert [recording.links[name].sheet.rows for name in NAMES] == [16, 8]
+    for name, port in zip(NAMES, ports):
+        assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
+        alone = [zones.to_dict() for _, _, zones in recording.frames(link=name)]
+        with contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link={name.replace(' ', '%20')}") as board:
+            assert [zones.to_dict() for zones in board] == alone
+        both = [zones.to_dict() for _, link, zones in recording.frames() if link == name]
+        assert both == alone
+    times = [t_s for t_s, _, _ in recording.frames()]
+    assert times == sorted(times)
+
+
+def test_a_link_must_be_named_where_there_are_several(tmp_path):
+    recorded(tmp_path / "x.mcap", bytes_only=True)
+    with pytest.raises(contactfpga.ContactFPGAError, match="several links; name one of them: left arm, chest"):
+        contactfpga.open(f"replay://{tmp_path / 'x.mcap'}")
+    with pytest.raises(contactfpga.ContactFPGAError, match="has no link 'leg'; it has left arm, chest"):
+        contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link=leg")
+
+
+def test_split_files_begin_with_a_hello_of_each_link(tmp_path):
+    ports, session = recorded(tmp_path / "x.mcap", split=Split(bytes=3_000), bytes_only=True)
+    assert len(session.files) > 1
+    for name, port in zip(NAMES, ports):
+        pieces = [Recording(file) for file in session.files]
+        kept = [b"".join(data for _, data in one.raw_bytes(name)) for one in pieces if name in one.links]
+        assert b"".join(kept) == port.sent
+
+
+@pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
+    hello = ModelBoard(SKIN).hello()
+    data = before + hello + b"frame\0\0"
+    cutter, kept = Cutter(), b""
+    for at in range(0, len(data), size):
+        first, after = cutter.take(data[at : at + size])
+        kept += first
+        if after:
+            break
+    assert after
+    assert kept + after == data[: len(kept + after)]
+    assert kept.strip(b"\0") == before.strip(b"\0")
+    assert size < 1000 or after.startswith(b"\0")
+    assert after.lstrip(b"\0").startswith(hello.strip(b"\0"))
+
+
+def test_a_link_without_a_hello_is_left_out(tmp_path):
+    from contactfpga.recordings import messages
+    from contactfpga.recordings.mcap_file import McapFile
+
+    file = McapFile(tmp_path / "x.mcap")
+    for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
+        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+    file.close()
+    recording = Recording(tmp_path / "x.mcap")
+    assert list(recording.links) == ["arm"]
+    assert [link for _, link, _ in recording.frames()] == ["arm"]
+    assert [data for _, data in recording.raw_bytes("leg")] == [b"\0\0noise\0"]
+
+
+def test_two_links_of_one_name(tmp_path):
+    with Session(tmp_path / "x.mcap") as session:
+        session.add(StreamPort(), name="arm")
+        session.add(StreamPort(), name="arm")
+        with pytest.raises(contactfpga.ContactFPGAError, match="two links are named 'arm'"):
+            session.start()
+
+
+ROBOT = """
+[[links]]
+name = "arm"
+frame = "arm_link"
+skin = "skin.toml"
+port = "{0}"
+point_m = [1.0, 0.0, 0.0]
+rpy_rad = [0.0, 0.0, 1.5707963267948966]
+
+[[links]]
+name = "shin"
+skin = "skin.toml"
+port = "{1}"
+mirrored = true
+surface = {{radius_mm = 50.0, slope = 0.1}}
+"""
+
+
+@pytest.fixture
+def robot(tmp_path):
+    with FakeBoard(SKIN) as arm, FakeBoard(SKIN) as shin:
+        (tmp_path / "skin.toml").write_text(SKIN.to_toml())
+        (tmp_path / "robot.toml").write_text(ROBOT.format(arm.path, shin.path))
+        yield tmp_path / "robot.toml", (arm, shin)
+
+
+def test_all_links_of_a_robot_by_command(robot, tmp_path):
+    path, _ = robot
+    file = tmp_path / "x.mcap"
+    assert cli.main(["record", str(file), str(path), "--seconds", "0.05", "--timeout", str(LONG)]) == 0
+    recording = Recording(file)
+    assert set(recording.links) == {"arm", "shin"}
+    assert recording.texts("robot") == [{"toml": path.read_text()}]
+    body = Body.load(path)
+    with AnyReader([file]) as reader:
+        found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+    assert "/tf" not in {topic for topic, _ in found}
+    for plan in body.links.values():
+        (first, *_) = [message for topic, message in found if topic == f"/{plan.name}/zones"]
+        assert first.header.frame_id == plan.frame
+        zone = first.zones[0]
+        point, normal = placed(plan, 1000 * zone.x, 1000 * zone.y)
+        np.testing.assert_allclose((zone.position.x, zone.position.y, zone.position.z), point)
+        np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
+
+
+def test_a_link_that_is_lost_leaves_the_others(robot, tmp_path, capsys):
+    path, (arm, shin) = robot
+    body = Body.load(path)
+    session = Session(tmp_path / "x.mcap")
+    for plan in body.links.values():
+        session.add(plan.port, plan.skin, name=plan.name, timeout=LONG)
+    session.start()
+    shin.unplug()
+    (gone,) = [link for link in session.links if link.name == "shin"]
+    wait_until(lambda: gone.error is not None)
+    assert session.running
+    before = session.frames
+    arm.send(arm.frame())
+    wait_until(lambda: session.frames > before)
+    with pytest.raises(contactfpga.PortLost):
+        session.stop()
+    assert set(Recording(tmp_path / "x.mcap").links) == {"arm", "shin"}
+
+
+@pytest.mark.parametrize("option", ["--skin", "--units", "--baud"])
+def test_what_a_robot_file_says_itself(robot, tmp_path, capsys, option):
+    value = "1000000" if option == "--baud" else "x.toml"
+    assert cli.main(["record", str(tmp_path / "x.mcap"), str(robot[0]), option, value]) == 1
+    assert "says it of each link" in capsys.readouterr().err
+
+
+def test_forces_of_units_are_messages(tmp_path):
+    from contactfpga.tracking.tracks import Tracks
+
+    taken = []
+
+    class Found(list):
+        from contactfpga.haptics import Wrench
+
+        wrench = Wrench((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), frame="bumper")
+
+    def felt(zones, tracks):
+        assert isinstance(tracks, Tracks)
+        taken.append(zones)
+        return Found()
+
+    port = StreamPort(frames=50)
+    session = Session(tmp_path / "x.mcap")
+    with session:
+        session.add(port, felt=lambda board: felt)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not port.left)
+    with AnyReader([tmp_path / "x.mcap"]) as reader:
+        wrenches = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages() if c.topic == "/skin/wrench"]
+    assert len(wrenches) == len(taken) > 0
+    assert wrenches[0].wrench.force.z == 3.0

@@ -1,0 +1,53 @@
+"""`contactfpga ros`: what a user sees of it."""
+
+import sys
+
+import pytest
+
+from contactfpga import cli
+
+
+def refused(capsys, *arguments):
+    status = cli.main(["ros", *arguments])
+    said = capsys.readouterr()
+    assert "Traceback" not in said.err
+    return status, said.err
+
+
+def test_it_publishes_for_as_long_as_it_is_asked(board, capsys):
+    pytest.importorskip("cyclonedds")
+    board.stream = board.frame
+    assert cli.main(["ros", board.path, "--domain", "88", "--namespace", "arm", "--seconds", "0.3"]) == 0
+    assert "publishing /arm/zones and its neighbors to this computer; stop with Ctrl+C" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--namespace", "a b"], "namespace is 'a b'; it has letters, digits and _, and / between parts"),
+        (["--frame", "a b"], "frame is 'a b'; a frame's name has letters, digits"),
+        (["--place", "0", "0", "nan"], "place_m is [0.0, 0.0, nan]; it must be three finite numbers"),
+        (["--zones-hz", "0"], "zones_hz is 0.0; it must be above 0 and at most 100000"),
+        (["--friction", "0.5"], "--friction is of forces; add --units"),
+        (["--seconds", "1", "nowhere"], "nowhere cannot be opened"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(capsys, arguments, said):
+    pytest.importorskip("cyclonedds")
+    status, text = refused(capsys, "--domain", "88", *arguments)
+    assert status == 1
+    assert said in " ".join(text.split())
+
+
+def test_units_of_a_board_that_has_none_are_refused(board, capsys, tmp_path):
+    pytest.importorskip("cyclonedds")
+    (tmp_path / "units.toml").write_text("[[unit]]\npoint_m = [0, 0, 0]\naxis = [0, 0, 1]\n")
+    status, text = refused(capsys, board.path, "--domain", "88", "--units", str(tmp_path / "units.toml"))
+    assert (status, "this board has no pressure units" in text) == (1, True)
+
+
+def test_the_missing_extra_is_named(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cyclonedds.domain", None)
+    status, text = refused(capsys, "sim://")
+    assert status == 1
+    assert "contactfpga[ros]" in text or "'.[ros]'" in text

@@ -1,0 +1,139 @@
+"""Publishers and routers in processes of their own, on free ports of this machine."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+from fake_board import FakeBoard
+
+ROUTER = """
+import sys, time
+from contactfpga.net import session
+with session.listening(sys.argv[1]):
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+def free_endpoint(protocol="tcp"):
+    """A port that nobody listens on."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
+
+
+class Child:
+    """A process of Python; ``line`` is the first that it prints."""
+
+    def __init__(self, *arguments, wait=True):
+        self.process = subprocess.Popen(
+            [sys.executable, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.line = self.process.stdout.readline().strip() if wait else ""
+
+    def end(self):
+        """Kill it; what it said."""
+        with contextlib.suppress(ProcessLookupError):
+            self.process.kill()
+        return self.process.communicate(timeout=30)[1]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.end()
+
+
+def router(endpoint):
+    """A Zenoh session that is nothing but a router."""
+    return Child("-c", ROUTER, endpoint)
+
+
+def publish(board, *options, wait=True):
+    """``contactfpga publish`` of a board."""
+    return Child("-m", "contactfpga", "publish", board.path, "--timeout", 60, *options, wait=wait)
+
+
+class Streaming(FakeBoard):
+    """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
+
+    def __init__(self, skin):
+        super().__init__(skin)
+        self.sent_us = set()
+        self._begun_s = time.monotonic()
+        self._hello_due_s = 0.0
+        self.lock = threading.Lock()
+        self.stream = self._more
+
+    def frame(self, *args, **options):
+        now_us = round((time.monotonic() - self._begun_s) * 1e6)
+        self.time_us = max(self.time_us, now_us)
+        self.sent_us.add(self.time_us)
+        return super().frame(*args, **options)
+
+    def _more(self):
+        time.sleep(0.002)
+        data = b""
+        if time.monotonic() > self._hello_due_s:
+            data, self._hello_due_s = self.hello(), time.monotonic() + 0.25
+        return data + self.frame()
+
+    def _write(self, data):
+        """A line does not wait: what nobody reads is lost, as in a UART."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+
+class Relay:
+    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first."""
+
+    def __init__(self, endpoint):
+        host, _, number = endpoint.partition("/")[2].rpartition(":")
+        self._target = host, int(number)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.endpoint = f"tcp/127.0.0.1:{self._listener.getsockname()[1]}"
+        self._whole = threading.Event()
+        self._whole.set()
+        self._sockets = []
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def cut(self):
+        self._whole.clear()
+        for one in self._sockets:
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+
+    def mend(self):
+        self._whole.set()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = self._listener.accept()
+                if not self._whole.is_set():
+                    near.close()
+                    continue
+                far = socket.create_connection(self._target)
+                self._sockets += [near, far]
+                for source, sink in ((near, far), (far, near)):
+                    threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
+
+    @staticmethod
+    def _carry(source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_RDWR)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.cut()
+        self._listener.close()
+        for one in self._sockets:
+            one.close()

@@ -1,0 +1,80 @@
+"""A robot in the view: links, sheets on them and the mouse's rays move with the joints."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser")
+
+from contactfpga.body import Body
+from contactfpga.view import robot
+from contactfpga.view import server as serving
+
+URDF = """<robot name="arm">
+  <link name="base"/>
+  <link name="arm">
+    <visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963"/>
+      <geometry><mesh filename="arm.stl" scale="2 1 1"/></geometry></visual>
+    <visual><geometry><box size="1 1 1"/></geometry></visual>
+    <visual><geometry><mesh filename="not there.stl"/></geometry></visual>
+  </link>
+  <joint name="elbow" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+</robot>"""
+TETRAHEDRON = "solid a\n" + "".join(
+    f"facet normal 0 0 0\nouter loop\n{''.join(f'vertex {x} {y} {z}' + chr(10) for x, y, z in face)}endloop\nendfacet\n"
+    for face in (
+        ((0, 0, 0), (1, 0, 0), (0, 1, 0)),
+        ((0, 0, 0), (0, 1, 0), (0, 0, 1)),
+        ((0, 0, 0), (0, 0, 1), (1, 0, 0)),
+        ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
+    )
+)
+TABLE = """urdf = "arm.urdf"
+[[links]]
+name = "sheet"
+frame = "arm"
+skin = "skin.toml"
+port = "sim://"
+point_m = [0.0, 0.0, 0.5]
+mirrored = {mirrored}
+"""
+
+
+@pytest.fixture(params=[False, True], ids=["as it is", "mirrored"])
+def stage(request, tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "arm.stl").write_text(TETRAHEDRON + "endsolid a\n")
+    (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 4\n")
+    (tmp_path / "robot.toml").write_text(TABLE.format(mirrored=str(request.param).lower()))
+    server, _ = serving.serve(port=0)
+    yield robot.RobotStage(server, Body.load(tmp_path / "robot.toml"), tmp_path / "arm.urdf"), request.param
+    serving.stop(server)
+
+
+def test_meshes_are_found_with_their_places(tmp_path, stage):
+    (found,) = robot.visuals(tmp_path / "arm.urdf")
+    assert (found.link, found.path.name, found.scale) == ("arm", "arm.stl", (2.0, 1.0, 1.0))
+    np.testing.assert_allclose(found.pose.apply(np.array([1.0, 0.0, 0.0])), [0.1, 1.0, 0.0], atol=1e-6)
+    assert stage[0].unread == set()
+
+
+def test_the_mouse_meets_a_sheet_where_the_joints_put_it(stage):
+    """By hand: the arm begins 1 m up; turned by 90 degrees about y its z is the base's x, and the sheet 0.5 m along."""
+    moved, mirrored = stage
+    moved.move({"elbow": np.pi / 2})
+    sheet = moved.stages["sheet"]
+    x_mm = 30.0 - 10.0 if mirrored else 10.0
+    # Place (10, 30) mm of the unmirrored sheet: x runs along the base's -z, y along its y.
+    onto = np.array([0.5, 0.03, 1.0 - 0.01])
+    assert sheet._met(onto + [1.0, 0, 0], np.array([-1.0, 0.0, 0.0])) == pytest.approx((x_mm, 30.0))
+    moved.move({"elbow": 0.0})
+    assert sheet._met(onto + [1.0, 0, 0], np.array([-1.0, 0.0, 0.0])) is None
+    assert sheet._met([0.01, 0.03, 9.0], np.array([0.0, 0.0, -1.0])) == pytest.approx((x_mm, 30.0))
+
+
+def test_a_mesh_that_cannot_be_read_is_said(tmp_path, stage):
+    path = tmp_path / "broken.dae"
+    path.write_text("no mesh")
+    visual = robot.visuals(tmp_path / "arm.urdf")[0]
+    stage[0]._add_mesh(robot.Visual("arm", visual.pose, path, (1.0, 1.0, 1.0)))
+    assert stage[0].unread == {".dae"}
