@@ -120,4 +120,4 @@ def test_doctor_prints_each_finding_once_and_what_was_not_pressed(doctor):
 
 def test_doctor_watches_or_tests(capsys):
     assert cli.main(["doctor", "--watch", "--self-test", "sim://"]) == 1
-    assert "give one of them" in capsys.readouterr().err
+    assert "give --watch or --self-test, not both" in capsys.readouterr().err
