@@ -173,7 +173,7 @@ def test_a_link_that_is_lost_leaves_the_others(robot, tmp_path, capsys):
 def test_what_a_robot_file_says_itself(robot, tmp_path, capsys, option):
     value = "1000000" if option == "--baud" else "x.toml"
     assert cli.main(["record", str(tmp_path / "x.mcap"), str(robot[0]), option, value]) == 1
-    assert "says it of each link" in capsys.readouterr().err
+    assert "sets it for each link" in capsys.readouterr().err
 
 
 def test_forces_of_units_are_messages(tmp_path):

@@ -49,7 +49,7 @@ REFUSED = [
     ({"units": 2.5}, "units is 2.5; it must be a whole number"),
     (
         {"units": 2, "converter": "ads"},
-        "converter is 'ads'; it must be one of 'mcp3208', or 'module:attribute' of your own",
+        "converter is 'ads'; it must be one of 'mcp3208', 'ads131m08', or 'module:attribute' of your own",
     ),
     ({"units": 2, "converter_v": 2.5}, "converter_v is 2.5; MCP3208 needs 2.7 to 5.5 V"),
     ({"units": 2, "converter_v": 6}, "converter_v is 6.0; MCP3208 needs 2.7 to 5.5 V"),

@@ -81,7 +81,7 @@ def show(
 
 def room(console: Console, endless: bool = False) -> Room:
     """What there is for a frame now; ``endless``: as many lines as it takes."""
-    shown = terminal.of()
+    shown = terminal.of(console.file)  # not standard output, for which Live stands in
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 

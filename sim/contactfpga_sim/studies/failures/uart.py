@@ -11,6 +11,7 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
+from contactfpga.zones.zone import Zones
 from contactfpga_sim.studies.failures.rig import Rig, hello_clocks
 
 OVERSAMPLING = 16
@@ -117,5 +118,10 @@ def _decoded(data: bytes) -> tuple[list[str], Conversation]:
     conversation = Conversation("the line")
     events = conversation.receive(data, 0.0)
     arrived = [event.zones for event in events if isinstance(event, Arrival)]
-    # Without the flags that the host adds, which depend on the frame before.
-    return [str(zones.to_dict() | {"flags": sorted(zones.frame.flags)}) for zones in arrived], conversation
+    return [str(_sent(zones)) for zones in arrived], conversation
+
+
+def _sent(zones: Zones) -> dict[str, object]:
+    """What the board said, without what the host adds from the frames before: flags, and the time on its own clock."""
+    own = {name: value for name, value in zones.to_dict().items() if not name.startswith("host_")}
+    return own | {"flags": sorted(zones.frame.flags)}
