@@ -13,7 +13,7 @@ import sys
 import textwrap
 import unicodedata
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, TextIO
+from typing import IO, TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,7 +64,7 @@ class Terminal:
     """What was written can be written over."""
 
 
-def of(stream: TextIO | None = None) -> Terminal:
+def of(stream: IO[str] | None = None) -> Terminal:
     """What standard output, or another stream, can show now."""
     stream = sys.stdout if stream is None else stream
     size = _size(stream)
@@ -82,7 +82,7 @@ def of(stream: TextIO | None = None) -> Terminal:
     )
 
 
-def _size(stream: TextIO) -> os.terminal_size | None:
+def _size(stream: IO[str]) -> os.terminal_size | None:
     """None where the stream is no terminal."""
     try:
         return os.get_terminal_size(stream.fileno()) if stream.isatty() else None
