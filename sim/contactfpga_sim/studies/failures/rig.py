@@ -70,7 +70,8 @@ def seen(skin: Skin, frames: np.ndarray, cuts: Cuts | None = None) -> list[Zones
         if cuts is not None:
             rig.board.cut(cuts.rows, cuts.columns)
         start = hello_clocks(skin)
-        held = HELD_SCANS * max(rig.scan, 10 * FRAME_BYTES * Derived(skin).bit_clocks)
+        # Whole scans, or the last frame would be torn.
+        held = HELD_SCANS * rig.scan * math.ceil(10 * FRAME_BYTES * Derived(skin).bit_clocks / rig.scan)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), start)
         rig.board.hold(frames, held)
         rig.board.hold(np.zeros((1, skin.rows, skin.columns), bool), held)
