@@ -122,6 +122,7 @@ def test_a_message_that_is_written_in_time_waits_for_no_other(tmp_path):
             wait_until(lambda: file.exists() and file.stat().st_size > 0)
             board.send(b"".join(board.frame() for _ in range(3)))
             wait_until(lambda: recovered_frames(file, tmp_path) >= 4)
+            assert process.poll() is None, "it wrote them before it ended"
         finally:
             process.kill()
             process.communicate()

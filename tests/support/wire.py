@@ -45,13 +45,8 @@ def undigits(data) -> int:
     return sum((byte - 128) * 128**place for place, byte in enumerate(data))
 
 
-def requests_in(packets) -> list:
-    """(number, whether a hello is asked for) of each packet of a host that a board takes."""
-    return [taken[:2] for taken in taken_in(packets)]
-
-
 def taken_in(packets) -> list:
-    """The same with (what, value) of a command, or None."""
+    """(number, whether a hello is asked for, (what, value) of a command or None) of each packet that a board takes."""
     found = []
     for packet in packets:
         if len(packet) not in (8, 12) or check(packet[:-3]) != packet[-3:]:

@@ -61,12 +61,13 @@ def test_a_click_between_four_cells_presses_them(page):
         page.hear(lambda message: "4 cells" in str(message))
 
 
-def test_a_second_click_lifts_the_finger(page):
+def test_a_second_click_lifts_the_finger(shown, page):
     page.say(click(CELLS, (0.07, 0.03, 0.5), (0.0, 0.0, -1.0)))
     barycenter(page)
     page.say(click(CELLS, (0.072, 0.031, 0.5), (0.0, 0.0, -1.0)))
     hidden = {"type": "SetSceneNodeVisibilityMessage", "name": BARYCENTERS, "visible": False}
     page.hear(lambda message: hidden.items() <= message.items())
+    assert shown.hand.fingers == []
 
 
 def test_a_drag_takes_a_finger_along(shown, page):

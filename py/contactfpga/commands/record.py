@@ -33,10 +33,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("file", metavar="FILE.mcap", help="File to write; it must not exist yet.")
     flags.connection(parser)
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after so many seconds (default: at Ctrl-C).")
-    megabytes = "Write FILE_0001.mcap, FILE_0002.mcap and so on, with about so many MB each."
+    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
+    megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
-    seconds = "The same, with so many seconds each."
+    seconds = "The same, each this many seconds long."
     parser.add_argument("--split-s", type=numbers.number(1, 86_400, "s"), metavar="S", help=seconds)
     flags.forces(parser, "Add forces")
     bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."

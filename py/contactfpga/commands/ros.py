@@ -34,7 +34,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--turn", nargs=3, type=numbers.TURN, metavar=("R", "P", "Y"), default=(0.0, 0.0, 0.0), help=turn
     )
-    rate = "Publish zones, tracks and contacts at most so many times per second (default: 1000)."
+    rate = "Publish zones, tracks and contacts at most at this rate (default: 1000)."
     parser.add_argument(
         "--zones-hz", type=numbers.number(0, 1e5, "Hz", above=True), metavar="HZ", default=1000.0, help=rate
     )

@@ -26,7 +26,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
     parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)
     parser.add_argument("--no-browser", action="store_true", help="Print the address only.")
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after so many seconds (default: at Ctrl-C).")
+    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
 
 
 def run(args: argparse.Namespace) -> int:

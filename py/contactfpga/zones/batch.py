@@ -132,9 +132,7 @@ def _zones(items: Sequence[Zones | Run], frames: np.ndarray, counts: np.ndarray)
     for name, sums, pitch in (("x_mm", x, sheet.pitch_x_mm), ("y_mm", y, sheet.pitch_y_mm)):
         out[name] = np.where(nowhere, math.nan, sums / scale * pitch)
     out["x_mm"][out["winding"] != ""] = math.nan
-    nowhere = np.isnan(out["x_mm"])
     out["point_mm"], out["normal"] = surfaces.of(sheet).place(out["x_mm"], out["y_mm"])
-    out["point_mm"][nowhere] = out["normal"][nowhere] = math.nan
     if sheet.ghosts:
         out["ghost"] = [suspect for one in items if isinstance(one, Zones) for suspect in one.suspects]
     return out[np.lexsort((out["area_cells"], out["x_mm"], out["y_mm"], out["frame"]))]

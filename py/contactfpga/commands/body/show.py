@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", choices=(BASE, LINK), help=frame)
     joint = "Angle of a joint in rad, or m of one that slides; may be repeated (default: 0)."
     parser.add_argument("--joint", action="append", default=[], type=angle, metavar="NAME=RAD", help=joint)
-    seconds = "Go on for so many seconds, with a picture of the state each second."
+    seconds = "Run for this many seconds and print the state every second."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
     parser.add_argument("--json", action="store_true", help="Print a line with one JSON object each time.")
     wait = "Seconds to wait for each board (default: 1)."
