@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import threading
 
 import pytest
@@ -74,9 +76,63 @@ def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient
             times = [queue.next().host_time_s for _ in range(5)]
             wait_for(lambda: queue.dropped > 3)
         assert times == sorted(times)
-        assert len(body.batch(0.05)) > 1
         with pytest.raises(ValueError, match="maxsize is 0"):
             body.subscribe(0)
+
+
+def test_it_is_iterated_as_a_board_is(patient):
+    async def first(source, count):
+        found = []
+        async for snapshot in source:
+            found.append(snapshot.host_time_s)
+            if len(found) == count:
+                break
+        return found
+
+    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+        with body.subscribe() as queue:
+            for source in (body, queue):
+                synchronous = [snapshot.host_time_s for snapshot, _ in zip(source, range(5))]
+                assert len(set(synchronous)) == 5
+                found = asyncio.run(first(source, 5))
+                assert found == sorted(set(found))
+
+
+def test_batch_holds_each_frame_of_each_link_once(patient):
+    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+        batch = body.batch(0.05)
+    assert len(batch) > 1
+    assert [one.host_time_s for one in batch] == sorted(one.host_time_s for one in batch)
+    assert set(batch.links) == {"arm", "chest"}
+    for name, arrays in batch.links.items():
+        seen = {one.links[name].zones.time_us for one in batch if one.links[name].zones is not None}
+        assert arrays.frames["time_us"].tolist() == sorted(seen)
+        assert len(arrays.zones) == len(seen), "each frame has one zone"
+
+
+def test_batch_of_a_link_without_frames_has_no_arrays_of_it(patient):
+    plugged = Plugged()
+    del plugged.ports["a"]
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        assert set(body.batch(0.05).links) == {"chest"}
+
+
+def test_stats_go_on_where_a_board_comes_back(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        wait_for(lambda: body.stats.links["arm"].frames > 5)
+        port = plugged.ports.pop("a")
+        port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
+        wait_for(lambda: body.latest().links["arm"].status == "lost")
+        before = body.stats.links["arm"]
+        plugged.plug("a")
+        wait_for(lambda: body.stats.links["arm"].frames > before.frames)
+        assert body.stats.links["arm"].hellos == before.hellos + 1
+        stats = body.stats
+        assert stats.frames == sum(one.frames for one in stats.links.values())
+        assert stats.damaged == {}
+        assert set(json.loads(json.dumps(stats.to_dict()))["links"]) == {"arm", "chest"}
+    assert body.stats.frames >= stats.frames, "as a board's, they stay when it is closed"
 
 
 def test_closing_wakes_who_waits_and_ends_all_threads(patient):

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import collections
+import asyncio
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from contactfpga.body.joints import Joints
 from contactfpga.body.plan import Plan
+from contactfpga.body.queue import SnapshotQueue
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
+from contactfpga.body.totals import BodyStats, SnapshotBatch
 from contactfpga.driver import driver, finding
 from contactfpga.driver.board import Board
 from contactfpga.driver.subscription import checked
@@ -136,8 +138,9 @@ class OpenBody:
             self._given = self._changes
         return self.latest()
 
-    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> list[Snapshot]:
-        """All snapshots of the next ``max_s`` seconds; the first one is waited for, for ``timeout`` seconds."""
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
+        """All snapshots of the next ``max_s`` seconds, with their frames as arrays; the first one is waited for, for
+        ``timeout`` seconds."""
         with self.subscribe() as queue:
             found = [queue.next(timeout)]
             end_s = self.clock() + max_s
@@ -146,7 +149,7 @@ class OpenBody:
                     found.append(queue.next(left_s))
                 except ReadTimeout:
                     break
-        return found
+        return SnapshotBatch(found)
 
     def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
         """A queue of its own for the snapshot at each change from now on."""
@@ -159,10 +162,23 @@ class OpenBody:
     def __iter__(self) -> Iterator[Snapshot]:
         """The newest snapshot again and again, forever, at every change or once per second."""
         while True:
-            try:
-                yield self.next()
-            except ReadTimeout:
-                yield self.latest()
+            yield self._newest()
+
+    async def __aiter__(self) -> AsyncIterator[Snapshot]:
+        """The same in ``async for``."""
+        while True:
+            yield await asyncio.to_thread(self._newest)
+
+    def _newest(self) -> Snapshot:
+        try:
+            return self.next()
+        except ReadTimeout:
+            return self.latest()
+
+    @property
+    def stats(self) -> BodyStats:
+        """Counters since the body was opened."""
+        return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
 
     def _check_open(self) -> None:
         if self._closing:
@@ -187,46 +203,3 @@ class OpenBody:
             thread.join()
         for reader in self._readers.values():
             reader.close()
-
-
-class SnapshotQueue:
-    """Snapshots from a moment on; at most ``maxsize`` wait, beyond, the oldest are dropped and counted."""
-
-    def __init__(self, body: OpenBody, maxsize: int):
-        if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
-            raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of snapshots, 1 or more")
-        self._body = body
-        self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
-        self.dropped = 0
-        """Snapshots that were not taken in time."""
-
-    def put(self, snapshot: Snapshot) -> None:
-        """Add one; the body's lock is held."""
-        self.dropped += len(self._waiting) == self._waiting.maxlen
-        self._waiting.append(snapshot)
-
-    def next(self, timeout: float = 1.0) -> Snapshot:
-        """The next one, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
-        timeout = checked(timeout)
-        with self._body._changed:
-            self._body._changed.wait_for(lambda: self._waiting or self._body._closing, timeout)
-            self._body._check_open()
-            if not self._waiting:
-                raise ReadTimeout(f"no link has changed within {timeout:g} s")
-            return self._waiting.popleft()
-
-    def close(self) -> None:
-        """Take no more."""
-        with self._body._changed:
-            if self in self._body._queues:
-                self._body._queues.remove(self)
-
-    def __enter__(self) -> SnapshotQueue:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def __iter__(self) -> Iterator[Snapshot]:
-        while True:
-            yield self.next()

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
+from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import (
     BoardClosed,
     BoardSilent,
@@ -41,6 +42,10 @@ class OpenBoard(Protocol):
     def clock(self) -> float:
         """Seconds on the clock of ``Zones.host_time_s``."""
 
+    @property
+    def stats(self) -> Stats:
+        """Counters since it was opened."""
+
     def close(self) -> None:
         """Give the port back."""
 
@@ -64,6 +69,7 @@ class LinkReader:
         self._tracker, self._tracks = Tracker(), NO_TRACKS
         self._frame_s = self._open_s = -math.inf
         self._ever = False
+        self._before = Stats()  # of all boards that were closed
 
     def ask(self) -> int:
         """Have the next frame be one that is scanned after this call; its number."""
@@ -117,8 +123,18 @@ class LinkReader:
                 self._board.close()
         self._fail(status, error)
 
+    @property
+    def stats(self) -> Stats:
+        """Counters of its boards, of those before as well."""
+        with self._lock:
+            return self._total()
+
+    def _total(self) -> Stats:
+        return total([self._before] if self._board is None else [self._before, self._board.stats])
+
     def _fail(self, status: str, error: Exception) -> None:
         with self._lock:
+            self._before = self._total()
             self._board = self._zones = None
             self._down, self._reason = status, str(error) or type(error).__name__
             self._retry_at = self._clock() + RETRY_S
