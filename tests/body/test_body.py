@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import shutil
@@ -105,6 +106,47 @@ def test_angles_are_those_of_the_frames_time(robot):
     assert arm.point_m[2] == pytest.approx(1.0 - 0.1 * math.sin(0.1) - 0.04 * math.cos(0.1))
     with pytest.raises(NoJoints, match=r"link 'chest': joint angles are known since 10.000 s, and not at 9.000 s"):
         snapshot.contacts()
+
+
+def blurred(sigma_s):
+    """Newest frames at 10 s on the body's clock, known to within ``sigma_s``."""
+    states = {"arm": state_of(ROUND, 0, 0, 10.0), "chest": state_of(FLAT, 0, 0, 10.0)}
+    for state in states.values():
+        state.zones._line = dataclasses.replace(state.zones._line, sigma_s=sigma_s)
+    return states
+
+
+@pytest.mark.parametrize("since_s", [9.9, 10.0], ids=["known before", "known from the frame on"])
+def test_place_is_as_uncertain_as_the_time_at_which_the_joint_moved(robot, since_s):
+    """Of a contact at 1.5 rad/s and a time known to 4 ms: 6 mrad of the elbow's lever, in the way that it turns."""
+    history = JointHistory(gap_s=1.0)
+    for moment_s in (since_s, 10.1):
+        history.add(moment_s, {"elbow": 1.5 * (moment_s - 10.0)})
+    snapshot = Snapshot(Body.load(robot), 10.0, blurred(0.004), history)
+    arm, chest = snapshot.contacts()
+    assert (arm.time_sigma_s, chest.time_sigma_s) == (0.004, 0.004)
+    still_arm, still_chest = Snapshot(Body.load(robot), 10.0, blurred(0.0), history).contacts()
+    lever = np.array(arm.point_m) - [0.5, 0, 1]
+    way = 1.5 * 0.004 * np.array([lever[2], 0, -lever[0]])
+    added = arm.covariance_m2 - still_arm.covariance_m2
+    assert added == pytest.approx(np.outer(way, way), rel=0.02, abs=1e-9)
+    assert chest.covariance_m2 == pytest.approx(still_chest.covariance_m2), "no joint moves it"
+    own = snapshot.contacts("link")[0]
+    assert own.covariance_m2 == pytest.approx(
+        Snapshot(snapshot._body, 10.0, blurred(0.0)).contacts("link")[0].covariance_m2
+    )
+    assert own.to_dict()["time_sigma_s"] == 0.004
+
+
+def test_angles_known_at_one_moment_alone_say_nothing_of_motion(robot):
+    def joints(host_time_s):
+        if host_time_s != 10.0:
+            raise NoJoints("no other moment is known")
+        return {"elbow": 0.0}
+
+    arm, _ = Snapshot(Body.load(robot), 10.0, blurred(0.004), joints).contacts()
+    assert arm.covariance_m2 is None
+    assert arm.point_m is not None
 
 
 def test_base_frame_needs_angles_and_a_urdf(robot):

@@ -31,13 +31,16 @@ class Contact:
     """Device time of its frame."""
     host_time_s: float
     """The same on the body's clock."""
+    time_sigma_s: float | None
+    """Standard deviation of it; None where it is not known."""
     point_m: Vector | None
     """None for a zone that has no place: one that goes all the way round a closed sheet, or that has no cells, which
     only a frame flagged ``mismatch`` can hold."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) of the point: chance within a cell, along the surface; None as ``point_m``."""
+    """(3, 3) of the point: chance within a cell, along the surface; in the base frame also how far the joints moved the
+    point within ``time_sigma_s``. None as ``point_m``, and where the angles next to the frame's time are not known."""
     zone: Zone
     flags: frozenset[str]
     """Of its frame."""
@@ -62,6 +65,15 @@ class Contact:
             force_n=None if self.force_n is None else vector(pose.turn(np.array(self.force_n))),
         )
 
+    def less_certain(self, other: Pose | None, pose: Pose) -> Contact:
+        """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None: nobody
+        knows how far."""
+        if other is None or self.point_m is None or self.covariance_m2 is None:
+            return dataclasses.replace(self, covariance_m2=None)
+        own = (np.array(self.point_m) - pose.point_m) @ pose.rotation
+        way = other.apply(own) - np.array(self.point_m)
+        return dataclasses.replace(self, covariance_m2=self.covariance_m2 + np.outer(way, way))
+
     def to_dict(self) -> dict[str, object]:
         """All of it in plain Python values, ready for JSON."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -84,7 +96,8 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
         if zone.x_mm is not None and zone.y_mm is not None:
             point, normal = plan.place(zone.x_mm, zone.y_mm)
             spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
-        when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
+        when = zones.time_us, state.frame_s, zones.host_sigma_s
+        fold = _fold(plan, zones, zone, angles)
         made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
         found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
     return _felt(plan, zones, found, sigma_m)
