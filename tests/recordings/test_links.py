@@ -4,35 +4,21 @@ import numpy as np
 import pytest
 from fake_board import FakeBoard, wait_until
 from model_board import ModelBoard
-from recorded_stream import StreamPort
+from recorded_stream import NAMES, StreamPort, recorded_both
 from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.body import Body
 from contactfpga.recordings import Recording, Session
-from contactfpga.recordings.recorder import Split
 from contactfpga.wire.hellos import Cutter
 
 SKIN = Skin()
 LONG = 60.0
-NAMES = ("left arm", "chest")
-
-
-def recorded(file, **options):
-    """The ports of two boards that differ in what they send."""
-    ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200, hello_every=30, gap_us=1404)]
-    session = Session(file, **options)
-    with session:
-        for name, port in zip(NAMES, ports):
-            session.add(port, name=name)
-        session.start()
-        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
-    return ports, session
 
 
 def test_each_link_is_there_to_the_byte(tmp_path):
-    ports, _ = recorded(tmp_path / "x.mcap")
+    ports, _ = recorded_both(tmp_path / "x.mcap")
     recording = Recording(tmp_path / "x.mcap")
     assert set(recording.links) == set(NAMES)
     assert [recording.links[name].sheet.rows for name in NAMES] == [16, 8]
@@ -48,20 +34,11 @@ def test_each_link_is_there_to_the_byte(tmp_path):
 
 
 def test_a_link_must_be_named_where_there_are_several(tmp_path):
-    recorded(tmp_path / "x.mcap", bytes_only=True)
+    recorded_both(tmp_path / "x.mcap", bytes_only=True)
     with pytest.raises(contactfpga.ContactFPGAError, match="several links; name one of them: left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}")
     with pytest.raises(contactfpga.ContactFPGAError, match="has no link 'leg'; it has left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link=leg")
-
-
-def test_split_files_begin_with_a_hello_of_each_link(tmp_path):
-    ports, session = recorded(tmp_path / "x.mcap", split=Split(bytes=3_000), bytes_only=True)
-    assert len(session.files) > 1
-    for name, port in zip(NAMES, ports):
-        pieces = [Recording(file) for file in session.files]
-        kept = [b"".join(data for _, data in one.raw_bytes(name)) for one in pieces if name in one.links]
-        assert b"".join(kept) == port.sent
 
 
 @pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])

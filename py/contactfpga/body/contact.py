@@ -66,8 +66,8 @@ class Contact:
         )
 
     def less_certain(self, other: Pose | None, pose: Pose) -> Contact:
-        """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None: nobody
-        knows how far."""
+        """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None:
+        nobody knows how far."""
         if other is None or self.point_m is None or self.covariance_m2 is None:
             return dataclasses.replace(self, covariance_m2=None)
         own = (np.array(self.point_m) - pose.point_m) @ pose.rotation

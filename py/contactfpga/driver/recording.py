@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 from urllib.parse import unquote
 
-from contactfpga.driver.mcap_bytes import MAGIC, McapStream
+from contactfpga.driver.mcap_bytes import McapStream
+from contactfpga.driver.mcap_part import MAGIC, files_of
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import number_in
@@ -116,7 +117,7 @@ def open_recorded(name: str) -> Recorded:
     """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
     try:
         asked = parse(name)
-        file = open_regular(asked.path)
+        file = open_regular(files_of(asked.path)[0])
         if file.read(len(MAGIC)) == MAGIC:
             file.close()
             return McapStream(asked.path, asked.link, asked.start_s)

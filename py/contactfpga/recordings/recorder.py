@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.driver.board import Board
+from contactfpga.driver.mcap_part import numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.recordings import messages
 from contactfpga.recordings.mcap_file import McapFile
@@ -121,7 +122,7 @@ class Recorder:
         self._begun_s = time.monotonic()
         path = self.path
         if self._split is not None:
-            path = path.with_name(f"{path.stem}_{len(self.files) + 1:04d}{path.suffix}")
+            path = numbered(path, len(self.files) + 1)
         file = McapFile(path)
         self.files.append(path)
         return file

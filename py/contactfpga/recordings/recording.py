@@ -11,7 +11,8 @@ from pathlib import Path
 
 from contactfpga import notebook
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
+from contactfpga.driver.mcap_bytes import McapBytes
+from contactfpga.driver.mcap_part import RecordingError
 from contactfpga.inputs.values import is_finite
 from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin

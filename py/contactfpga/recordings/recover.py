@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver.mcap_bytes import LARGEST, MAGIC, RecordingError
+from contactfpga.driver.mcap_part import LARGEST, MAGIC, RecordingError
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.recordings.mcap_file import McapFile

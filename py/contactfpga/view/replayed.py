@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from contactfpga.driver import driver, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_bytes import MAGIC
+from contactfpga.driver.mcap_part import MAGIC, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet
@@ -41,7 +41,7 @@ class Recorded(Protocol):
 
 def is_recording(name: str) -> bool:
     """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
-    return name.startswith(recording.SCHEME) or Path(name).is_file()
+    return name.startswith(recording.SCHEME) or Path(name).is_file() or files_of(Path(name)) != [Path(name)]
 
 
 def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
@@ -64,7 +64,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
 
 def _is_mcap(path: Path) -> bool:
     try:
-        with open_regular(path) as file:
+        with open_regular(files_of(path)[0]) as file:
             return file.read(len(MAGIC)) == MAGIC
     except (OSError, RuntimeError, ValueError):  # which is said where it is opened
         return False
