@@ -113,7 +113,8 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
     assert cli.main(["record", str(file), str(path), "--seconds", "0.05", "--timeout", str(LONG)]) == 0
     recording = Recording(file)
     assert set(recording.links) == {"arm", "shin"}
-    assert recording.texts("robot") == [{"toml": path.read_text()}]
+    (texts,) = recording.texts("robot")
+    assert texts["toml"] == path.read_text()
     body = Body.load(path)
     with AnyReader([file]) as reader:
         found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
@@ -125,6 +126,35 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
         point, normal = plan.place(1000 * zone.x, 1000 * zone.y)
         np.testing.assert_allclose((zone.position.x, zone.position.y, zone.position.z), point)
         np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
+
+
+def test_four_links_are_those_that_a_program_reads(tmp_path):
+    """A virtual board says the same whenever it is started: once recorded, once read."""
+    pytest.importorskip("amaranth")
+    example = (contactfpga.examples() / "robot.toml").read_text()
+    text = example.replace('urdf = "package', '# urdf = "package').replace(
+        'skin = "', f'skin = "{contactfpga.examples()}/'
+    )
+    (tmp_path / "robot.toml").write_text(text)
+    file = tmp_path / "x.mcap"
+    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.01", "--timeout", "60"]) == 0
+    recording = Recording(file)
+    body = Body.load(tmp_path / "robot.toml")
+    assert set(recording.links) == set(body.links)
+    assert len(body.links) == 4
+    for name, plan in body.links.items():
+        kept = [zones.to_dict() for _, _, zones in recording.frames(link=name)]
+        assert len(kept) > 50
+        with contactfpga.open(plan.port, plan.skin, timeout=60.0) as board:
+            live = [board.next(60.0).to_dict()]  # the answer to the first hello; frames before it are recorded, too
+            while live[-1]["time_us"] < kept[-1]["time_us"]:
+                live.append(board.next(60.0).to_dict())
+        for zones in live:  # a recording has no times of arrival
+            zones |= dict.fromkeys(("arrived_s", "host_time_s", "host_sigma_s"))
+        assert len(live) > 50
+        assert kept[-len(live) :] == live
+        with contactfpga.open(f"replay://{file}?link={name}", plan.skin) as board:
+            assert [zones.to_dict() for zones in board] == kept
 
 
 def test_a_link_that_is_lost_leaves_the_others(robot, tmp_path, capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -155,7 +156,7 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone |
     return table
 
 
-def text(values: dict[str, Any], key: str, usual: str | None = None) -> str:
+def text(values: Mapping[str, Any], key: str, usual: str | None = None) -> str:
     """The text of this key; raises :class:`BodyError` where it is none, or is missing without a usual one."""
     found = values.get(key, usual)
     if found is None:

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, numbers, terminal
@@ -45,6 +44,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from contactfpga.body import packed
     from contactfpga.recordings.recorder import Split
     from contactfpga.recordings.session import Session
 
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     split = None
     if args.split_mb is not None or args.split_s is not None:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
-    about = {} if body is None else {"robot": {"toml": Path(args.port).read_text(encoding="utf-8")}}
+    about = {} if body is None else {packed.ROBOT: packed.pack(args.port)}
     session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session)
     try:

@@ -28,7 +28,7 @@ LAST_S = 0.2
 
 
 class Recording:
-    """A file of `contactfpga record` that was closed or recovered.
+    """What `contactfpga record` wrote, closed or recovered; of files that are split all, by the name recorded to.
 
     Every call reads the file, of which it keeps nothing in memory. Frames are made of the board's own bytes, as by the
     driver. Raises :class:`ContactFPGAError` where the file cannot be read.
@@ -64,7 +64,7 @@ class Recording:
         return {link: _skin(texts.get(link, "")) for link in self.links}
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds."""
+        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds, and what that names."""
         return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:

@@ -142,27 +142,29 @@ class LinkRecording:
 
     def __init__(self, recording: Recording, link: str | None = None):
         links = recording.links
+        self.named = link is not None
+        """Whether this link was asked for, or is the first one."""
         if link is None:
             link = next(iter(links))
         if link not in links:
             raise ContactFPGAError(f"{recording.path} has no link {link!r}; it has {', '.join(links)}")
-        self._recording, self._link = recording, link
+        self.recording, self._link = recording, link
         self.title = f"{recording.path.name}, {link}"
         self.sheet = links[link].sheet
 
     @property
     def duration_s(self) -> float:
-        return self._recording.duration_s
+        return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
         """As :meth:`Recorded.frames`."""
-        return ((seconds, zones) for seconds, _, zones in self._recording.frames(start_s, end_s, self._link))
+        return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
         """As :meth:`Recorded.lateness`."""
         conversation = Conversation(self.title, live=False)
         found = []
-        for seconds, data in self._recording.raw_bytes(self._link):
+        for seconds, data in self.recording.raw_bytes(self._link):
             times_us = [_last_us(event) for event in conversation.receive_runs(data, 0.0)]
             if known := [time_us for time_us in times_us if time_us is not None]:
                 found.append((seconds, seconds - known[-1] / 1e6))
