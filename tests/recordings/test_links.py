@@ -20,7 +20,7 @@ LONG = 60.0
 def test_each_link_is_there_to_the_byte(tmp_path):
     ports, _ = recorded_both(tmp_path / "x.mcap")
     recording = Recording(tmp_path / "x.mcap")
-    assert set(recording.links) == set(NAMES)
+    assert list(recording.links) == list(NAMES)
     assert [recording.links[name].sheet.rows for name in NAMES] == [16, 8]
     for name, port in zip(NAMES, ports):
         assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
@@ -71,6 +71,21 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
     assert list(recording.links) == ["arm"]
     assert [link for _, link, _ in recording.frames()] == ["arm"]
     assert [data for _, data in recording.raw_bytes("leg")] == [b"\0\0noise\0"]
+
+
+def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
+    """And not in that in which their boards spoke."""
+    from contactfpga.recordings import messages
+    from contactfpga.recordings.mcap_file import McapFile
+
+    file = McapFile(tmp_path / "x.mcap")
+    for link in ("arm", "leg", "chest"):
+        file.metadata("contactfpga", {"link": link})
+    data = ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()
+    for link in ("chest", "arm", "leg"):
+        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+    file.close()
+    assert list(Recording(tmp_path / "x.mcap").links) == ["arm", "leg", "chest"]
 
 
 def test_two_links_of_one_name(tmp_path):

@@ -4,8 +4,8 @@ import pytest
 
 import contactfpga
 from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.view import opening, replayed
 from contactfpga.view import player as playing
-from contactfpga.view import replayed
 from contactfpga.view.player import Player
 from contactfpga.view.replayed import ByteRecording, Clock
 
@@ -108,6 +108,12 @@ def test_what_cannot_be_played_is_named(tmp_path):
     (tmp_path / "noise.bin").write_bytes(b"\x00\x01\x02" * 100)
     with pytest.raises(ContactFPGAError, match="holds no hello"):
         ByteRecording(f"replay://{tmp_path}/noise.bin")
+
+
+def test_a_recording_that_is_not_there_is_no_port(tmp_path):
+    pytest.importorskip("mcap")
+    with pytest.raises(ContactFPGAError, match=r"none\.mcap cannot be opened: No such file or directory; is the path right"):
+        opening._source(opening.Named(f"{tmp_path}/none.mcap"))
 
 
 @pytest.mark.parametrize(("name", "link"), [("{}", "arm"), ("replay://{}?link=arm", None)])

@@ -50,9 +50,12 @@ class Recording:
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
-        """The first hello of each link, whose ``sheet`` has lines and lengths. A link that said none is left out: its
-        frames cannot be read. Raises :class:`ContactFPGAError` where there is no other."""
-        found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
+        """The first hello of each link, whose ``sheet`` has lines and lengths, in the order in which they were added. A
+        link that said none is left out: its frames cannot be read. Raises :class:`ContactFPGAError` where there is no
+        other."""
+        added = [facts.get("link") for facts in self.texts(METADATA)]
+        links = sorted(self._file.links, key=lambda link: added.index(link) if link in added else len(added))
+        found = {link: hello for link in links if (hello := self._hello(link)) is not None}
         if not found:
             raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
         return found

@@ -11,6 +11,7 @@ from types import TracebackType
 
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
+from contactfpga.driver.mcap_part import SUFFIX
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
 from contactfpga.recordings.link_messages import LinkMessages
@@ -20,8 +21,6 @@ from contactfpga.recordings.recorder import Recorder, Split, link_name
 from contactfpga.recordings.whole_file import RecordingFailed
 from contactfpga.ros.feed import Felt
 from contactfpga.skin import Skin
-
-SUFFIX = ".mcap"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from contactfpga.driver import driver, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_part import MAGIC, files_of
+from contactfpga.driver.mcap_part import MAGIC, SUFFIX, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet
@@ -41,7 +41,7 @@ class Recorded(Protocol):
 
 def is_recording(name: str) -> bool:
     """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
-    return name.startswith(recording.SCHEME) or Path(name).is_file() or files_of(Path(name)) != [Path(name)]
+    return name.startswith(recording.SCHEME) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
 def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
