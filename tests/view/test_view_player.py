@@ -112,7 +112,9 @@ def test_what_cannot_be_played_is_named(tmp_path):
 
 def test_a_recording_that_is_not_there_is_no_port(tmp_path):
     pytest.importorskip("mcap")
-    with pytest.raises(ContactFPGAError, match=r"none\.mcap cannot be opened: No such file or directory; is the path right"):
+    with pytest.raises(
+        ContactFPGAError, match=r"none\.mcap cannot be opened: No such file or directory; is the path right"
+    ):
         opening._source(opening.Named(f"{tmp_path}/none.mcap"))
 
 

@@ -15,6 +15,7 @@ from contactfpga.body.plan import Plan
 from contactfpga.body.queue import SnapshotQueue
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
+from contactfpga.body.together import Together
 from contactfpga.body.totals import BodyStats, SnapshotBatch
 from contactfpga.driver import driver, finding
 from contactfpga.driver.board import Board
@@ -57,9 +58,8 @@ class OpenBody:
         self._changes = self._given = 0
         self._closing = False
         self._queues: list[SnapshotQueue] = []
-        self._readers = {
-            name: LinkReader(plan, opened or self._open_board, self.clock) for name, plan in body.links.items()
-        }
+        opener, together = opened or self._open_board, Together(self.clock)
+        self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
         self._threads = [
             threading.Thread(target=self._read, args=(reader,), name=f"reader of link {name}", daemon=True)
             for name, reader in self._readers.items()

@@ -69,6 +69,11 @@ class Plan:
         return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
 
     @property
+    def virtual(self) -> bool:
+        """Whether its board runs in simulated time."""
+        return self.port is not None and self.port.startswith("sim:")
+
+    @property
     def sigma_mm(self) -> float:
         """Standard deviation of a place within a cell, along the surface."""
         return math.hypot(self.skin.pitch_x_mm, self.skin.pitch_y_mm) / math.sqrt(24)
