@@ -20,6 +20,7 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
+from contactfpga.inputs.values import shown
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
@@ -42,6 +43,10 @@ class OpenBoard(Protocol):
 
     def clock(self) -> float:
         """Seconds on the clock of ``Zones.host_time_s``."""
+
+    @property
+    def name(self) -> str:
+        """What it was named by the Skin that it was built from; "" where it was not."""
 
     @property
     def stats(self) -> Stats:
@@ -125,6 +130,9 @@ class LinkReader:
 
     def _take(self, zones: Zones) -> None:
         assert self._board is not None
+        own, theirs = self.plan.skin.name, self._board.name
+        if own and theirs and own != theirs:
+            raise SkinMismatch(f"the board is named {shown(theirs)}; this link's Skin is named {shown(own)}")
         tracks = self._tracker.update(zones)
         now_s = self._board.clock()
         sampled_s = now_s if zones.host_time_s is None else min(zones.host_time_s, now_s)

@@ -39,7 +39,8 @@ class LinkState:
     """How long ago, on the body's clock, the newest frame was scanned that ever came; None: none ever did."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
-    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin or version is there."""
+    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
+    there."""
     reason: str = ""
     """Why it is not ok."""
     frame_s: float | None = None

@@ -63,7 +63,7 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
             f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
         )
     heard = survey(found, baud)
-    meant = [one for one in heard if one.hello is not None and _is_meant(one.hello, port, skin)]
+    meant = _meant(heard, port, skin)
     if len(meant) == 1:
         return meant[0].candidate.device
     report = "; ".join(map(str, heard))
@@ -120,10 +120,22 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
     return found
 
 
-def _is_meant(hello: Hello, port: str | None, skin: Skin | None) -> bool:
-    if port is not None and port.startswith(NAME) and hello.name != port.removeprefix(NAME):
-        return False
-    return skin is None or hello.fingerprint == skin.fingerprint
+def _meant(heard: Sequence[Found], port: str | None, skin: Skin | None) -> list[Found]:
+    """Those that were asked for by name; by Skin; and where its name tells several of these apart, by that."""
+    found = [one for one in heard if one.hello is not None]
+    if port is not None and port.startswith(NAME):
+        found = _named(found, port.removeprefix(NAME))
+        if len(found) == 1:  # of another Skin, too: whoever opens it says so
+            return found
+    if skin is not None:
+        found = [one for one in found if one.hello is not None and one.hello.fingerprint == skin.fingerprint]
+        if len(found) > 1 and skin.name:
+            found = _named(found, skin.name) or found
+    return found
+
+
+def _named(found: Sequence[Found], name: str) -> list[Found]:
+    return [one for one in found if one.hello is not None and one.hello.name == name]
 
 
 def _of(port: str | None, skin: Skin | None) -> str:
