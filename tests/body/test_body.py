@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import shutil
 
 import numpy as np
 import pytest
 from model_board import DirectPort
-from two_links import FLAT, ROBOT, ROUND, state_of
+from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints
@@ -47,9 +46,7 @@ def test_contacts_lie_where_the_geometry_says(robot):
 
 
 def test_force_is_that_which_the_units_measure(robot):
-    robot.write_text(ROBOT.replace("mirrored = true", 'units = "units.toml"'))
-    shutil.copy(contactfpga.examples() / "units.toml", robot.parent / "units.toml")
-    body = Body.load(robot)
+    body = Body.load(with_units(robot))
     cells = body.links["chest"].units
     state = state_of(FLAT, 3, 5, 10.0)
     push = np.array([0.5, -0.25, -4.0])
@@ -60,7 +57,9 @@ def test_force_is_that_which_the_units_measure(robot):
     chest, arm = snapshot.contacts(links=["chest", "arm"])
     assert chest.force_n == pytest.approx(tuple(push))
     assert chest.normal_n == pytest.approx(4.0)
-    assert (arm.force_n, arm.normal_n) == (None, None)
+    assert (arm.force_n, arm.normal_n, arm.interval_n) == (None, None, None)
+    assert chest.interval_n == pytest.approx((4.0, 4.0))
+    assert json.loads(json.dumps(chest.to_dict()))["interval_n"] == pytest.approx([4.0, 4.0])
     turned = chest.moved(Pose.of((0, 0, 1), (math.pi / 2, 0, 0)), "elsewhere")
     assert turned.force_n == pytest.approx((0.5, 4.0, -0.25))
 

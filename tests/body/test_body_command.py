@@ -12,6 +12,8 @@ from two_links import ROBOT
 import contactfpga
 from contactfpga import cli
 
+UNITS = contactfpga.examples() / "units.toml"
+
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
@@ -24,6 +26,7 @@ from contactfpga import cli
         ("mirrored = true", "late_s = 0.001", "link 'chest': late_s is 0.001; a board of this Skin may be silent for"),
         ("mirrored = true", "late_s = 1\nsilent_s = 0.5", "link 'chest': late_s is 1 and silent_s 0.5; late_s must be"),
         ("mirrored = true", 'surface = "none.npz"', "none.npz"),
+        ("mirrored = true", f'units = "{UNITS}"', "link 'chest': its file of units has 6; the Skin has units = 0"),
         ("mirrored = true", "surface = {radius_mm = 3}", "link 'chest': surface is {'radius_mm': 3}; a cone is"),
         ("[0.1, 0.0, 0.0]", "[0.1, 0.0]", "link 'arm': point_m is [0.1, 0.0]; it must be a list of three numbers"),
         ("[0.1, 0.0, 0.0]", "[0.1, 0.0, 2000]", "link 'arm': point_m is [0.1, 0.0, 2000]"),

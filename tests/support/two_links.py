@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 
 from model_board import DirectPort
@@ -39,6 +40,14 @@ def write_robot(folder):
     (folder / "flat.toml").write_text(FLAT.to_toml())
     (folder / "robot.toml").write_text(ROBOT)
     return folder / "robot.toml"
+
+
+def with_units(robot):
+    """Pressure units under the chest."""
+    robot.write_text(ROBOT.replace("mirrored = true", 'units = "units.toml"'))
+    (robot.parent / "flat.toml").write_text(FLAT.replace(units=6, baud=6_000_000).to_toml())
+    shutil.copy(contactfpga.examples() / "units.toml", robot.parent / "units.toml")
+    return robot
 
 
 class Streaming(DirectPort):

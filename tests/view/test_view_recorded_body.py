@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from fake_board import wait_until
 from recorded_stream import StreamPort
-from two_links import FLAT, ROBOT, ROUND, state_of, write_robot
+from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 
 pytest.importorskip("viser")
 
-import contactfpga
 from contactfpga.body import Body, BodyError, packed
 from contactfpga.body.contact import on_link
 from contactfpga.recordings import Recording, Session
@@ -93,9 +92,7 @@ def test_where_sheets_lie_is_in_the_recording(file, player, tmp_path):
 
 
 def test_tables_and_units_are_kept_too(tmp_path):
-    path = write_robot(tmp_path)
-    shutil.copy(contactfpga.examples() / "units.toml", tmp_path / "units.toml")
-    path.write_text(ROBOT.replace("mirrored = true", 'units = "units.toml"'))
+    path = with_units(write_robot(tmp_path))
     (tmp_path / "there").mkdir()
     body = packed.unpack(packed.pack(path), tmp_path / "there")
     np.testing.assert_array_equal(body.links["chest"].units.matrix, Body.load(path).links["chest"].units.matrix)
@@ -153,10 +150,7 @@ def test_a_recording_with_the_table_alone_shows_a_link(tmp_path):
 
 def test_an_arrow_ends_at_its_contact_and_shows_its_force(tmp_path):
 
-    path = write_robot(tmp_path)
-    shutil.copy(contactfpga.examples() / "units.toml", tmp_path / "units.toml")
-    path.write_text(ROBOT.replace('port = "a"', 'port = "a"\nunits = "units.toml"'))
-    plan = Body.load(path).links["arm"]
+    plan = Body.load(write_robot(tmp_path)).links["arm"]
     state = state_of(ROUND, 3, 5, 10.0)
     (contact,) = on_link(plan, state)
     assert pushes(plan, [contact]).shape == (0, 2, 3)

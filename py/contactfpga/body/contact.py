@@ -54,6 +54,14 @@ class Contact:
     """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
     None: nothing was learned for this link, or at this angle, or the angle is not known."""
 
+    _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
+
+    @property
+    def interval_n(self) -> tuple[float, float | None] | None:
+        """Least and largest push that the same readings allow; the second is None where there is no largest one. None
+        as ``force_n``. With three contacts or more it raises :class:`~contactfpga.MissingExtra` without ``haptics``."""
+        return None if self._felt is None else self._felt.interval_n
+
     def moved(self, pose: Pose, frame: str) -> Contact:
         """The same in a frame in which its own one lies at ``pose``."""
         return dataclasses.replace(
@@ -76,7 +84,8 @@ class Contact:
 
     def to_dict(self) -> dict[str, object]:
         """All of it in plain Python values, ready for JSON."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        names = [field.name for field in dataclasses.fields(self) if field.name != "_felt"]
+        values = {name: getattr(self, name) for name in (*names, "interval_n")}
         spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
         values |= {"covariance_m2": spread, "flags": sorted(self.flags)}
         return values | {"zone": dataclasses.asdict(self.zone)}
@@ -113,7 +122,8 @@ def _felt(plan: Plan, zones: Zones, found: list[Contact], sigma_m: float) -> lis
     touches = [haptics.Touch(point, normal, plan.friction, sigma_m) for point, normal in places]
     forces = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
     return [
-        dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n) for one, force in zip(found, forces)
+        dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n, _felt=force)
+        for one, force in zip(found, forces)
     ]
 
 

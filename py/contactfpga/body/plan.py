@@ -115,6 +115,9 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         raise BodyError(f"folds are of {folds.lines} cells; the Skin has {(skin.rows, skin.columns)}")
     if folds is not None and skin.report != "cells":
         raise BodyError(f"report is {shown(skin.report)}; folds are marked cell by cell, with report = 'cells'")
+    units = LoadCells.load(folder / text(values, "units")) if "units" in values else None
+    if units is not None and len(units.units) != skin.units:
+        raise BodyError(f"its file of units has {len(units.units)}; the Skin has units = {skin.units}")
     return Plan(
         name=name,
         frame=text(values, "frame", name),
@@ -123,7 +126,7 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         pose=Pose.of(_vector(values, "point_m"), _vector(values, "rpy_rad")),
         mirrored=mirrored,
         surface=_surface(values.get("surface"), skin, folder),
-        units=LoadCells.load(folder / text(values, "units")) if "units" in values else None,
+        units=units,
         friction=_number(values, "friction", 0.5),
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
