@@ -13,8 +13,10 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints
+from contactfpga.body.contact import forces_of, on_link
 from contactfpga.body.pose import Pose
 from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
@@ -62,6 +64,19 @@ def test_force_is_that_which_the_units_measure(robot):
     assert json.loads(json.dumps(chest.to_dict()))["interval_n"] == pytest.approx([4.0, 4.0])
     turned = chest.moved(Pose.of((0, 0, 1), (math.pi / 2, 0, 0)), "elsewhere")
     assert turned.force_n == pytest.approx((0.5, 4.0, -0.25))
+
+
+def test_forces_of_a_recording_are_those_of_the_contacts_by_their_tracks(robot):
+    plan = Body.load(with_units(robot)).links["chest"]
+    zones = state_of(FLAT, 3, 5, 10.0).zones
+    tracks = Tracker().update(zones)
+    assert forces_of(plan, zones, tracks) is None
+    zones._units = UnitSamples(0, tuple((plan.units.zeros + 1e4).tolist()), (0.0,) * 6, (False,) * 6)
+    (found,) = forces_of(plan, zones, tracks)
+    (contact,) = on_link(plan, LinkState(zones, 0.0, "ok", "", 10.0, tracks))
+    assert contact.force_n == found.force_n
+    assert contact.track == found.track == tracks.active[0].id
+    assert found.point_m == contact.point_m
 
 
 def test_zone_without_a_place_is_a_contact_all_the_same(robot):

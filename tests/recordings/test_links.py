@@ -198,6 +198,23 @@ def test_what_a_robot_file_says_itself(robot, tmp_path, capsys, option):
     assert "sets it for each link" in capsys.readouterr().err
 
 
+@pytest.mark.campaign  # a board with units takes a while to compile
+def test_links_of_a_robot_with_units_have_forces(tmp_path):
+    pytest.importorskip("amaranth")
+    examples = contactfpga.examples()
+    units = f"{examples}/units-flat.toml"
+    link = f"""[[links]]\nname = "arm"\nskin = "{examples}/force.toml"\nunits = "{units}"
+        port = "sim://?scene=two_fingers&units={units}"\npoint_m = [0.0, 0.0, 1.0]"""
+    (tmp_path / "robot.toml").write_text(link)
+    file = tmp_path / "x.mcap"
+    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.05", "--timeout", "60"]) == 0
+    with AnyReader([file]) as reader:
+        found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+    pushes = [one.wrench.force.z for topic, message in found if topic == "/arm/contacts" for one in message.contacts]
+    assert min(pushes) < -1
+    assert any(topic == "/arm/wrench" for topic, _ in found)
+
+
 def test_forces_of_units_are_messages(tmp_path):
     from contactfpga.tracking.tracks import Tracks
 

@@ -12,6 +12,7 @@ from contactfpga import haptics
 from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
 from contactfpga.surfaces.shapes import Floats, Vector, vector
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
@@ -109,22 +110,35 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
         fold = _fold(plan, zones, zone, angles)
         made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
         found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
-    return _felt(plan, zones, found, sigma_m)
+    return _felt(plan, zones, found)
 
 
-def _felt(plan: Plan, zones: Zones, found: list[Contact], sigma_m: float) -> list[Contact]:
+def _felt(plan: Plan, zones: Zones, found: list[Contact]) -> list[Contact]:
     """The same with forces, where the units' readings have come, and each contact has a place."""
-    if plan.units is None or zones.units is None or not found:
+    forces = forces_of(plan, zones) if found else None
+    if forces is None:
         return found
-    places = [(one.point_m, one.normal) for one in found if one.point_m is not None and one.normal is not None]
-    if len(places) < len(found):
-        return found
-    touches = [haptics.Touch(point, normal, plan.friction, sigma_m) for point, normal in places]
-    forces = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
     return [
         dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n, _felt=force)
         for one, force in zip(found, forces)
     ]
+
+
+def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics.Contacts | None:
+    """The forces at the zones of a frame, in the link's frame; None where there are no readings of units, or a zone has
+    no place."""
+    if plan.units is None or zones.units is None:
+        return None
+    touches = []
+    for zone in zones:
+        if zone.x_mm is None or zone.y_mm is None:
+            return None
+        touches.append(haptics.Touch(*plan.place(zone.x_mm, zone.y_mm), plan.friction, 1e-3 * plan.sigma_mm))
+    found = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
+    ids = {} if tracks is None else {id(track.zone): track.id for track in tracks.active}
+    for one, zone in zip(found, zones):
+        one.track = ids.get(id(zone))
+    return found
 
 
 def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:

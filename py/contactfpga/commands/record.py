@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, numbers, terminal
@@ -18,6 +18,7 @@ from contactfpga.errors import ContactFPGAError
 
 if TYPE_CHECKING:
     from contactfpga.body import Body
+    from contactfpga.body.plan import Plan
     from contactfpga.recordings.session import Session
     from contactfpga.ros.feed import Felt
 
@@ -107,7 +108,15 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
         return
     for plan in body.links.values():
         mount = Mount(plan.frame, plan.place)
-        session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount)
+        forces = None if plan.units is None else _felt_on(plan)
+        session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount, felt=forces)
+
+
+def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
+    """What says the forces at contacts of a link with pressure units."""
+    from contactfpga.body.contact import forces_of
+
+    return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
 
 
 class _Progress:
