@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
-from two_links import ROBOT
+from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
 from contactfpga import cli
+from contactfpga.body import Body, OpenBody, Snapshot
+from contactfpga.zones.units import UnitSamples
 
 UNITS = contactfpga.examples() / "units.toml"
 
@@ -71,3 +75,22 @@ def test_command_says_that_contacts_of_a_lost_link_are_not_known(robot, capsys):
     printed = capsys.readouterr().out
     assert printed.count("contacts not known") == 2
     assert "arm: lost (no frame yet; a cannot be opened" in printed
+
+
+def test_command_waits_for_the_readings_that_belong_to_a_frame(robot, capsys, monkeypatch):
+    """They come some milliseconds after it."""
+    body = Body.load(with_units(robot))
+    states = {"arm": state_of(ROUND, 3, 5, 10.0), "chest": state_of(FLAT, 3, 5, 10.0)}
+    push = np.array([0.0, 0.0, -4.0])
+    exerted = np.concatenate([push, np.cross([0.03, 0.05, 0.0], push)])
+    units = body.links["chest"].units
+    readings = units.zeros + np.linalg.pinv(units.matrix) @ exerted
+
+    def read(self, timeout):
+        come = UnitSamples(0, tuple(readings.tolist()), (0.0,) * 6, (False,) * 6)
+        threading.Timer(0.005, lambda: setattr(states["chest"].zones, "_units", come)).start()
+        return Snapshot(body, 10.0, states)
+
+    monkeypatch.setattr(OpenBody, "read", read)
+    assert cli.main(["body", str(robot), "--frame", "link", "--timeout", "0.2"]) == 0
+    assert "mm2, pushes 4.00 N" in capsys.readouterr().out

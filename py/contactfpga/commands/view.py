@@ -18,7 +18,11 @@ WHAT = "Port, sim://, a recording, or a robot.toml (default: a virtual sheet to 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser, WHAT)
-    parser.add_argument("--link", metavar="NAME", help="Board to show, of a recording of several (default: the first).")
+    parser.add_argument(
+        "--link",
+        metavar="NAME",
+        help="Board to show, of a recording of several (default: all of a robot, or the first).",
+    )
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
     parser.add_argument("--units", metavar="FILE", help=units)
     host = "Address to listen on (default: 127.0.0.1, which this computer alone can reach)."

@@ -14,6 +14,9 @@ from contactfpga.inputs.values import number_in
 
 HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
 
+READINGS_S = 0.03
+"""After a frame: its readings of pressure units come when the next ones do."""
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
@@ -47,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
         until = time.monotonic() + (args.seconds or 0.0)
         while True:
             snapshot = opened.read(args.timeout)
+            if any(plan.units is not None for plan in body.links.values()):
+                time.sleep(READINGS_S)
             _print(snapshot, frame, args.json)
             left = until - time.monotonic()
             if left <= 0:
