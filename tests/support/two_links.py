@@ -54,13 +54,13 @@ class Streaming(DirectPort):
     """Sends a frame every 5 ms, and nothing once it is mute."""
 
     mute = False
-    due_s, every_s = 0.0, 0.005
+    due_s = 0.0
 
     def read(self, seconds):
         if not self._out and seconds:
-            time.sleep(min(seconds, self.every_s / 5))
+            time.sleep(0.001)
         if not self.mute and time.monotonic() >= self.due_s:
-            self.due_s = time.monotonic() + self.every_s
+            self.due_s = time.monotonic() + 0.005
             self._out += self.frame()
         return super().read(seconds)
 
