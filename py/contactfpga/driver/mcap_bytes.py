@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga.driver.mcap_part import McapPart, RecordingError, files_of
+from contactfpga.driver.mcap_part import METADATA, McapPart, RecordingError, files_of
 from contactfpga.wire.hellos import find_hello
 
 HELLO_NS = 600_000_000
@@ -18,17 +18,19 @@ class McapBytes:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self._parts = [McapPart(one) for one in files_of(self.path)]
-        self._links = list(dict.fromkeys(link for part in self._parts for link in part.topics))
+        held = {link for part in self._parts for link in part.topics}
+        added = [facts.get("link", "") for facts in self.texts(METADATA)]
+        self._links = sorted(held, key=lambda link: (added.index(link) if link in added else len(added), link))
         if not self._links:
             raise RecordingError(f"{path} holds no bytes of a board; `contactfpga record` makes files that do")
-        held = [part for part in self._parts if part.topics]
-        self.start_ns = min(part.start_ns for part in held)
+        parts = [part for part in self._parts if part.topics]
+        self.start_ns = min(part.start_ns for part in parts)
         """Since 1970."""
-        self.end_ns = max(part.end_ns for part in held)
+        self.end_ns = max(part.end_ns for part in parts)
 
     @property
     def links(self) -> list[str]:
-        """Names of the links whose bytes it holds."""
+        """Names of the links whose bytes it holds, in the order in which they were added."""
         return list(self._links)
 
     def checked(self, link: str | None) -> str:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 MAGIC = b"\x89MCAP0\r\n"
 SUFFIX = ".mcap"
 KIND = "contactfpga_msgs/msg/Bytes"
+METADATA = "contactfpga"
+"""Name of what stands in a file for each link: its hello and its Skin."""
 
 _BEGIN = struct.Struct("<4xiII")
 """Seconds and nanoseconds, and the bytes of the link's name."""

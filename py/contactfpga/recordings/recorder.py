@@ -11,15 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap_part import numbered
+from contactfpga.driver.mcap_part import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.recordings import messages
 from contactfpga.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.hellos import Cutter
-
-METADATA = "contactfpga"
-"""Name of what stands in a file for each link: its hello and its Skin."""
 
 PATIENCE_S = 2.0
 """How long a new file waits for hellos to begin with; boards say one twice per second."""

@@ -12,9 +12,8 @@ from pathlib import Path
 from contactfpga import notebook
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes
-from contactfpga.driver.mcap_part import RecordingError
+from contactfpga.driver.mcap_part import METADATA, RecordingError
 from contactfpga.inputs.values import is_finite
-from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
@@ -53,9 +52,7 @@ class Recording:
         """The first hello of each link, whose ``sheet`` has lines and lengths, in the order in which they were added. A
         link that said none is left out: its frames cannot be read. Raises :class:`ContactFPGAError` where there is no
         other."""
-        added = [facts.get("link") for facts in self.texts(METADATA)]
-        links = sorted(self._file.links, key=lambda link: added.index(link) if link in added else len(added))
-        found = {link: hello for link in links if (hello := self._hello(link)) is not None}
+        found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
         if not found:
             raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
         return found
