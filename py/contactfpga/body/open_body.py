@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -11,28 +10,18 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from contactfpga.body.joints import Joints
+from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
 from contactfpga.body.queue import SnapshotQueue
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
 from contactfpga.body.together import Together
 from contactfpga.body.totals import BodyStats, SnapshotBatch
-from contactfpga.driver import driver, finding
-from contactfpga.driver.board import Board
 from contactfpga.driver.subscription import checked
 from contactfpga.errors import BoardClosed, ReadTimeout
 
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
-
-
-_SEARCHING = threading.Lock()  # two searches would hold each other's ports
-
-
-def open_board(plan: Plan, timeout: float = 1.0) -> Board:
-    """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
-    with _SEARCHING if finding.searched(plan.port) else contextlib.nullcontext():
-        return driver.open(plan.port, plan.skin, timeout=timeout)
 
 
 class OpenBody:

@@ -38,7 +38,7 @@ def unpack(texts: Mapping[str, str], folder: Path) -> Body:
     try:
         values = tomllib.loads(texts[TOML])
         for number, (table, key, name) in enumerate(_files(values)):
-            file = folder / f"{number}{Path(table[key]).suffix}"
+            file = folder / str(number)
             file.write_bytes(base64.b64decode(texts[name], validate=True))
             table[key] = str(file)
     except KeyError as error:

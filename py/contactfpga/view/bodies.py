@@ -11,7 +11,8 @@ import numpy as np
 
 from contactfpga.body import Body, Contact
 from contactfpga.body.contact import on_link
-from contactfpga.body.open_body import OpenBody, open_board
+from contactfpga.body.open_body import OpenBody
+from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
 from contactfpga.driver import driver, transport
