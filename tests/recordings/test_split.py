@@ -60,6 +60,15 @@ def test_all_files_are_read_by_the_name_that_was_recorded_to(tmp_path):
         assert part
 
 
+def test_seconds_are_those_of_what_is_recorded(tmp_path):
+    """A virtual board's are not the computer's."""
+    port = StreamPort(frames=2000)
+    session = recorded(tmp_path, port, split=Split(seconds=0.5), bytes_only=True)
+    lasts_s = [Recording(file).duration_s for file in session.files]
+    assert len(lasts_s) == 4
+    assert lasts_s[:-1] == pytest.approx([0.5] * 3, abs=0.06)
+
+
 def test_each_link_goes_on_from_file_to_file(tmp_path):
     ports, session = recorded_both(tmp_path / "x.mcap", **SPLIT)
     assert len(session.files) > 1

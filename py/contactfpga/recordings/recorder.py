@@ -29,10 +29,10 @@ class Split:
     bytes: float | None = None
     seconds: float | None = None
 
-    def due(self, file: McapFile, seconds: float) -> bool:
-        """Whether this file, which was begun so long ago, is full."""
+    def due(self, file: McapFile) -> bool:
+        """Whether this file is full, or holds as much time."""
         full = self.bytes is not None and file.size >= self.bytes
-        return file.messages > 0 and (full or (self.seconds is not None and seconds >= self.seconds))
+        return file.messages > 0 and (full or (self.seconds is not None and file.seconds >= self.seconds))
 
 
 class Recorder:
@@ -81,7 +81,7 @@ class Recorder:
                     file.flush_old(now_s)
             if self._old is not None:
                 self._end_old(now_s)
-            elif self._split is not None and self._split.due(self.file, now_s - self._begun_s):
+            elif self._split is not None and self._split.due(self.file):
                 self._old, self.file = self.file, self._begin()
                 for name, values in self._about:
                     self.file.metadata(name, values)
