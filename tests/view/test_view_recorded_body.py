@@ -35,14 +35,15 @@ def record(folder, about=None):
     return path
 
 
-@pytest.fixture
-def file(tmp_path):
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
     """Recorded in a folder that is gone."""
-    (tmp_path / "away").mkdir()
-    record(tmp_path / "away")
-    shutil.move(tmp_path / "away" / "x.mcap", tmp_path / "x.mcap")
-    shutil.rmtree(tmp_path / "away")
-    return tmp_path / "x.mcap"
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "away").mkdir()
+    record(folder / "away")
+    shutil.move(folder / "away" / "x.mcap", folder / "x.mcap")
+    shutil.rmtree(folder / "away")
+    return folder / "x.mcap"
 
 
 @pytest.fixture
