@@ -24,9 +24,9 @@ SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
 
 @functools.cache
-def found(setting: Setting, count: int = CONTACTS) -> dict[str, np.ndarray]:
+def found(setting: Setting, count: int = CONTACTS, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
     """(contacts, times) errors in m of each method."""
-    each = [felt.errors(setting, seed) for seed in range(count)]
+    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 

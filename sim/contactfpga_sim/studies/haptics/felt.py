@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -26,7 +27,8 @@ from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
 
 RATE_N_S = 1600.0
 MOST_N = 30.0
-BEGIN_S = 1e-3
+LEAD_S = 1.5e-3
+"""From power-up until the first switch closes. The push has begun before; what it did then changes no answer."""
 LOOK_S = 20e-6
 RING_M = 0.075
 GAIN_N = 0.02
@@ -93,28 +95,22 @@ class Touching:
 
     def push(self, seconds: float) -> float:
         """In N."""
-        return min(MOST_N, RATE_N_S * max(0.0, seconds - BEGIN_S))
+        return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
         """(rows, columns) bool."""
         found: np.ndarray = self.closing_n <= self.push(seconds)
         return found
 
-    @property
-    def first_s(self) -> float:
-        """When the first switch closes."""
-        return BEGIN_S + float(self.closing_n.min()) / RATE_N_S
-
     def board(self) -> VirtualBoard:
         """That feels it."""
         cells, rng = self.setting.cells, np.random.default_rng([self.seed, 8])
-        turn = np.linalg.pinv(cells.matrix)
+        x, y = self.place_m + np.array(cells.sheet_m)
+        each = np.linalg.pinv(cells.matrix) @ np.array([0, 0, -1, -y, x, 0])
         sigma = self.setting.unit_sigma_n / GAIN_N
 
         def readings(seconds: float) -> list[int]:
-            push, (x, y) = self.push(seconds), self.place_m + np.array(cells.sheet_m)
-            exerted = np.array([0, 0, -push, -push * y, push * x, 0])
-            noisy = turn @ exerted + ZERO + sigma * rng.standard_normal(3)
+            noisy = self.push(seconds) * each + ZERO + sigma * rng.standard_normal(3)
             steps: list[int] = np.clip(np.rint(noisy), 0, 4095).astype(int).tolist()
             return steps
 
@@ -150,18 +146,18 @@ def ramp(setting: Setting, seed: int) -> Touching:
     return Touching(setting, (MIDDLE + np.random.default_rng(seed).random(2)) * 1e-3 * setting.pitch_mm, seed)
 
 
-def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
-    """Of one contact, in m: for each method at each of :data:`TIMES_S`; NaN while it has no answer."""
+def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> dict[str, list[float]]:
+    """Of one contact, in m: for each method at each of these rising times; NaN while it has no answer."""
     touching, cells = ramp(setting, seed), setting.cells
-    frames = heard(touching, touching.first_s + TIMES_S[-1] + 0.2e-3)
+    frames = heard(touching, LEAD_S + times_s[-1] + 0.2e-3)
     assert cells.noise.covariance is not None
     push_sigma = math.sqrt(float(cells.noise.covariance[2, 2]) + (RATE_N_S * 0.15e-3) ** 2 / 12)
     finder = Locator(setting.skin.sheet, reach_of(POINT), setting.spread, push_sigma)
     truth = touching.place_m
     found: dict[str, list[float]] = {method: [] for method in METHODS}
     watch, taken = ClosingWatch(cells), 0
-    for time_s in TIMES_S:
-        now = touching.first_s + time_s
+    for time_s in times_s:
+        now = LEAD_S + time_s
         came = [one.zones for one in frames if one.came_s <= now]
         known = [one.zones for one in frames if one.known_s <= now]
         for zones in known[taken:]:
