@@ -102,10 +102,10 @@ class PacedRule:
         return 0, 2 * self.periods * self.pace(facts)
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
-        """The first conversion is left out; the n-th is that of what was there one and a half periods before."""
+        """The first two conversions are left out; the n-th is that of what was there one and a half periods before."""
         whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
         late_us = round(1.5e6 * whole / facts.skin.clock_hz)
-        ready = 2 * whole - pace
+        ready = 3 * whole - pace
         while ready < cycles:
             time_us = (ready + 3) // facts.clocks_per_us - late_us
             sampled = ready - 3 * whole // 2
