@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics import Contacts, DriftWatch, HapticsError, LoadCells, felt
+from contactfpga.haptics import AloneWatch, Contacts, DriftWatch, HapticsError, LoadCells, felt
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
@@ -26,6 +26,7 @@ class Forces:
     def __init__(self, cells: LoadCells, friction: float):
         self._cells, self._friction = cells, friction
         self._drift = DriftWatch(cells)
+        self._alone = AloneWatch(cells)
         self.drifted: tuple[int, ...] = ()
         self.contacts: Contacts | None = None
         """None: no readings belong to the frame."""
@@ -37,7 +38,8 @@ class Forces:
 
     def take(self, zones: Zones, tracks: Tracks | None) -> None:
         """The next frame."""
-        self.contacts = felt(self._cells, zones, self._friction, tracks=tracks)
+        self._alone.take(zones)
+        self.contacts = felt(self._cells, zones, self._friction, tracks=tracks, alone=self._alone)
         if zones.units is not None:
             drift = self._drift.update(zones.time_us / 1e6, zones.units.readings, len(zones))
             self.drifted = drift.drifted

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 import numpy as np
 
 import contactfpga
-from contactfpga.haptics import ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
+from contactfpga.haptics import AloneWatch, ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
 from contactfpga.haptics.answer import Floats
 from contactfpga.haptics.layouts import tripod
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.scenes.contacts import Contact, disc
+from contactfpga_sim.scenes.contacts import Contact, Track, disc
 from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.scene import Scene
 from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
@@ -199,28 +199,39 @@ class Forces:
 
 
 FINGER_MM = 6.0
-KINDS = ("point", f"finger of {2 * FINGER_MM:g} mm")
+FINGER = f"finger of {2 * FINGER_MM:g} mm"
+KINDS = POINTS, AT_ONCE, ONE_FIRST = ("point", FINGER, f"{FINGER}, one of them alone before")
+FIRST_S = 0.025
+"""For which it is alone."""
+BOTH = 4
+"""Frames of both, the last of which is asked."""
 
 
-def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) -> Forces:
+def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> Forces:
     """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found. Points
     lie where each alone closes a switch; fingers lie anywhere, since they are wider than the pitch."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
-    near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == KINDS[0] else math.inf
-    places = _pair(setting, apart_mm, near_mm, np.random.default_rng([seed, 9]))
-    fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
+    near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == POINTS else math.inf
+    places = pair(setting, apart_mm, near_mm, np.random.default_rng([seed, 9]))
+    pushes = (push_n, Track((FIRST_S - 1e-6, FIRST_S), (0.0, push_n)) if kind == ONE_FIRST else push_n)
+    fingers = tuple(
+        Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push) for (x, y), push in zip(places, pushes)
+    )
     units = Felt(Scene(fingers), cells, skin, seed)
-    if kind == KINDS[0]:
+    if kind == POINTS:
         each = np.array([1 / Touching(setting, 1e-3 * np.array(place), seed).closing_n for place in places])
         closed = push_n * each.sum(axis=0) >= 1
         board = VirtualBoard(skin, lambda seconds: closed, units=units)
     else:
         board = VirtualBoard(skin, Scene(fingers), units=units)
     with contactfpga.open(board, skin) as opened:
-        frames = WithReadings(opened)
-        zones = [frames.next() for _ in range(4)][-1]
-    found = felt(cells, zones, friction=0.0)
+        frames, alone, both = WithReadings(opened), AloneWatch(cells), 0
+        while both < BOTH and opened.clock() < FIRST_S + 0.02:
+            zones = frames.next()
+            alone.take(zones)
+            both += len(zones) == 2
+    found = felt(cells, zones, friction=0.0, alone=alone)
     if found is None or len(zones) != 2:
         return Forces(len(zones), ())
     true_m = 1e-3 * np.array(places) + np.array(cells.sheet_m)
@@ -228,7 +239,7 @@ def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) 
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
 
 
-def _pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Places in mm, each nearer than ``near_mm`` to a switch."""
     pitch = setting.pitch_mm
     while True:
