@@ -8,7 +8,19 @@ from bumpers import flat
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.haptics import AloneWatch, Cylinder, HapticsError, LoadCells, Plane, WithReadings, felt
+from contactfpga.console.forces import Forces
+from contactfpga.haptics import (
+    AloneWatch,
+    Cylinder,
+    Drift,
+    HapticsError,
+    LoadCells,
+    Plane,
+    WithReadings,
+    Wrench,
+    contacts,
+    felt,
+)
 from contactfpga.haptics.table import write
 from contactfpga.tracking.tracker import Tracker
 from contactfpga_sim.board.virtual import VirtualBoard
@@ -137,6 +149,14 @@ def test_units_of_a_scene_lift_and_clip():
     wrench = cells.wrench(read)
     assert wrench.lifted
     assert wrench.saturated
+
+
+def test_a_drifted_unit_is_named_with_its_drift():
+    forces = Forces(bumper(), 0.5)
+    forces.contacts = contacts(Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), [])
+    forces.drift = Drift(np.array([0.0, -0.4123, 0.01]), (1,), 12.0)
+    assert forces.sentences() == ["unit 1 drifted by -0.41 N"]
+    assert forces.to_dict()["drifted"] == [1]
 
 
 def test_a_sheet_without_surface_is_refused():
