@@ -48,7 +48,7 @@ class ConverterRule:
     """From the selection to the edge at which the last bit is taken."""
 
     def level(self, facts: Facts) -> int:
-        """Clocks of a level."""
+        """Clocks of a level of the SPI clock."""
         fastest = max(hz for volts, hz in self.supplies if volts <= facts.skin.converter_v)
         by_rate = Fraction(facts.skin.clock_hz, 2 * fastest)
         by_level = Fraction(self.least_level_ns * facts.skin.clock_hz, 10**9)
@@ -60,7 +60,7 @@ class ConverterRule:
         return between, between * facts.skin.units
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
-        """Those that begin before ``cycles``."""
+        """The sweeps that begin before ``cycles``."""
         level, begin = self.level(facts), self.first(facts)
         while begin < cycles:
             sweep = []
