@@ -9,7 +9,7 @@ import pytest
 from contactfpga.haptics import Plane
 from contactfpga_sim.pages import failures_page, haptics_felt
 from contactfpga_sim.studies.failures.knob import Turned
-from contactfpga_sim.studies.haptics import breaks, felt
+from contactfpga_sim.studies.haptics import breaks, felt, pairs
 from contactfpga_sim.studies.haptics.breaks import STUDIES
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
@@ -81,8 +81,16 @@ def test_centers_of_pressure_of_many_placements_end_to_end():
     assert haptics_felt.interval(errors)[0] == pytest.approx(expected, rel=0.1)
 
 
+def test_places_limit_the_forces_of_two_fingers():
+    """Not how they are computed: the page says so."""
+    off = {method: np.sqrt(np.mean(errors**2)) for method, errors in pairs.errors(60.0, 80).items()}
+    coarse, mean, known = (off[method] for method in pairs.METHODS)
+    assert mean == pytest.approx(coarse, rel=0.1)
+    assert known < 0.8 * coarse
+
+
 def test_two_contacts_60_mm_apart_are_felt_apart():
-    pairs = [felt.two(60.0, seed) for seed in range(4)]
-    assert [one.zones for one in pairs] == [2] * 4
-    off = [one for pair in pairs for one in pair.off_n]
+    found = [felt.two(60.0, seed) for seed in range(4)]
+    assert [one.zones for one in found] == [2] * 4
+    off = [one for pair in found for one in pair.off_n]
     assert np.sqrt(np.mean(np.square(off))) < 1.2  # 0.6 N over many
