@@ -83,9 +83,9 @@ def test_centers_of_pressure_of_many_placements_end_to_end():
 
 def test_places_limit_the_forces_of_two_fingers():
     """Not how they are computed: the page says so."""
-    off = {method: np.sqrt(np.mean(errors**2)) for method, errors in pairs.errors(60.0, 80).items()}
+    off = {method: np.sqrt(np.mean(errors**2)) for method, errors in pairs.errors(60.0, 50).items()}
     coarse, mean, known = (off[method] for method in pairs.METHODS)
-    assert mean == pytest.approx(coarse, rel=0.1)
+    assert mean == pytest.approx(coarse, rel=0.15)
     assert known < 0.8 * coarse
 
 
