@@ -35,12 +35,12 @@ _CONVERTER_PINS = {
         "spi_miso": "DOUT 12 of the MCP3208",
     },
     "ads131m08": {
-        "spi_clock": "SCLK of the ADS131M08",
-        "spi_select_n": "CS of the ADS131M08, 10 kΩ to its supply",
-        "spi_mosi": "DIN of the ADS131M08",
-        "spi_miso": "DOUT of the ADS131M08",
-        "spi_ready_n": "DRDY of the ADS131M08",
-        "spi_pace": "XTAL1/CLKIN of the ADS131M08",
+        "spi_clock": "SCLK 19 of the ADS131M08",
+        "spi_select_n": "CS 17 of the ADS131M08, 10 kΩ to its supply",
+        "spi_mosi": "DIN 21 of the ADS131M08",
+        "spi_miso": "DOUT 20 of the ADS131M08",
+        "spi_ready_n": "DRDY 18 of the ADS131M08",
+        "spi_pace": "XTAL1/CLKIN 23 of the ADS131M08",
     },
 }
 """By the name of the converter; of one of your own the port itself is said."""
