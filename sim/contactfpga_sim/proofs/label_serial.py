@@ -188,6 +188,11 @@ _BUGS = (
 )  # fmt: skip
 
 
+_CLOSED_BUGS = (
+    Bug("the seam is forgotten in a last row", SerialLabeller, "meets",
+        lambda meets, inside: meets & ~inside["last"]),
+    Bug("the seam is no turn", SerialLabeller, "turn_now", lambda *_: 0),
+)  # fmt: skip
 _OVERFLOW_BUGS = (
     Bug("always in the first place", SerialLabeller, "write__addr", lambda *_: 0),
     Bug("a place is read again", SerialLabeller, "wanted",
@@ -214,6 +219,8 @@ CASES = (
     _case(records_are_the_zones, 2, 4, 11),
     _case(records_are_the_zones, 3, 8, 12, bugs=_BUGS, bug_clocks=14),
     _case(records_are_the_zones, 3, 4, 14, campaign=True),
+    _case(records_are_the_zones, 3, 8, 11, rows=2, closed=True, campaign=True, bugs=_CLOSED_BUGS, bug_clocks=14),
+    _case(records_are_the_zones, 3, 4, 13, rows=2, closed=True, campaign=True),
     _case(nothing_overflows, 1, 8, 8),
     _case(nothing_overflows, 2, 4, 11),
     _case(nothing_overflows, 3, 8, 12, bugs=_OVERFLOW_BUGS, bug_clocks=17),

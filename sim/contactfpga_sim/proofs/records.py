@@ -8,6 +8,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
 from contactfpga_hdl.label.steps import place_of
+from contactfpga_hdl.label.unwrap import Unwrap
 from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.payloads import zone_layout
 from contactfpga_sim.proofs.bugs import Bug
@@ -98,6 +99,7 @@ def _lemmas(proof: Proof, dut: RunLabeller, inside: Inside, open_row: OpenRow, r
                 word, moments = words[place_of(dut.derived, x)], open_row.moments[x].as_value()
                 proof.lemma(word[: len(moments)] == moments)
         if isinstance(open_row, TurnedRow):
+            proof.lemma(inside["join.turned"] == 0)
             turned = inside["join.old_turned"]
             for x in columns:
                 with m.If(starts[x]):
@@ -177,7 +179,11 @@ _BUGS = (
         lambda leaves, inside: leaves | inside["decided.closes"] & inside["decided.store"]),
     Bug("runs do not join", Join, "new_before", lambda _, inside: inside["before"]),
 )  # fmt: skip
-_CLOSED_BUGS = (Bug("the seam is forgotten in a last row", Walk, "seam", _seam_forgotten),)
+_CLOSED_BUGS = (
+    Bug("the seam is forgotten in a last row", Walk, "seam", _seam_forgotten),
+    Bug("cells past the seam are not counted", Unwrap, "turned_group.turned", lambda *_: 0),
+    Bug("nothing is a ring", Unwrap, "turned_group.ring", lambda *_: 0),
+)
 _SPECIFICATION_BUGS = (Bug("zones of one row do not merge", RowStep, "next_reach_2", lambda reach, _: reach & 0b100),)
 
 
@@ -198,8 +204,8 @@ CASES = (
     _case(4, 4, 9, campaign=True),
     _case(8, 8, 7, rows=2, bounded=True, campaign=True),
     _case(8, 4, 7, rows=2, bounded=True, campaign=True),
-    _case(3, 8, 9, closed=True, bounded=True, campaign=True, bugs=_CLOSED_BUGS),
-    _case(3, 4, 9, closed=True, bounded=True, campaign=True),
+    _case(3, 8, 8, rows=2, closed=True, campaign=True, bugs=_CLOSED_BUGS, bug_clocks=14),
+    _case(3, 4, 9, rows=2, closed=True, campaign=True),
     *(
         Case("rows find the zones", f"3x3, {connectivity}-connected, closed",
              partial(rows_find_the_zones, rows=3, columns=3, connectivity=connectivity, closed=True), 1,

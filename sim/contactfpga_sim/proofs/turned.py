@@ -89,30 +89,23 @@ class TurnedStep(RowStep):
         low = [offsets[j] - before.turns[j].back for j in columns]
         high = [low[j] + before.turns[j].two for j in columns]
         cells, places = reach[len(columns) :], offsets[len(columns) :]
-        back = _any(zones[j] & (low[j] < 0) for j in columns) | _any(cells[k] & (places[k] < 0) for k in columns)
-        upper = Mux(back, 0, 1)
-        lowest = Mux(back, -1, 0)
-        shares = [
-            Mux(before.turns[j].two, Mux(high[j] == upper, before.turns[j].turned, 0),
-                Mux(low[j] == upper, before.moments[j].area, 0)) for j in columns
-        ]  # fmt: skip
-        above = [Mux(zones[j], shares[j], 0) for j in columns] + [cells[k] & (places[k] == upper) for k in columns]
+        parts = [*zip(zones, low, high, strict=True), *zip(cells, places, places, strict=True)]
+        back = _any(there & (lower < 0) for there, lower, _ in parts)
+        lowest, upper = Mux(back, -1, 0), Mux(back, 0, 1)
+        turned = sum(cells[k] & (places[k] == upper) for k in columns)
+        for j in columns:
+            alone = Mux(low[j] == upper, before.moments[j].area, 0)
+            shared = Mux(high[j] == upper, before.turns[j].turned, 0)
+            turned += Mux(zones[j], Mux(before.turns[j].two, shared, alone), 0)
+        wound = _any(there & ((lower < lowest) | (higher > upper)) for there, lower, higher in parts)
+        ring = _any(reach[a] & way & (offsets[a] + turn != offsets[b]) for a, b, way, turn in ways)
         turns = Signal.like(before.turns[0], name=f"turns_from_{first}")
         m.d.comb += [
-            turns.turned.eq(sum(above)),
-            turns.two.eq(
-                _any(zones[j] & (high[j] > lowest) for j in columns)
-                | _any(cells[k] & (places[k] > lowest) for k in columns)
-            ),
+            turns.turned.eq(turned),
+            turns.two.eq(_any(there & (higher > lowest) for there, _, higher in parts)),
             turns.back.eq(back),
-            turns.wound.eq(
-                _any(zones[j] & (before.turns[j].wound | (low[j] < lowest) | (high[j] > upper)) for j in columns)
-                | _any(cells[k] & ((places[k] < lowest) | (places[k] > upper)) for k in columns)
-            ),
-            turns.ring.eq(
-                _any(zones[j] & before.turns[j].ring for j in columns)
-                | _any(reach[a] & way & (offsets[a] + turn != offsets[b]) for a, b, way, turn in ways)
-            ),
+            turns.wound.eq(wound | _any(zones[j] & before.turns[j].wound for j in columns)),
+            turns.ring.eq(ring | _any(zones[j] & before.turns[j].ring for j in columns)),
         ]
         return turns
 
@@ -151,8 +144,8 @@ def _any(bits: Iterable) -> Value:
 
 
 def flood_around(m: Module, derived: Derived, frame, wanted):
-    """How many zones of a frame have the record ``wanted``: every pressed cell spreads over many turns of the frame side
-    by side. What is no ring takes two rows for each turn."""
+    """How many zones of a frame have the record ``wanted``: every pressed cell spreads over turns of the frame that lie
+    side by side. What is no ring takes two rows for each turn."""
     cells = derived.skin.rows * derived.skin.columns
     turns = derived.skin.rows // 2 + 1
     count = 0
