@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import weakref
 from collections.abc import Callable
@@ -21,6 +22,9 @@ from contactfpga.zones.zone import Zones
 
 TURN_S = 0.05
 """How often the reader checks whether the board was closed."""
+
+ASK_S = 1.0
+"""How often :meth:`Link.ask` asks."""
 
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
@@ -69,6 +73,7 @@ class Link:
         self.last_s = transport.clock()
         """When it came."""
         self._last_bytes = 0  # that had come by then
+        self._asked_s = -math.inf  # by :meth:`ask`
         self._sending = threading.Lock()
         self._commanding = threading.Lock()
         self._waiters: list[_Waiter] = []
@@ -96,6 +101,16 @@ class Link:
         finally:
             with self.changed:
                 self._waiters.remove(waiter)
+
+    def ask(self) -> None:
+        """Ask the board, at most once per second; nobody waits for the answer, which says how late frames are."""
+        with self.changed:
+            now = self.transport.clock()
+            if now < self._asked_s + ASK_S:
+                return
+            self._asked_s = now
+            self.conversation.ask(now, now)
+        self._send()
 
     def command(self, command: Command, timeout: float) -> Found:
         """Have the board do something; the first frame scanned after it took the command, or the error that came in
