@@ -176,7 +176,9 @@ def test_a_frame_that_waited_on_its_way_is_not_the_latest(board, port):
     late, port.dead = port.frame(), True
     port.seconds += 0.6
     port.out += late
-    with pytest.raises(contactfpga.NoData, match=r"frame \d+ waited on its way, 0\.\d+ s or more \(allowed are 0\.05 s\)"):
+    with pytest.raises(
+        contactfpga.NoData, match=r"frame \d+ waited on its way, 0\.\d+ s or more \(allowed are 0\.05 s\)"
+    ):
         board.latest(max_age_s=0.05)
     port.dead = False
     port.time_us += round(0.6 * 1e6)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 LEASE_MS = 1000
 """After this long without a sign of life a peer counts as gone."""
+MOST_RECEIVED = 1 << 20
+"""Bytes of one message that a session takes, which Zenoh keeps roughly: more than any of ours, and little memory."""
 CONNECT_MS = 2000
 """How long a connection may take."""
 
@@ -26,7 +28,12 @@ def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.S
 
 def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
     """A session that connects to a router, and listens nowhere."""
-    settings = {"mode": "client", "connect/endpoints": [endpoint or ENDPOINT], "connect/timeout_ms": CONNECT_MS}
+    settings = {
+        "mode": "client",
+        "connect/endpoints": [endpoint or ENDPOINT],
+        "connect/timeout_ms": CONNECT_MS,
+        "listen/endpoints": [],
+    }
     return _open(settings, endpoint, config, "connect")
 
 
@@ -40,6 +47,7 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/link/rx/max_message_size": MOST_RECEIVED,
     }
     found, given = zenoh.Config(), {}
     if config is not None:
