@@ -1,12 +1,14 @@
 """Publishers and routers in processes of their own, on free ports of this machine."""
 
 import contextlib
+import json
 import os
 import socket
 import subprocess
 import sys
 import threading
 import time
+from typing import NamedTuple
 
 from fake_board import FakeBoard
 
@@ -16,6 +18,24 @@ from contactfpga.net import session
 with session.listening(sys.argv[1]):
     print("ready", flush=True)
     time.sleep(600)
+"""
+
+
+READER = """
+import dataclasses, json, sys, time
+import contactfpga
+board = contactfpga.open(sys.argv[1], timeout=60)
+while True:
+    found = None
+    try:
+        found = board.latest(60, max_age_s=float(sys.argv[2]))
+    except contactfpga.NoData:
+        pass
+    now_s, stats = time.monotonic(), board.stats
+    seen = stats.frames + stats.lost + stats.unexplained
+    line = [found and found.time_us, now_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
+    print(json.dumps(line), flush=True)
+    time.sleep(0.005)
 """
 
 
@@ -58,25 +78,51 @@ def publish(board, *options, wait=True):
     return Child("-m", "contactfpga", "publish", board.path, "--timeout", 60, *options, wait=wait)
 
 
+class Sight(NamedTuple):
+    """What a :class:`Reader` says again and again."""
+
+    time_us: int | None
+    """Of the latest frame; None: there was no data."""
+    at_s: float
+    seen: int
+    """Frames that came or are known not to have come."""
+    hellos: int
+    restarts: int
+    net: dict
+
+
+class Reader(Child):
+    """A program that takes the latest frame of a port, none older than ``max_age_s``."""
+
+    def __init__(self, port, max_age_s):
+        super().__init__("-c", READER, port, max_age_s)
+        self.sights = [Sight(*json.loads(self.line))]
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self):
+        self.sights += (Sight(*json.loads(line)) for line in self.process.stdout)
+
+
 class Streaming(FakeBoard):
     """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
 
-    def __init__(self, skin):
+    def __init__(self, skin, every_s=0.002):
         super().__init__(skin)
+        self._every_s = every_s
         self.sent_us = set()
-        self._begun_s = time.monotonic()
+        self.begun_s = time.monotonic()
         self._hello_due_s = 0.0
         self.lock = threading.Lock()
         self.stream = self._more
 
     def frame(self, *args, **options):
-        now_us = round((time.monotonic() - self._begun_s) * 1e6)
+        now_us = round((time.monotonic() - self.begun_s) * 1e6)
         self.time_us = max(self.time_us, now_us)
         self.sent_us.add(self.time_us)
         return super().frame(*args, **options)
 
     def _more(self):
-        time.sleep(0.002)
+        time.sleep(self._every_s)
         data = b""
         if time.monotonic() > self._hello_due_s:
             data, self._hello_due_s = self.hello(), time.monotonic() + 0.25
