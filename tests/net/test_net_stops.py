@@ -1,4 +1,4 @@
-"""Processes that stand still (SIGSTOP) and go on: nothing that waited is taken for news, and what was lost is counted."""
+"""Processes that stand still (SIGSTOP) and go on: nothing that waited is taken for news, and each loss is counted."""
 
 import contextlib
 import os

@@ -12,6 +12,9 @@ from typing import NamedTuple
 
 from fake_board import FakeBoard
 
+CHUNK = 4096
+"""Bytes that a cable takes at once."""
+
 ROUTER = """
 import sys, time
 from contactfpga.net import session
@@ -135,9 +138,11 @@ class Streaming(FakeBoard):
 
 
 class Relay:
-    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first."""
+    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first.
+    ``bytes_s``: what it carries per second, with little memory; None: all there is."""
 
-    def __init__(self, endpoint):
+    def __init__(self, endpoint, bytes_s=None):
+        self.bytes_s = bytes_s
         host, _, number = endpoint.partition("/")[2].rpartition(":")
         self._target = host, int(number)
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -163,16 +168,20 @@ class Relay:
                 if not self._whole.is_set():
                     near.close()
                     continue
-                far = socket.create_connection(self._target)
+                far = socket.socket()
+                if self.bytes_s is not None:
+                    far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
+                far.connect(self._target)
                 self._sockets += [near, far]
                 for source, sink in ((near, far), (far, near)):
                     threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
 
-    @staticmethod
-    def _carry(source, sink):
+    def _carry(self, source, sink):
         with contextlib.suppress(OSError):
-            while data := source.recv(65536):
+            while data := source.recv(CHUNK):
                 sink.sendall(data)
+                if self.bytes_s is not None:
+                    time.sleep(len(data) / self.bytes_s)
             sink.shutdown(socket.SHUT_RDWR)
 
     def __enter__(self):
