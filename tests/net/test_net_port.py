@@ -223,7 +223,7 @@ def test_a_publisher_of_another_release_is_named(network, opened):
     with pytest.raises(contactfpga.VersionMismatch, match=r"another version than 1, .*same release on both computers"):
         opened.read(0.0)
     network.arrive(message)
-    assert opened.read(0.0) == b"\0x", "but who sends what can be read is read"
+    assert opened.read(0.0) == b"x", "but who sends what can be read is read"
     network.arrive(b"cfp2" + message[4:])
     assert opened.read(0.0) == b""
 

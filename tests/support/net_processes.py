@@ -49,6 +49,15 @@ def free_endpoint(protocol="tcp"):
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
 
 
+def assert_loopback_alone(pid):
+    """It listens, and nobody outside this machine can reach it."""
+    import psutil  # which not every computer has
+
+    found = psutil.Process(pid).net_connections("inet")
+    assert [one for one in found if one.status == "LISTEN"], "the test sees where it listens"
+    assert {one.laddr.ip for one in found} == {"127.0.0.1"}
+
+
 class Child:
     """A process of Python; ``line`` is the first that it prints."""
 

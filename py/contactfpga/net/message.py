@@ -99,7 +99,7 @@ class Stream:
         if last is None or message.publisher != last.publisher:
             counters.publishers += 1
             counters.breaks += last is not None
-            return b"\0" + message.data, last is not None
+            return (b"\0" if last is not None else b"") + message.data, last is not None
         missing = message.sequence - last.sequence - 1
         hole = message.offset - last.offset - len(last.data)
         counters.lost_messages += missing

@@ -54,7 +54,10 @@ class ZenohPort:
     def _find(self) -> None:
         with self._changed:
             if not self._changed.wait_for(lambda: self._stream.alive, FOUND_S):
-                raise PortNotFound(f"{self.name}: nobody publishes it; is `contactfpga publish` running with this key?")
+                step = "is `contactfpga publish` running with this key"
+                if self._address.config is not None:
+                    step += ", and do its access rules let this user read it"
+                raise PortNotFound(f"{self.name}: nobody publishes it; {step}?")
 
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte."""
