@@ -44,9 +44,9 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch):
         contactfpga.open(f"zenoh://slow?connect={relay.endpoint}&wait=60", timeout=LONG) as board,
     ):
         unknown = settled(source, board)
-        source.busy = True
+        source.rate_hz = 2000.0
         time.sleep(1.5)
-        source.busy = False
+        source.rate_hz = 0.0
         relay.bytes_s = 10**7
         assert settled(source, board) == unknown, "every frame came, or is counted"
         publisher.end()

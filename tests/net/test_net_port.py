@@ -23,7 +23,7 @@ class Network:
         self.said = []
 
     def declare_publisher(self, key, **_):
-        return SimpleNamespace(put=lambda data: self.said.append((key, data)))
+        return SimpleNamespace(put=lambda data: self.said.append((key, data)), undeclare=lambda: None)
 
     def declare_subscriber(self, key, callback, **options):
         if options:

@@ -9,19 +9,18 @@ from model_board import ModelBoard
 import contactfpga
 from contactfpga.net.publisher import Publisher
 
-RATE_HZ = 2000
-"""Frames per second while it is busy; else it answers requests."""
 PORT_BYTES = 4096
 
 
 class SmallPort(ModelBoard):
-    """A board behind a port with little memory: what does not find room is lost, frame by frame."""
+    """A board behind a port with little memory: what does not find room is lost, frame by frame. It answers requests,
+    and sends ``rate_hz`` frames per second by itself, and hellos."""
 
     threaded = True
 
     def __init__(self, skin=None):
         super().__init__(skin or contactfpga.Skin())
-        self.busy = False
+        self.rate_hz = 0.0
         self.overflowed = 0
         self._kept, self._begun_s = b"", time.monotonic()
         self._due_s = self._hello_due_s = 0.0
@@ -29,8 +28,11 @@ class SmallPort(ModelBoard):
 
     def _fill(self):
         now_s = time.monotonic()
-        while self.busy and self._due_s < now_s:
-            self._due_s = max(self._due_s + 1 / RATE_HZ, now_s - 0.5)
+        while self.rate_hz and self._due_s < now_s:
+            if self._due_s > self._hello_due_s:
+                self._hello_due_s = now_s + 0.5
+                self._kept += self.hello()
+            self._due_s = max(self._due_s + 1 / self.rate_hz, now_s - 0.5)
             self._send(1)
 
     def _send(self, count):

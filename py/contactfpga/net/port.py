@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import re
 import threading
 import time
@@ -36,6 +37,7 @@ class ZenohPort:
         self._waiting = 0
         self._gone_s: float | None = None  # since when nobody publishes
         self._stream = Stream(self.counters)
+        self._asks: zenoh.Publisher | None = None
         try:
             self._session = session.connected(address.connect, address.config)
         except ContactFPGAError as error:
@@ -83,6 +85,7 @@ class ZenohPort:
 
     def write(self, data: bytes) -> None:
         """Ask the board."""
+        assert self._asks is not None
         self._asks.put(data)
 
     def clock(self) -> float:
@@ -91,6 +94,11 @@ class ZenohPort:
 
     def close(self) -> None:
         """Leave the network; may be called twice."""
+        import zenoh
+
+        if self._asks is not None:
+            with contextlib.suppress(zenoh.ZError):  # gone already, which is what closing wants
+                self._asks.undeclare()  # else Zenoh would keep the session in memory
         self._session.close()
 
     def _take(self, sample: zenoh.Sample) -> None:

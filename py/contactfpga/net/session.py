@@ -55,6 +55,7 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/shared_memory/enabled": False,
         "transport/link/rx/max_message_size": MOST_RECEIVED,
     }
     found, given = zenoh.Config(), {}
