@@ -134,7 +134,7 @@ def test_who_may_read_but_not_ask_is_told(keys):
     with session.listening(config=config) as network, published(source, network, "left"):
         with pytest.raises(contactfpga.BoardSilent, match=r"not one byte came"):
             contactfpga.open(keys.port(), timeout=0.5)
-        source.rate_hz = 200.0
+        source.go(200.0)
         source.say_hello()
         with pytest.raises(
             contactfpga.ReadTimeout, match=r"if there are access rules, let this program write to KEY/ask"

@@ -42,7 +42,7 @@ def robot(tmp_path, endpoint):
 
 def board(skin=SKIN):
     source = SmallPort(skin)
-    source.rate_hz = 100.0
+    source.go(100.0)
     return source
 
 

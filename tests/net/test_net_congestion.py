@@ -44,9 +44,9 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch):
         contactfpga.open(f"zenoh://slow?connect={relay.endpoint}&wait=60", timeout=LONG) as board,
     ):
         unknown = settled(source, board)
-        source.rate_hz = 2000.0
+        source.go(2000.0)
         time.sleep(1.5)
-        source.rate_hz = 0.0
+        source.go(0.0)
         relay.bytes_s = 10**7
         assert settled(source, board) == unknown, "every frame came, or is counted"
         publisher.end()
@@ -60,6 +60,19 @@ def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch):
     else:
         assert net.lost_messages > 10
         assert net.lost_bytes > 15 * (stats.lost - source.overflowed) > 0
+
+
+def test_a_port_does_not_run_over_while_bytes_are_collected():
+    """For 0.6 s, in which three times as many come as the port holds."""
+    source = SmallPort()
+    with session.listening(free_endpoint()) as network, published(source, network, "slow", batch_s=0.6) as publisher:
+        source.port_bytes = 1024
+        source.go(300.0)
+        time.sleep(1.4)
+        publisher.end()
+    assert source.overflowed == 0
+    assert source.sent > 300
+    assert publisher.sent < 10
 
 
 def last_message(board):

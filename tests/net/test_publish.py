@@ -15,6 +15,7 @@ from contactfpga import cli
 from contactfpga.net import session
 from contactfpga.net.message import MOST_ASKED
 from contactfpga.wire.command import Command, encode_command
+from contactfpga.wire.protocol import encode_request
 
 psutil = pytest.importorskip("psutil")
 pytest.importorskip("zenoh")
@@ -70,6 +71,9 @@ def test_a_published_board_is_a_board(streaming):
         assert (stats["lost"], stats["damaged"], stats["net"]["lost_messages"]) == (0, {}, 0)
         assert stats["net"]["messages"] > 5
         assert_loopback_alone(publisher.process.pid)
+        publisher.process.send_signal(signal.SIGINT)
+        assert publisher.process.wait(LONG) == 0
+        assert publisher.end() == ""
 
 
 def test_by_default_nothing_listens_but_on_this_machine_and_a_port_listens_nowhere(streaming):
@@ -198,8 +202,17 @@ def test_an_endpoint_that_zenoh_cannot_read_is_one_line(opened):
 
 def test_a_board_that_is_unplugged_ends_its_publisher():
     endpoint = free_endpoint()
-    with FakeBoard(SKIN) as board, publish(board, "--listen", endpoint) as publisher:
+    with (
+        FakeBoard(SKIN) as board,
+        publish(board, "--listen", endpoint) as publisher,
+        session.connected(endpoint) as asks,
+    ):
+        request = encode_request(0x10101)
+        wait_until(lambda: asks.put("contactfpga/left-forearm/ask", request) or board.asked > 3, LONG)
         board.unplug()
+        for _ in range(100):
+            asks.put("contactfpga/left-forearm/ask", request)
         said = publisher.process.communicate(timeout=LONG)[1]
     assert publisher.process.returncode == 1
     assert "is gone" in said
+    assert said.count("\n") == 1
