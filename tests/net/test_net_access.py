@@ -13,6 +13,7 @@ import contactfpga
 from contactfpga import cli
 from contactfpga.net import session
 from contactfpga.net.message import Message
+from contactfpga.wire.protocol import encode_request
 
 psutil = pytest.importorskip("psutil")
 pytest.importorskip("zenoh")
@@ -181,6 +182,22 @@ def test_a_second_publisher_of_a_key_is_refused(endpoint, capsys):
         assert errors.count("\n") == 1
         with contactfpga.open(port(endpoint), timeout=LONG) as board:
             assert board.read(LONG)
+
+
+def test_asking_a_board_that_is_gone_is_no_traceback(endpoint, capfd):
+    """Zenoh would print it; the publisher's own read says what happened."""
+    source, asked = SmallPort(SKIN), []
+
+    def write(data):
+        asked.append(data)
+        raise contactfpga.PortLost("gone")
+
+    source.write = write
+    with session.listening(endpoint) as network, published(source, network, "left"):
+        with session.connected(endpoint) as asks:
+            request = encode_request(0x10101)
+            wait_until(lambda: asks.put("left/ask", request) or len(asked) > 2, LONG)
+    assert capfd.readouterr().err == ""
 
 
 def test_what_is_far_too_large_goes_no_further(endpoint):
