@@ -1,8 +1,10 @@
 """Who may read a published board and who may not: each refusal is one sentence, or counted."""
 
+import re
 import shutil
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, wait_until
@@ -22,14 +24,13 @@ pytestmark = pytest.mark.usefixtures("_closed_ports")
 SKIN = contactfpga.Skin(name="left forearm")
 LONG = 60.0
 
-KEY = "openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes"
-AUTHORITY = f"{KEY} -x509 -days 365 -subj /CN=authority -keyout authority-key.pem -out authority.pem"
+PAGE = (Path(__file__).parents[2] / "docs" / "net.md").read_text(encoding="utf-8")
+AUTHORITY, CERTIFICATE = re.findall(r"^    (openssl .*)$", PAGE, re.MULTILINE)
 NAMES = "-addext basicConstraints=CA:FALSE -addext subjectAltName=DNS:localhost,IP:127.0.0.1"
-CERTIFICATE = (
-    f"{KEY} -x509 -days 365 -CA authority.pem -CAkey authority-key.pem -subj /CN=localhost {NAMES} "
-    "-keyout key.pem -out certificate.pem"
+ASKED = (
+    f"openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj /CN=localhost {NAMES} "
+    "-keyout old-key.pem -out old.csr"
 )
-ASKED = f"{KEY} -subj /CN=localhost {NAMES} -keyout old-key.pem -out old.csr"
 EXPIRED = (
     "openssl x509 -req -in old.csr -CA authority.pem -CAkey authority-key.pem -CAcreateserial -copy_extensions copy "
     "-days -1 -out old.pem"
