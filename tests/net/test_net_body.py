@@ -9,8 +9,7 @@ from small_port import SmallPort, published
 
 import contactfpga
 from contactfpga import cli
-from contactfpga.body import Body
-from contactfpga.body.snapshot import NoLinkData
+from contactfpga.body import Body, NoLinkData
 from contactfpga.net import session
 
 pytest.importorskip("zenoh")

@@ -180,7 +180,12 @@ class Relay:
                 far = socket.socket()
                 if self.bytes_s is not None:
                     far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
-                far.connect(self._target)
+                try:
+                    far.connect(self._target)
+                except OSError:  # nobody listens there now
+                    near.close()
+                    far.close()
+                    continue
                 self._sockets += [near, far]
                 for source, sink in ((near, far), (far, near)):
                     threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
