@@ -166,8 +166,9 @@ class Board:
     def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
         """The newest frame: the last of all that wait, or the next one when none does. Older ones are dropped.
 
-        With ``max_age_s`` no frame that came longer ago, in seconds; as soon as there can be none it raises
-        :class:`NoData`. Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
+        With ``max_age_s`` no frame that came longer ago, in seconds, or that was scanned longer ago and waited on its
+        way, as far as clocks tell; as soon as there can be none it raises :class:`NoData`. Of a recording, the next
+        frame. ``timeout`` and errors as for :meth:`next`.
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
