@@ -6,7 +6,7 @@ import argparse
 import sys
 import threading
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.driver import driver
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
@@ -51,11 +51,10 @@ def run(args: argparse.Namespace) -> int:
         with open_session(args.connect or args.listen, args.config) as network:
             batch_s, block = args.batch_ms / 1000, args.congestion == "block"
             publisher = Publisher(transport, network, key, batch_s=batch_s, block=block, commands=args.allow_commands)
-            print(f"{address.SCHEME}{key}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
-            _warn(args, here)
-            publisher.run(threading.Event())
-    except KeyboardInterrupt:  # which is how it is meant to end
-        pass
+            with interrupt.usual_end():
+                print(f"{address.SCHEME}{key}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
+                _warn(args, here)
+                publisher.run(threading.Event())
     finally:
         transport.close()
     return 0

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
 import sys
-import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
@@ -57,9 +53,9 @@ def run(args: argparse.Namespace) -> int:
     session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session)
     try:
-        with _ended_by_term(), session:
+        with session:
             _add(session, args, body)
-            with contextlib.suppress(KeyboardInterrupt):  # the usual end
+            with interrupt.usual_end():
                 session.start(args.seconds)
                 while session.running:
                     session.wait(0.05)
@@ -67,19 +63,6 @@ def run(args: argparse.Namespace) -> int:
     finally:
         progress.end()
     return 0
-
-
-@contextlib.contextmanager
-def _ended_by_term() -> Iterator[None]:
-    """A service is stopped with TERM, which closes the file as Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals are the main thread's
-        return
-    before = signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _body(args: argparse.Namespace) -> Body | None:

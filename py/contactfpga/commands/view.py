@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
@@ -32,11 +31,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.view import opening
+    from contactfpga.view.player import Player
 
     named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units)
-    with contextlib.suppress(KeyboardInterrupt), opening.opened(named, args.host, args.http_port) as shown:
+    with opening.opened(named, args.host, args.http_port) as shown, interrupt.usual_end():
         terminal.say(f"Open {shown.url}")
-        terminal.say("Whoever has this address can read and press. Ctrl-C ends it.", hang=2)
+        can = "see the recording" if isinstance(shown.source, Player) else "read and press"
+        terminal.say(f"Whoever has this address can {can}. Ctrl-C ends it.", hang=2)
         if not args.no_browser and _has_display():
             opening.browse(shown.url)
         opening.run(shown, args.seconds)
