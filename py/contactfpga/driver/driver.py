@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import os
 import threading
 from pathlib import Path
 
@@ -13,14 +14,15 @@ from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortLost
-from contactfpga.skin import Skin
+from contactfpga.inputs.values import shown
+from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
 
 
 def open(
-    port: str | SimulatedPort | None = None,
+    port: str | os.PathLike[str] | SimulatedPort | None = None,
     skin: Skin | str | Path | None = None,
     *,
     baud: int | None = None,
@@ -46,8 +48,15 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    elif not isinstance(baud, int) or not limits.MIN_BAUD <= baud <= limits.MAX_CLOCK_HZ // 2:
+        most = limits.MAX_CLOCK_HZ // 2
+        raise ValueError(f"baud is {shown(baud)}; it must be a whole number from {limits.MIN_BAUD} to {most}")
     if isinstance(record, str | Path):
         recording.check(record)
+    elif record is not None and not hasattr(record, "take"):
+        raise TypeError(f"record is {shown(record)}; it must be the name of a file or a Tap")
+    if isinstance(port, os.PathLike):
+        port = os.fspath(port)
     if port is None or (isinstance(port, str) and finding.searched(port)):
         port = finding.find(port, skin, baud)
     transport = connect(port, baud)

@@ -18,6 +18,9 @@ from contactfpga.inputs.values import number_in
 SCHEME = "replay://"
 _OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
 """Where they begin; a path may have other question marks."""
+_UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
+"""What looks like options that there are not."""
+_KNOWN = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
 class Recorded(Protocol):
@@ -86,9 +89,7 @@ def parse(name: str) -> ReplayAddress:
     for part in rest[0].split("&") if rest else ():
         key, equals, value = part.partition("=")
         if not equals or key not in ("pace", "start", "link"):
-            raise PortNotFound(
-                f"{name}: {part!r} is no option; there are ?pace=1, ?start=SECONDS and ?link=NAME, with & between"
-            )
+            raise PortNotFound(f"{name}: {part!r} is no option; there are {_KNOWN}")
         if key in found:
             raise PortNotFound(f"{name}: {key} is given twice")
         found[key] = value
@@ -123,7 +124,8 @@ def open_recorded(name: str) -> Recorded:
         file.seek(0)
     except OSError as error:
         reason = error.strerror or told(error)
-        raise PortNotFound(f"{name} cannot be opened: {reason}; is the path right?") from None
+        hint = f"the options are {_KNOWN}" if _UNKNOWN.search(name) else "is the path right?"
+        raise PortNotFound(f"{name} cannot be opened: {reason}; {hint}") from None
     except ValueError as error:  # a path with a zero byte
         raise PortNotFound(f"{name} cannot be opened: {error}") from None
     if asked.start_s or asked.link is not None:
