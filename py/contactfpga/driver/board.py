@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
+from typing import NoReturn
 
 from contactfpga.driver import self_test
 from contactfpga.driver.link import Link
@@ -43,6 +44,17 @@ class Board:
         self._threaded = transport.threaded
         self._link = Link(transport, skin)
         self._frames = Subscription(self._link, QUEUE)
+
+    def __repr__(self) -> str:
+        try:
+            sheet = self.sheet
+        except ContactFPGAError as error:
+            return f"<Board {error}>"
+        return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
+
+    def __reduce__(self) -> NoReturn:
+        """Not even a copy: the end of one would close the port of the other."""
+        raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
 
     def __del__(self) -> None:
         if hasattr(self, "_link"):
