@@ -121,7 +121,7 @@ class Timeline:
         step_s = 10.0 ** np.floor(np.log10(end_s / 1000))
         self._place = gui.add_slider("s", 0.0, float(np.ceil(end_s / step_s) * step_s), float(step_s), 0.0)
         self._button = gui.add_button("Pause")
-        speed = gui.add_dropdown("speed", tuple(SPEEDS), "1")
+        speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         # What the server itself sets has no client.
         self._place.on_update(lambda event: player.seek(self._place.value) if event.client is not None else None)
         self._button.on_click(lambda _: player.pause() if player.playing else player.play())
