@@ -114,5 +114,5 @@ def test_what_cannot_be_played_is_named(tmp_path):
 def test_a_link_of_bytes_alone_is_refused(tmp_path, name, link):
     path = tmp_path / "touches.bin"
     path.write_bytes(b"nothing")
-    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is of what `contactfpga record` makes$"):
+    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is for files of `contactfpga record`$"):
         replayed.load(name.format(path), link)

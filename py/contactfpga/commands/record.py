@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from contactfpga.recordings.session import Session
     from contactfpga.ros.feed import Felt
 
-HELP = "Record a board, or all boards of a robot (ROBOT.toml instead of PORT), into an MCAP file."
+HELP = "Record a board, or all boards of a robot, into an MCAP file."
 EXTRA = "record"
 
 SHOWN_S = 0.5
@@ -28,8 +28,8 @@ SHOWN_S = 0.5
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("file", metavar="FILE.mcap", help="File to write; it must not exist yet.")
-    flags.connection(parser)
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
+    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, or ROBOT.toml for all boards of a robot (docs/body.md).")
+    flags.seconds(parser)
     megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
     seconds = "The same, each this many seconds long."

@@ -8,7 +8,7 @@ from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.console.forces import Forces
 from contactfpga.haptics import WithReadings
 
-HELP = "Publish the skin as ROS 2 topics, with no ROS installed."
+HELP = "Publish contacts as ROS 2 topics, with no ROS installed."
 EXTRA = "ros"
 
 
@@ -43,8 +43,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
     network = "Reach nodes on other computers too; without it only those on this one."
     parser.add_argument("--network", action="store_true", help=network)
-    seconds = "End after this many seconds (default: at Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
+    flags.seconds(parser)
 
 
 def run(args: argparse.Namespace) -> int:

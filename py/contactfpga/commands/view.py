@@ -11,12 +11,16 @@ from contactfpga.console import flags, interrupt, numbers, terminal
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
 
-WHAT = "Port, sim://, a recording, or a robot.toml (default: a virtual sheet to press)."
+WHAT = (
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, sim://, a recording's file, or ROBOT.toml (default: "
+    "a virtual sheet to press)."
+)
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    flags.connection(parser, WHAT)
+    skin = "Skin of the virtual sheet; of a board: require one that was built from it, and use its baud rate."
+    flags.connection(parser, WHAT, skin)
     parser.add_argument("--link", metavar="NAME", help="Board to show, of a recording of several (default: the first).")
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
     parser.add_argument("--units", metavar="FILE", help=units)
@@ -25,7 +29,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
     parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)
     parser.add_argument("--no-browser", action="store_true", help="Print the address only.")
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
+    flags.seconds(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from contactfpga.console import numbers, outputs, terminal
 from contactfpga.inputs.values import number_in
 from contactfpga.zones.zone import Zones
 
-HELP = "Learn which cells the folding cover presses over a joint's range, with nobody near."
+HELP = "Learn which cells the folding cover presses over a joint's range, while nobody touches it."
 MAX_LINE = 200
 
 
@@ -30,9 +30,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", metavar="FOLDS.json", help=output)
     step = f"How finely angles are told apart (default: {folds.STEP_RAD:g})."
     parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
-    parser.epilog = (
-        "Reads the joint's angle in rad from standard input, a line each time that the robot says it, until it ends."
-    )
+    parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
 
 
 def run(args: argparse.Namespace) -> int:
@@ -40,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
     body = Body.load(args.robot)
     plan = link(body, args.link)
     output = outputs.file(args.output, "FOLDS.json")
-    terminal.say(f"move {args.joint} slowly over its whole range, there and back, with nobody near", sys.stderr)
+    terminal.say(
+        f"move {args.joint} slowly over its whole range, there and back; nobody may touch the cover", sys.stderr
+    )
     alone = Body({plan.name: plan})
     with alone.open() as opened:
         found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
@@ -56,7 +56,9 @@ def run(args: argparse.Namespace) -> int:
         hang=2,
     )
     if gaps:
-        terminal.say(f"{gaps} steps between were not visited: there nothing will be marked; move more slowly", hang=2)
+        terminal.say(
+            f"{gaps} steps between were not visited: at these angles nothing will be marked; move more slowly", hang=2
+        )
     return 0
 
 
