@@ -46,7 +46,7 @@ def says(study: Study, turned: Turned) -> str:
         parts = [f"{parts[0]}, {since}"] if words == parts[0] else [*parts, f"{words} {since}"]
     if told and turned.silent_at is not None:
         parts.append(f"**not noticed** at {study.format.format(turned.silent_at)}")
-    if not reported and (later := [value for value, one in zip(turned.values, turned.outcomes) if one.verdict == "told"]):
+    if not told and (later := [value for value, one in zip(turned.values, turned.outcomes) if one.verdict == "told"]):
         first = turned.outcomes[turned.values.index(later[0])].told
         parts.append(f"{', '.join(f'`{word}`' for word in first)} from {study.format.format(later[0])} on")
     return "; ".join(parts)
