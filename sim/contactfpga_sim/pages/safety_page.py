@@ -28,8 +28,8 @@ NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` 
 
 def faults_table() -> str:
     """Each fault with what tells it, how fast, and what was wrong before."""
-    head = ["fault", "what it does unnoticed", "reported by", "after, at most", "`contact` after", "frames wrong before"]
-    rows = [[*head, "without options", "what is left to do"]]
+    head = ["fault", "what it does unnoticed", "reported by", "after, at most", "`contact` after"]
+    rows = [[*head, "frames wrong before", "without options", "what is left to do"]]
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
         rows.append(
