@@ -21,6 +21,7 @@ DESIGNS = (
 MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
+"""In words."""
 
 
 def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
@@ -76,7 +77,7 @@ def modules_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
 
 
 def ways_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
-    """What is wrong, or tells, with each design."""
+    """What is wrong with each design, or reports the flip."""
     lines = []
     for design in designs:
         some = [row for row in rows if row.design == design.name and row.found.outcome != "masked"]

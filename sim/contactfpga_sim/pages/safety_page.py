@@ -22,14 +22,21 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
     "these and `self_test`": ("guarded", ("flags", "deadline", "alive", start.HOST)),
 }
-"""Options with the Skin and with what tells a fault."""
+"""Options with the Skin and with what reports a fault."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
 def faults_table() -> str:
-    """Each fault with what tells it, how fast, and what was wrong before."""
-    head = ["fault", "what it does unnoticed", "reported by", "after, at most", "`contact` after"]
-    rows = [[*head, "frames wrong before", "without options", "what is left to do"]]
+    """Each fault with what reports it, how fast, and what was wrong before."""
+    head = [
+        "fault",
+        "what it does unnoticed",
+        "reported by",
+        "after, at most",
+        "`contact` after",
+        "frames wrong before",
+    ]
+    rows = [[*head, "without options", "what is left to do"]]
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
         rows.append(
@@ -48,7 +55,7 @@ def faults_table() -> str:
 
 
 def coverage_table() -> str:
-    """Told faults of the listed ones, with and without each option."""
+    """Reported faults of the listed ones, with and without each option."""
     rows = [["options", "faults reported at every place", "diagnostic coverage", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]
@@ -85,7 +92,7 @@ def _is_told(places: list[Place]) -> bool:
 
 
 def _told_by(places: list[Place], host: str) -> str:
-    """What tells it, at all places or at some."""
+    """What reports it, at all places or at some."""
     if not any(_channels(place) for place in places):
         return f"**not reported** by a scan; meant for `{host}`" if host else "**not reported**"
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
@@ -96,7 +103,7 @@ def _told_by(places: list[Place], host: str) -> str:
 
 
 def _tested(fault: str) -> str:
-    """What the self-test at power-up tells of it."""
+    """What the self-test at power-up reports of it."""
     times = [us for us in start.found(fault).values() if us is not None]
     of = len(start.found(fault))
     share = "" if len(times) == of else f" at {len(times)} of {of} places"
