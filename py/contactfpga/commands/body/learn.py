@@ -12,9 +12,10 @@ import numpy as np
 
 from contactfpga.body import Body, folds
 from contactfpga.body.open_body import OpenBody
+from contactfpga.body.plan import Plan
 from contactfpga.commands.body.register import link
 from contactfpga.console import numbers, outputs, terminal
-from contactfpga.inputs.values import number_in
+from contactfpga.inputs.values import number_in, shown
 from contactfpga.zones.zone import Zones
 
 HELP = "Learn which cells the folding cover presses over a joint's range, while nobody touches it."
@@ -37,6 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     body = Body.load(args.robot)
     plan = link(body, args.link)
+    _check(body, plan, args.joint)
     output = outputs.file(args.output, "FOLDS.json")
     terminal.say(
         f"move {args.joint} slowly over its whole range, there and back; nobody may touch the cover", sys.stderr
@@ -56,10 +58,22 @@ def run(args: argparse.Namespace) -> int:
         hang=2,
     )
     if gaps:
-        terminal.say(
-            f"{gaps} steps between were not visited: at these angles nothing will be marked; move more slowly", hang=2
-        )
+        between = max(found.frames) - min(found.frames) - 1
+        missed = f"no frame came at {gaps} of the {between} steps between"
+        terminal.say(f"{missed}: move more slowly, or folds there are not marked", hang=2)
     return 0
+
+
+def _check(body: Body, plan: Plan, joint: str) -> None:
+    """Before anybody moves the robot. Raises ValueError."""
+    names = None if body.kinematics is None else body.kinematics.joint_names
+    if names is not None and joint not in names:
+        raise ValueError(f"joint {shown(joint)} is no joint of the URDF; it has {', '.join(names)}")
+    if plan.skin.report != "cells":
+        raise ValueError(
+            f'link {shown(plan.name)}: its Skin has report = "{plan.skin.report}"; folds are learned cell by cell, so '
+            'build it with report = "cells"'
+        )
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
@@ -70,7 +84,9 @@ def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, 
             continue
         angle = number_in(line[:MAX_LINE])
         if not math.isfinite(angle):
-            raise ValueError(f"line {number} of standard input is {numbers.shortened(line.strip())!r}, no angle in rad")
+            raise ValueError(
+                f"line {number} of standard input is {numbers.shortened(line.strip())!r}; it must be an angle in rad"
+            )
         state = opened.read().links[name]
         if state.status != "ok" or state.zones is None:
             raise ValueError(f"link {name!r}: {state}; nothing can be learned without data")
