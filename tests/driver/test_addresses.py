@@ -72,19 +72,21 @@ def test_only_files_are_replayed(tmp_path, kind):
 
 
 @pytest.mark.parametrize("link", ["same", "symlink", "hard link"])
-def test_a_recording_is_not_written_over_while_it_is_read(tmp_path, link):
+def test_a_recording_is_never_written_over(tmp_path, link):
+    """Neither the one that is replayed nor any other."""
     path, other = tmp_path / "frames.bin", tmp_path / "other.bin"
     path.write_bytes(b"precious")
     if link == "same":
         other = path
     else:
         (other.symlink_to if link == "symlink" else other.hardlink_to)(path)
-    with pytest.raises(ContactFPGAError, match="record to another file"):
-        recording.create(other, f"replay://{path}")
+    for port in (f"replay://{path}", "sim://"):
+        with pytest.raises(ContactFPGAError, match="is there already; name a new file, or remove it first"):
+            contactfpga.open(port, record=other)
     assert path.read_bytes() == b"precious"
-    recording.create(tmp_path / "new.bin", f"replay://{path}").close()
-    recording.create(other, "sim://").close()
-    assert path.read_bytes() == b""
+    (tmp_path / "empty.bin").touch()
+    for name in ("new.bin", "empty.bin"):
+        recording.create(tmp_path / name).close()
 
 
 # ---- the link of `contactfpga board`

@@ -27,7 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
     )
     flags.forces(parser, "Show the force at each zone too")
-    record = "Write every byte received to this file; replay://FILE plays it back."
+    record = "Write every byte received to this new file; replay://FILE plays it back."
     parser.add_argument("--record", metavar="FILE", help=record)
 
 

@@ -62,7 +62,7 @@ def open(
     transport = connect(port, baud)
     try:
         if record is not None:
-            tap = FileTap(record, transport.name) if isinstance(record, (str, Path)) else record
+            tap = FileTap(record) if isinstance(record, (str, Path)) else record
             transport = RecordingTransport(transport, tap)
         board = Board(transport, skin)
     except BaseException:
