@@ -152,6 +152,7 @@ CASES = [
     *([*command, "--skin", name] for command in WITH_SKIN for name in TOML),
     ["zones", "replay://RECORDED", "--record", "RECORDED"],
     ["zones", "sim://", "--record", "FOLDER"],
+    ["publish", "sim://", "--key", ""],
     ["zones", "sim://", "--record", "/no/folder/x"],
     *(["recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
     *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),

@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.net import session
     from contactfpga.net.publisher import Publisher
 
-    key = address.checked_key(args.key) if args.key else None
+    key = None if args.key is None else address.checked_key(args.key)
     hello, device = _look(args)
     key = key or address.key_of(hello.name, hello.fingerprint)
     here = args.connect or args.listen or address.ENDPOINT
