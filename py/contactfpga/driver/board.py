@@ -34,7 +34,8 @@ class Board:
     """An open port with a board at its other end: a context manager that iterates every frame.
 
     Made by :func:`open`. Safe for several threads; :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
-    thread that wants every frame for itself takes a :meth:`subscribe`. Every method raises :class:`BoardClosed` after
+    thread that wants every frame for itself takes a :meth:`subscribe`. It can be neither copied nor sent to another
+    process. Every method raises :class:`BoardClosed` after
     :meth:`close`, also where it was waiting.
     """
 
