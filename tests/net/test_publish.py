@@ -181,7 +181,7 @@ def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys)
     assert ".cargo" not in errors
     assert errors.count("\n") == 1
     for arguments, said in (
-        (["replay://x"], "give a board, no recording and nothing that is published"),
+        (["replay://x"], "publish a board, not a recording or what is published already"),
         ([streaming.path, "--key", "a/**"], "key is 'a/**'"),
         ([streaming.path, "--listen", "x", "--connect", "y"], "give --listen or --connect, not both"),
         ([streaming.path, "--config", "/nowhere.json5"], "there is no such file"),

@@ -122,5 +122,5 @@ def test_a_recording_that_is_not_there_is_no_port(tmp_path):
 def test_a_link_of_bytes_alone_is_refused(tmp_path, name, link):
     path = tmp_path / "touches.bin"
     path.write_bytes(b"nothing")
-    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is of what `contactfpga record` makes$"):
+    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is for files of `contactfpga record`$"):
         replayed.load(name.format(path), link)

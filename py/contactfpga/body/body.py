@@ -67,6 +67,8 @@ class Body:
         """
         from contactfpga.body.open_body import OpenBody
 
+        if joints is not None and not callable(joints):
+            raise TypeError(f"joints is {shown(joints)}; it must be a function of a time, such as a JointHistory")
         return OpenBody(self, joints, timeout=timeout, period_s=period_s)
 
 

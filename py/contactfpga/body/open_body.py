@@ -17,7 +17,7 @@ from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
 from contactfpga.body.together import Together
 from contactfpga.body.totals import BodyStats, SnapshotBatch
-from contactfpga.driver.subscription import checked
+from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 
 if TYPE_CHECKING:
@@ -130,6 +130,7 @@ class OpenBody:
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
         """All snapshots of the next ``max_s`` seconds, with their frames as arrays; the first one is waited for, for
         ``timeout`` seconds."""
+        max_s = checked_span(max_s)
         with self.subscribe() as queue:
             found = [queue.next(timeout)]
             end_s = self.clock() + max_s

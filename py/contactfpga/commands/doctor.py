@@ -23,13 +23,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
     long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, help=long)
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
     watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
     parser.add_argument("--watch", action="store_true", help=watch)
     tested = "Have the board drive each line alone, again and again while you press every place; name joined lines."
     parser.add_argument("--self-test", action="store_true", help=tested)
-    stuck = "Seconds without a change after which a watch tells a pressed switch (default: 10)."
-    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="T", help=stuck)
+    stuck = "Seconds without a change after which --watch reports a pressed switch (default: 10)."
+    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="S", help=stuck)
     parser.add_argument("--list", action="store_true", help="Listen to all ports; list the boards and their names.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
 

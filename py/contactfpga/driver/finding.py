@@ -115,8 +115,9 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
     candidates = list(candidates)
     found = [one for one in candidates if one.serial_number == number]
     if not found:
-        there = ", ".join(visible(one.serial_number) for one in candidates if one.serial_number) or "none"
-        raise PortNotFound(f"no board with USB serial number {visible(number)} is plugged in; there is {there}")
+        there = ", ".join(visible(one.serial_number) for one in candidates if one.serial_number)
+        others = f"; there is {there}" if there else ", nor any other with a serial number"
+        raise PortNotFound(f"no board with USB serial number {visible(number)} is plugged in{others}")
     return found
 
 

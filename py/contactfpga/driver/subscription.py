@@ -161,6 +161,7 @@ class Subscription(Listening[Zones]):
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
+        max_s = checked_span(max_s)
         link, until = self._link, self._link.clock() + max_s
         self._wait(timeout)
         if link.transport.live:  # of a recording, what was read at once
@@ -241,3 +242,10 @@ def checked(timeout: float) -> float:
     if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
+
+
+def checked_span(max_s: float) -> float:
+    """The seconds of a batch as a float; raises ValueError unless they are finite and not below 0."""
+    if not is_finite(max_s) or max_s < 0:
+        raise ValueError(f"max_s is {max_s!r}; it must be a number of seconds, 0 or more")
+    return float(max_s)

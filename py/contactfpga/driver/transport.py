@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import shlex
 import time
 from typing import Protocol
 
@@ -11,6 +13,7 @@ from contactfpga.cover import Cover, load_cover
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.replay import ReplayTransport
 from contactfpga.errors import MissingExtra, PortLost, PortNotFound
+from contactfpga.inputs.values import shown
 from contactfpga.net.address import SCHEME
 from contactfpga.net.message import Counters
 from contactfpga.net.port import ZenohPort
@@ -72,6 +75,8 @@ class SerialTransport:
         try:
             self._port.open()
         except self._errors as error:
+            if "locked" in str(error):
+                raise PortNotFound(f"{name} is in use: another program reads this port; close it first") from None
             raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
 
     def read(self, timeout_s: float) -> bytes:
@@ -174,6 +179,8 @@ def counters_of(transport: Transport) -> Counters | None:
 def connect(name: str | SimulatedPort, baud: int) -> Transport:
     """Open the transport that ``name`` asks for, or that a virtual board is."""
     if not isinstance(name, str):
+        if not hasattr(name, "read"):
+            raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
         return SimTransport("the virtual board", name)
     if name.startswith("sim:"):
         return SimTransport.named(name)
@@ -181,7 +188,23 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
         return ReplayTransport(name)
     if name.startswith(SCHEME):
         return ZenohPort(name)
+    if (reason := _no_port(name)) is not None:
+        raise PortNotFound(reason)
     return SerialTransport(name, baud)
+
+
+def _no_port(name: str) -> str | None:
+    """What to say of a name that can be no serial port; None: it may be one."""
+    if not name:
+        return "the port has no name; leave it out to take the board that is plugged in"
+    scheme, colon, _ = name.partition("://")
+    if colon:
+        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE and zenoh://KEY"
+    if not os.path.isfile(name):
+        return None
+    if name.endswith(".toml"):
+        return f"{name} is a file; for the boards of a robot there is: contactfpga body {shlex.quote(name)}"
+    return f"{name} is a file; to play a recording name {shlex.quote(f'replay://{name}')} as the port"
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
@@ -222,7 +245,5 @@ def _next_step(error: Exception, name: str) -> str:
     if isinstance(error, PermissionError):
         return "add yourself to the group that owns it (often `dialout`), or see `contactfpga doctor`"
     if isinstance(error, FileNotFoundError):
-        return "is the board plugged in? `contactfpga doctor` lists the ports"
-    if "locked" in str(error):
-        return "another program reads this port; close it first"
-    return f"`contactfpga doctor {name}` may say why"
+        return "is the board plugged in? `contactfpga doctor --list` lists the ports"
+    return f"`contactfpga doctor {shlex.quote(name)}` may say why"

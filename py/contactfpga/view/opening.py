@@ -100,10 +100,10 @@ def _check(named: Named) -> None:
     recorded = port is not None and not is_body and is_recording(port)
     for name in ("skin", "baud", "units"):
         if getattr(named, name) is not None and (is_body or recorded):
-            other = "says it of each link" if is_body else "is a recording"
-            raise ContactFPGAError(f"--{name} is of a board; {port} {other}")
+            other = "sets it for each link" if is_body else "is a recording"
+            raise ContactFPGAError(f"--{name} is for a board; {port} {other}")
     if named.link is not None and not recorded:
-        raise ContactFPGAError(f"--link is of a recording; {'name one' if port is None else f'{port} is none'}")
+        raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
 
 def _is_body(port: str | None) -> TypeGuard[str]:

@@ -55,7 +55,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
     link = link or asked.link
     if not _is_mcap(asked.path):
         if link is not None:
-            raise ContactFPGAError(f"{asked.path} holds one board; --link is of what `contactfpga record` makes")
+            raise ContactFPGAError(f"{asked.path} holds one board; --link is for files of `contactfpga record`")
         return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout)
     from contactfpga.recordings import Recording
 
