@@ -225,6 +225,7 @@ CASES = (
     _case(nothing_overflows, 2, 4, 11),
     _case(nothing_overflows, 3, 8, 12, bugs=_OVERFLOW_BUGS, bug_clocks=17),
     _case(nothing_overflows, 3, 8, 11, rows=2, closed=True, campaign=True),
+    _case(nothing_overflows, 3, 4, 12, rows=2, closed=True, campaign=True),
     _case(stalls_change_nothing, 8, 8, 2, bugs=_STALL_BUGS, bug_clocks=16),
     _case(stalls_change_nothing, 8, 4, 2),
     _case(stalls_change_nothing, 8, 4, 2, closed=True),
