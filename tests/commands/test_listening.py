@@ -63,12 +63,13 @@ def test_no_command_listens_but_on_this_computer(tmp_path):
         pytest.importorskip(package)
     endpoint = free_endpoint()
     (tmp_path / "skin.toml").write_text(SKIN.to_toml())
-    names = ("publish", "record", "body", "view", "ros")
+    names = ("publish", "connect", "record", "body", "view", "ros")
     boards = {name: FakeBoard(SKIN) for name in names}
     body = '[[links]]\nname = "left"\nskin = "skin.toml"\nport = "{}"\n'
     (tmp_path / "robot.toml").write_text(body.format(boards["body"].path))
     commands = [
         ["publish", boards["publish"].path, "--listen", endpoint],
+        ["publish", boards["connect"].path, "--connect", endpoint, "--key", "other"],
         ["zones", f"zenoh://contactfpga/left?connect={endpoint}", "--json"],
         ["record", str(tmp_path / "x.mcap"), boards["record"].path],
         ["body", str(tmp_path / "robot.toml"), "--seconds", "600"],

@@ -14,7 +14,8 @@ from small_port import SmallPort, published
 import contactfpga
 from contactfpga import cli
 from contactfpga.net import session
-from contactfpga.net.message import Message
+from contactfpga.net.message import MOST_ASKED, Message
+from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request
 
 psutil = pytest.importorskip("psutil")
@@ -159,6 +160,25 @@ def endpoint():
 
 def port(endpoint):
     return f"zenoh://left?connect={endpoint}"
+
+
+def test_commands_and_what_no_host_sends_do_not_reach_the_board(endpoint):
+    source, command = SmallPort(SKIN), encode_command(0x10101, Command(1, 5))
+    with session.listening(endpoint) as network, published(source, network, "left"):
+        with contactfpga.open(port(endpoint), timeout=LONG) as board, session.connected(endpoint) as stranger:
+            for data in (command, b"\0\1\2\3\0", bytes(MOST_ASKED + 1), b"", command + bytes(1000)):
+                stranger.put("left/ask", data)
+            wait_until(lambda: board.stats.net.denied == 5, LONG)
+            assert board.read(LONG)
+    assert source.commanded == []
+
+
+def test_commands_pass_where_that_was_asked_for(endpoint):
+    with FakeBoard(SKIN.replace(report="cells")) as source:
+        with publish(source, "--listen", endpoint, "--allow-commands") as one:
+            with contactfpga.open(one.line, timeout=LONG) as board:
+                board.sample_at(0, LONG)
+    assert source.commanded == [(2, 0)]
 
 
 def test_a_command_that_is_denied_says_so(endpoint):

@@ -13,8 +13,6 @@ from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint
 import contactfpga
 from contactfpga import cli
 from contactfpga.net import session
-from contactfpga.net.message import MOST_ASKED
-from contactfpga.wire.command import Command, encode_command
 
 psutil = pytest.importorskip("psutil")
 pytest.importorskip("zenoh")
@@ -73,20 +71,6 @@ def test_a_published_board_is_a_board(streaming):
         publisher.process.send_signal(signal.SIGINT)
         assert publisher.process.wait(LONG) == 0
         assert publisher.end() == ""
-
-
-def test_by_default_nothing_listens_but_on_this_machine_and_a_port_listens_nowhere(streaming):
-    endpoint = free_endpoint()
-    with router(endpoint) as one:
-        assert_loopback_alone(one.process.pid)
-        before = {(each.laddr, each.status) for each in psutil.Process().net_connections("inet")}
-        with publish(streaming, "--connect", endpoint) as publisher:
-            with contactfpga.open(publisher.line, timeout=LONG):
-                mine = {(each.laddr, each.status) for each in psutil.Process().net_connections("inet")} - before
-                theirs = psutil.Process(publisher.process.pid).net_connections("inet")
-    assert {place.ip for place, _ in mine} == {"127.0.0.1"}
-    for status in [status for _, status in mine] + [each.status for each in theirs]:
-        assert status == "ESTABLISHED"
 
 
 def test_a_killed_publisher_shows_within_a_second(streaming):
@@ -148,27 +132,6 @@ def test_a_link_that_flaps_loses_frames_and_counts_them(streaming):
             assert board.stats.net.publishers == 1
             assert board.stats.lost > 0
             assert board.stats.restarts == 0
-
-
-def test_commands_and_what_no_host_sends_do_not_reach_the_board(streaming):
-    endpoint = free_endpoint()
-    with publish(streaming, "--listen", endpoint):
-        with contactfpga.open(port(endpoint), timeout=LONG) as board, session.connected(endpoint) as stranger:
-            command = encode_command(0x10101, Command(1, 5))
-            for data in (command, b"\0\1\2\3\0", bytes(MOST_ASKED + 1), b"", command + bytes(1000)):
-                stranger.put("contactfpga/left-forearm/ask", data)
-            take_until(board, lambda: board.stats.net.denied == 5, streaming.sent_us)
-            assert board.read(LONG)
-    assert streaming.commanded == []
-
-
-def test_commands_pass_where_that_was_asked_for():
-    endpoint = free_endpoint()
-    skin = SKIN.replace(report="cells")
-    with Streaming(skin) as streaming, publish(streaming, "--listen", endpoint, "--allow-commands"):
-        with contactfpga.open(port(endpoint), timeout=LONG) as board:
-            board.sample_at(0, LONG)
-    assert streaming.commanded == [(2, 0)]
 
 
 def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys):

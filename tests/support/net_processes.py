@@ -118,7 +118,7 @@ class Reader(Child):
 class Streaming(FakeBoard):
     """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
 
-    def __init__(self, skin, every_s=0.002):
+    def __init__(self, skin, every_s=0.005):
         super().__init__(skin)
         self._every_s = every_s
         self.sent_us = set()

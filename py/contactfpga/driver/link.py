@@ -188,9 +188,7 @@ class Link:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()
                 if left <= 0:
-                    raise timed_out(
-                        self.transport.name, timeout, self.conversation.stats, start, counters_of(self.transport)
-                    )
+                    raise timed_out(self.transport.name, timeout, self.conversation, start, counters_of(self.transport))
                 if self.transport.threaded or self._turning is not None:
                     self.changed.wait(min(left, 1.0) if self.transport.threaded else TURN_S)
                 else:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from contactfpga.driver.stats import Stats
+from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import BoardSilent, OnlyNoise, ReadTimeout
 from contactfpga.net.message import Counters
 
 
-def timed_out(name: str, timeout: float, stats: Stats, start: int, net: Counters | None) -> ReadTimeout:
+def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Counters | None) -> ReadTimeout:
     """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
     ``net``: what is counted about the network; None: there is none."""
+    stats = said.stats
     head = f"{name}: no frame within {timeout:g} s"
     if net is not None and not net.messages:
         return BoardSilent(
