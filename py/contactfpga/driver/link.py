@@ -266,6 +266,10 @@ class Link:
                 f"`contactfpga doctor {self.transport.name}` checks"
             )
         seen = f"{stats.bytes - start} bytes came"
+        if not stats.hellos and (numbers := sorted(self.conversation.numbers)):
+            name = self.transport.name
+            ports = ", ".join(f"{name}#{number}" for number in numbers)
+            return OnlyNoise(f"{name}: this board serves several sheets; open one of them: {ports}")
         if not stats.frames and not stats.hellos:
             damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
             return OnlyNoise(

@@ -12,10 +12,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.skin.several import MOST_SHEETS
 from contactfpga.wire import framing
-from contactfpga.wire.hello import HelloReader
+from contactfpga.wire.hello import Hello, HelloReader
 from contactfpga.wire.hellos import begins_hello
 from contactfpga.wire.numbered import numbered_requests, sheet_of, unnumbered
 
@@ -81,6 +82,11 @@ class SharedPort:
         self._reading = False
         self._sorter = Sorter()
         self._waiting: dict[SheetPort, deque[bytes]] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """The ports of all of its sheets, as far as the board has told of them."""
+        return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
 
     def add(self, sheet: SheetPort) -> None:
         """From now on keep what comes of this sheet."""
@@ -161,6 +167,29 @@ class SheetPort:
         _give_back(self, self._shared)
 
 
+class Greetings:
+    """Hellos of the sheets at a port that is only listened to."""
+
+    def __init__(self, port: str):
+        self.heard: dict[str, Hello] = {}
+        """By the port of the sheet."""
+        self._port = port
+        self._sorter = Sorter()
+        self._conversations: dict[int, Conversation] = {}
+
+    def take(self, data: bytes, now: float) -> bool:
+        """Whether with ``data`` the last one of all came."""
+        for number, packet in self._sorter.take(data):
+            if number is None:
+                continue
+            name = f"{self._port}#{number}"
+            conversation = self._conversations.setdefault(number, Conversation(name))
+            for event in conversation.receive(packet, now):
+                if isinstance(event, Hello):
+                    self.heard[name] = event
+        return len(self.heard) == self._sorter.sheets
+
+
 _open: dict[str, SharedPort] = {}
 _lock = threading.Lock()
 
@@ -176,6 +205,13 @@ def share(port: str, number: int, baud: int, connect: Callable[[str, int], Trans
                 f"{port}#{number}: another sheet at this port is open at {shared.baud} baud; give baud = {shared.baud}"
             )
         return SheetPort(f"{port}#{number}", number, shared)
+
+
+def open_at(port: str) -> list[str]:
+    """The ports of the sheets at a port that is open in this process; none where it is not."""
+    with _lock:
+        shared = _open.get(port)
+        return [] if shared is None or shared.failure is not None else shared.names
 
 
 def _give_back(sheet: SheetPort, shared: SharedPort) -> None:
