@@ -25,9 +25,7 @@ class SeveralTop(wiring.Component):
     def __init__(self, several: Several, probes: bool = False):
         self.several = several
         count = len(several.skins)
-        self.sheets = [
-            Top(skin, probes, place=Place(number, count)) for number, skin in enumerate(several.skins)
-        ]
+        self.sheets = [Top(skin, probes, place=Place(number, count)) for number, skin in enumerate(several.skins)]
         shared = {"tx": Out(1, init=1), "rx": In(1, init=1), "contact": Out(1)}
         super().__init__(shared | {f"{name}_{number}": member for number, name, member in self._outside()})
 
@@ -46,7 +44,9 @@ class SeveralTop(wiring.Component):
         for number, sheet in enumerate(self.sheets):
             m.submodules[f"sheet_{number}"] = sheet
             m.d.comb += [sheet.turn.eq(turns.turn[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]
-            m.d.comb += [getattr(sheet.bits, name).eq(getattr(receiver.bits, name)) for name in receiver.bits.signature.members]
+            m.d.comb += [
+                getattr(sheet.bits, name).eq(getattr(receiver.bits, name)) for name in receiver.bits.signature.members
+            ]
             with m.If(turns.turn[number]):
                 m.d.comb += [
                     transmitter.bytes.valid.eq(sheet.bytes.valid),

@@ -54,8 +54,8 @@ class Top(wiring.Component):
 
     A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
 
-    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the UART
-    it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
+    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
+    UART it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
     """
 
     def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: Place | None = None):

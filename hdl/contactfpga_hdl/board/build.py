@@ -44,7 +44,8 @@ class BitstreamFailed(Exception):
 
 
 def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
-    """Build the bitstream of a sheet, or of several ones, in ``folder``; raise BitstreamFailed when it does not fit or misses its timing.
+    """Build the bitstream of a sheet, or of several ones, in ``folder``; raise BitstreamFailed when it does not fit or
+    misses its timing.
 
     ``seed`` is where place and route starts from; the same one gives the same bitstream.
     """

@@ -21,8 +21,8 @@ _LONG_BIT = 3
 
 class RequestReader(wiring.Component):
     """Finds requests bit by bit; nothing but the number and what the check needs is kept. With ``commands`` it finds
-    these as well, in which what to do and a value come after the number; in requests their places are left out. With ``sheet``
-    it finds only those that say this number of a sheet.
+    these as well, in which what to do and a value come after the number; in requests their places are left out. With
+    ``sheet`` it finds only those that say this number of a sheet.
 
     ``received`` is high with ``good`` of a request's closing delimiter, which has no bits where it comes as a pulse;
     ``hello`` then says if the request asks for one. From the next clock on ``heard`` holds the lowest bits of its

@@ -116,9 +116,9 @@ class BoardSpec:
         """Pins of each port that the gateware has at the sheet and at the units' converter, lowest bit first, and of
         ``alive``; of several sheets those of each port with the sheet's number after its name."""
         if isinstance(skin, Several):
-            rows, columns = (_of_sheets(skin, wires) for wires in (row_wires, column_wires))
-            dealt = self._dealt(rows, self.row_side + self.column_side[::-1])
-            return dealt | self._dealt(columns, self.column_side + self.row_side[::-1])
+            rows_first, columns_first = self.row_side + self.column_side[::-1], self.column_side + self.row_side[::-1]
+            sheets = self._dealt(_of_sheets(skin, row_wires), rows_first)
+            return sheets | self._dealt(_of_sheets(skin, column_wires), columns_first)
         columns = self.column_side[:-1] if skin.alive else self.column_side
         ports = unit_ports(skin)
         rows = self.row_side[: len(self.row_side) - len(ports)]
@@ -161,9 +161,10 @@ class BoardSpec:
     def _check_sheets(self, several: Several) -> None:
         wires = [sum({**row_wires(skin), **column_wires(skin)}.values()) for skin in several.skins]
         if sum(wires) > self.lines:
+            taken = " + ".join(map(str, wires))
             raise SkinError(
-                f"{len(wires)} sheets take {' + '.join(map(str, wires))} wires, {self.title} has {self.lines} free pins "
-                "beside `contact`; use fewer chains or fewer sheets"
+                f"{len(wires)} sheets take {taken} wires, {self.title} has {self.lines} free pins beside `contact`; "
+                "use fewer chains or fewer sheets"
             )
 
     def _check_wires(self, skin: Skin) -> None:
@@ -203,9 +204,7 @@ def column_wires(skin: Skin) -> dict[str, int]:
 
 def _of_sheets(several: Several, wires: Callable[[Skin], Mapping[str, int]]) -> dict[str, int]:
     """Bits of each port of several sheets."""
-    return {
-        f"{name}_{number}": bits for number, skin in enumerate(several.skins) for name, bits in wires(skin).items()
-    }
+    return {f"{name}_{number}": bits for number, skin in enumerate(several.skins) for name, bits in wires(skin).items()}
 
 
 def pins_of(connector: str, numbers: str) -> tuple[str, ...]:

@@ -72,11 +72,15 @@ def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> 
         raise ContactFPGAError(str(error)) from None
     bitstream = str(bitstream_path(board, folder).resolve())
     if not args.json:
-        one = isinstance(skin, Skin)
-        what = f"{skin.rows}x{skin.columns}, report {skin.report!r}" if one else f"sheets of {sheets_of(skin.skins)}"
-        print(f"{board.title}, {what}", *report.lines(), sep="\n")
+        print(f"{board.title}, {_described(skin)}", *report.lines(), sep="\n")
         print(f"{'bitstream':12} {bitstream}")
     return {"bitstream": bitstream, "report": dataclasses.asdict(report)}
+
+
+def _described(skin: Skin | Several) -> str:
+    if isinstance(skin, Several):
+        return f"sheets of {sheets_of(skin.skins)}"
+    return f"{skin.rows}x{skin.columns}, report {skin.report!r}"
 
 
 def default_folder(board: BoardSpec) -> Path:

@@ -41,7 +41,7 @@ class Several:
         if set(values) != {"sheets"}:
             unknown = sorted(set(values) - {"sheets"})
             what = f"unknown key {unknown[0]!r}" if unknown else "no key 'sheets'"
-            raise SkinError(f"{path}: {what}; the file of several sheets holds sheets = [\"SKIN.toml\", ...] alone")
+            raise SkinError(f'{path}: {what}; the file of several sheets holds sheets = ["SKIN.toml", ...] alone')
         files = values["sheets"]
         if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
             raise SkinError(f"{path}: sheets is {shown(files)}; it must be a list of Skin files")

@@ -52,7 +52,9 @@ class _Sheet:
         self.recorder = TraceRecorder(cycles)
         self._stimulus = Stimulus(skin, timeline)
         self._reads = {name: port(name) for name in self._stimulus.reads}
-        self._drives = [(place, port(name)) for place, name in enumerate(self._stimulus.drives) if number == 0 or name != "rx"]
+        self._drives = [
+            (place, port(name)) for place, name in enumerate(self._stimulus.drives) if number == 0 or name != "rx"
+        ]
         there = ports(LEVELS, skin)
         fields = [(name, port(name)) for name in (*there, *ports(PAYLOADS, skin))]
         self.sampled = Cat(field for _, field in fields)

@@ -69,9 +69,7 @@ def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
     return _play(facts(skin), timeline, cycles)[2].beginnings
 
 
-def _play(
-    known: Facts, timeline: Timeline, cycles: int, line: Line | None = None
-) -> tuple[Trace, Link, scan.Scanned]:
+def _play(known: Facts, timeline: Timeline, cycles: int, line: Line | None = None) -> tuple[Trace, Link, scan.Scanned]:
     skin = known.skin
     heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands), known.closing)
     trace = Trace(cycles)

@@ -41,8 +41,10 @@ class Heard:
 
 
 def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"") -> bytes:
-    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit; ``closing``: for
-    one of several sheets."""
+    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
+
+    ``closing``: that of the sheet, among several ones, that it is for.
+    """
     return _sent(_digits(number, 3) + bytes([KIND << 4 | hello]), bit_clocks, closing)
 
 
