@@ -56,15 +56,22 @@ class Board {
     EACH_SHEET
 #undef SHEET
 
-    void put_columns() {
+    // Whether any sheet's levels have changed.
+    bool put_columns() {
         auto &top = model_.top;
-#define SHEET(NUMBER, ...)                                                                                          \
-    put(top.p_column__data__##NUMBER,                                                                               \
-        sheet_##NUMBER.step(static_cast<uint64_t>(get(top.p_row__data__##NUMBER)), get(top.p_row__clock__##NUMBER), \
-                            get(top.p_row__latch__##NUMBER), get(top.p_row__enable__n__##NUMBER),                   \
-                            get(top.p_column__load__n__##NUMBER), get(top.p_column__clock__##NUMBER)));
+        bool changed = false;
+#define SHEET(NUMBER, ...)                                                                                            \
+    const uint64_t level_##NUMBER =                                                                                   \
+        sheet_##NUMBER.step(static_cast<uint64_t>(get(top.p_row__data__##NUMBER)), get(top.p_row__clock__##NUMBER),   \
+                            get(top.p_row__latch__##NUMBER), get(top.p_row__enable__n__##NUMBER),                     \
+                            get(top.p_column__load__n__##NUMBER), get(top.p_column__clock__##NUMBER));                \
+    if (level_##NUMBER != levels_[NUMBER]) {                                                                          \
+        put(top.p_column__data__##NUMBER, levels_[NUMBER] = level_##NUMBER);                                          \
+        changed = true;                                                                                               \
+    }
         EACH_SHEET
 #undef SHEET
+        return changed;
     }
 
 public:
@@ -85,8 +92,8 @@ public:
         for (const uint64_t end = cycle + cycles; cycle < end; cycle++) {
             put(model_.top.p_rx, sender.level());
             model_.settle();
-            put_columns();
-            model_.settle();  // lines enter flip-flops only
+            if (put_columns())
+                model_.settle();  // lines enter flip-flops only
             watch();
             model_.finish();
         }
@@ -94,6 +101,7 @@ public:
 
 private:
     bool line_ = true, contact_ = false;
+    uint64_t levels_[16] = {};
 
     void watch() {
         const bool line = get(model_.top.p_tx), contact = get(model_.top.p_contact);
