@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contactfpga
-from contactfpga import Skin
+from contactfpga import Skin, examples
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
@@ -17,7 +17,7 @@ from contactfpga_sim.board.several import CompiledSheets
 from contactfpga_sim.cosim import bench_several
 from contactfpga_sim.cosim.compare import Mismatch, compare
 from contactfpga_sim.cosim.covering import CHOICES, pairwise, skin_for
-from contactfpga_sim.golden import Timeline, requests
+from contactfpga_sim.golden import Timeline
 from contactfpga_sim.golden.predict import predict_several
 from contactfpga_sim.golden.request import request
 
@@ -30,6 +30,7 @@ SMALL = Several(
     )
 )
 CYCLES = 7_500
+EXAMPLE = examples() / "two-sheets.toml"
 
 
 def timelines(several, cycles, seed=0, received=()):
@@ -84,10 +85,13 @@ def check(several, lines, cycles, limit_s=60.0):
 
 
 def test_gateware_and_model_agree_cycle_for_cycle():
-    lines = timelines(SMALL, CYCLES, received=asked(CYCLES, 2, 2, seed=9))
-    want = check(SMALL, lines, CYCLES)
+    check(SMALL, timelines(SMALL, 2_400, received=asked(2_400, 2, 2)), 2_400)
+
+
+@pytest.mark.campaign
+def test_gateware_and_model_agree_with_requests_as_pulses():
+    want = check(SMALL, timelines(SMALL, CYCLES, received=asked(CYCLES, 2, 2, seed=9)), CYCLES)
     one, other = heard(want)
-    assert [talk.hello.place for talk in (one, other)] == [(0, 2), (1, 2)]
     assert one.sheet == SMALL.skins[0].sheet
     assert one.stats.hellos + other.stats.hellos == 3  # one of them was asked for
     for talk in (one, other):
@@ -125,46 +129,40 @@ def test_a_sheet_waits_for_one_packet_of_each_other_one():
         assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 
-@pytest.fixture(scope="module")
-def compiled():
-    with CompiledSheets(SMALL) as board:
-        yield board
+def test_the_compiled_board_agrees_at_the_pins():
+    cycles, several = 60_000, Several.load(EXAMPLE)
+    sent = asked(cycles, 2, 4)
+    lines = [Timeline([(at, cells, None) for at, cells, _ in line.pieces], sent) for line in timelines(several, cycles)]
+    pressed = [(at, number, cells) for number, line in enumerate(lines) for at, cells, _ in line.pieces if at < cycles]
+    with CompiledSheets(several) as board:
+        for at, number, what in sorted([*pressed, *((at, None, data) for at, data in sent)], key=lambda one: one[0]):
+            board.run(at - board.cycle)
+            board.send(what) if number is None else board.press(number, what)
+        board.run(cycles - board.cycle)
+        want = predict_several(several.skins, lines, cycles)
+        for boundary in ("line", "contact"):
+            events = board.take(boundary)
+            assert list(zip(events["cycle"].tolist(), events["data"].tolist(), strict=True)) == want[0].events(boundary)
+    for number, talk in enumerate(heard(want)):
+        assert talk.hello.place == (number, 2)
+        assert talk.stats.hellos > 1  # asked for
+        assert talk.stats.frames > 5
+        assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 
-def test_the_compiled_board_agrees_at_the_pins(compiled):
-    cycles = 120_000
-    lines = timelines(SMALL, cycles)
-    lines = [Timeline([(at, cells, None) for at, cells, _ in line.pieces]) for line in lines]
-    changes = sorted((at, number, cells) for number, line in enumerate(lines) for at, cells, _ in line.pieces)
-    for at, number, cells in sorted(changes, key=lambda change: change[:2]):
-        if at < cycles:
-            compiled.run(at - compiled.cycle)
-            compiled.press(number, cells)
-    compiled.run(cycles - compiled.cycle)
-    want = predict_several(SMALL.skins, lines, cycles)[0]
-    for boundary in ("line", "contact"):
-        events = compiled.take(boundary)
-        assert list(zip(events["cycle"].tolist(), events["data"].tolist(), strict=True)) == want.events(boundary)
-
-
-def test_the_virtual_board_serves_both_sheets(tmp_path):
-    for number, skin in enumerate(SMALL.skins):
-        (tmp_path / f"{number}.toml").write_text(skin.to_toml())
-    (tmp_path / "sheets.toml").write_text('sheets = ["0.toml", "1.toml"]')
-    port = f"sim://?sheets={tmp_path / 'sheets.toml'}&scene=palm"
+def test_the_virtual_board_serves_both_sheets():
+    port, skins = f"sim://?sheets={EXAMPLE}&scene=palm", Several.load(EXAMPLE).skins
     with contextlib.ExitStack() as stack:
-        boards = [
-            stack.enter_context(contactfpga.open(f"{port}#{number}", skin)) for number, skin in enumerate(SMALL.skins)
-        ]
-        assert boards[0].name == "one"
+        boards = [stack.enter_context(contactfpga.open(f"{port}#{number}", skin)) for number, skin in enumerate(skins)]
+        assert [board.name for board in boards] == ["chest", "back"]
         for _ in range(20):
             for board in boards:
                 before = board.clock()
-                assert board.read().time_us >= 0
+                assert len(board.read()) == 1
                 assert board.clock() - before < 0.01
         for board in boards:
             assert board.stats.damaged.total() == board.stats.lost == 0
-    with pytest.raises(contactfpga.OnlyNoise, match="serves several sheets; open one of them: .*#0"):
+    with pytest.raises(contactfpga.OnlyNoise, match=r"serves several sheets; open one of them: .*#0"):
         contactfpga.open(port, timeout=0.01)
 
 
@@ -183,7 +181,8 @@ def test_sheets_of_all_kinds_agree(seed):
     check(several, lines, 6_000, limit_s=600.0)
 
 
-def test_ordinary_requests_are_nobodys():
-    received = requests(range(0, CYCLES, 700), 2)
-    traces = predict_several(SMALL.skins, timelines(SMALL, CYCLES, received=received), CYCLES)
-    assert [talk.stats.hellos for talk in heard(traces)] == [1, 1]
+def test_requests_are_for_one_sheet():
+    for closing, hellos in ((b"", [1, 1]), (b"\x02\xb0", [2, 1]), (b"\x02\xb1", [1, 2]), (b"\x02\xb2", [1, 1])):
+        received = [(4_000, request(9, True, 2, closing))]
+        traces = predict_several(SMALL.skins, timelines(SMALL, 9_000, received=received), 9_000)
+        assert [talk.stats.hellos for talk in heard(traces)] == hellos

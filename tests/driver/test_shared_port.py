@@ -154,7 +154,7 @@ def test_a_board_of_several_sheets_names_their_ports(line, monkeypatch):
 
 
 def test_another_baud_rate_at_an_open_port_is_refused(line):
-    with opened(line, 0), pytest.raises(ContactFPGAError, match="fake#1: another sheet.*open at 3000000 baud"):
+    with opened(line, 0), pytest.raises(ContactFPGAError, match=r"fake#1: another sheet.*open at 3000000 baud"):
         opened(line, 1, baud=1_000_000)
 
 
@@ -189,7 +189,7 @@ def test_a_search_finds_each_sheet(monkeypatch):
     assert finding.find("name:back", None, 3_000_000) == "fake#1"
     assert finding.find(None, SKINS[0], 3_000_000) == "fake#0"
     assert finding.find("usb:ABC#1", None, 3_000_000) == "fake#1"
-    with pytest.raises(PortNotFound, match="several boards answer.*name:chest or name:back"):
+    with pytest.raises(PortNotFound, match=r"several boards answer.*name:chest or name:back"):
         finding.find(None, None, 3_000_000)
 
 

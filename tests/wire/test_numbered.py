@@ -1,4 +1,4 @@
-"""Packets of a numbered sheet: what they are, and that they are an ordinary packet as soon as the number is taken out."""
+"""Packets of a numbered sheet: what they are, and that without the number they are ordinary ones."""
 
 import random
 

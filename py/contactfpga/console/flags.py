@@ -11,7 +11,7 @@ from contactfpga.errors import ContactFPGAError
 
 PORT = (
     "Device path, name:NAME or usb:SERIAL of a board, sim:// or replay://FILE (default: the one supported board that "
-    "is plugged in, with --skin the one of that Skin)."
+    "is plugged in, with --skin the one of that Skin). PORT#1 is sheet 1 of several ones at a port."
 )
 
 
