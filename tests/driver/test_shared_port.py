@@ -1,12 +1,16 @@
 """Several sheets at one port: each is a board of its own to whoever opens it."""
 
+import os
+import select
 import threading
+import tty
 
 import pytest
 from model_board import DirectPort
 
 import contactfpga
 from contactfpga import ContactFPGAError, PortLost, PortNotFound, Skin
+from contactfpga.cli import main
 from contactfpga.driver import finding, sheets
 from contactfpga.driver.board import Board
 from contactfpga.driver.ports import Candidate
@@ -170,7 +174,38 @@ def test_a_lost_port_is_lost_for_all_and_opened_anew_after(line):
         assert other.closed == 1
 
 
-def test_numbers_of_sheets_end_a_port(monkeypatch):
+def test_sheets_at_a_serial_port(capsys):
+    """Through the operating system; the doctor looks at the port itself."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    line, ends = Line(), threading.Event()
+
+    def answer():
+        while not ends.is_set():
+            if select.select([master], [], [], 0.01)[0]:
+                line.write(os.read(master, 4096))
+            while data := line.read(0.0):
+                os.write(master, data)
+
+    thread = threading.Thread(target=answer)
+    thread.start()
+    try:
+        port = os.ttyname(slave)
+        with contactfpga.open(f"{port}#0", timeout=20) as chest, contactfpga.open(f"{port}#1", timeout=20) as back:
+            for number, board in enumerate((chest, back)):
+                assert board.read(20.0)[0].sum_x == 10 + number
+            assert not chest.stats.damaged
+        main(["doctor", f"{port}#1", "--timeout", "1", "--seconds", "0.1"])
+        assert f"ok    {port} may be read and written" in capsys.readouterr().out
+    finally:
+        ends.set()
+        thread.join()
+        os.close(master)
+        os.close(slave)
+    assert sheets._open == {}
+
+
+def test_numbers_of_sheets_end_a_port():
     assert sheets.split("/dev/ttyUSB0#1") == ("/dev/ttyUSB0", 1)
     assert sheets.split("sim://?skin=a#b.toml") is None
     with pytest.raises(PortNotFound, match="port#16: sheets have the numbers 0 to 15"):
