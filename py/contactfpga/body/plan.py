@@ -15,7 +15,7 @@ from contactfpga import surfaces
 from contactfpga.body.answer import BodyError
 from contactfpga.body.folds import Folds
 from contactfpga.body.pose import Pose
-from contactfpga.driver import sim_address
+from contactfpga.driver import sheets, sim_address
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics.units import LoadCells
@@ -139,7 +139,7 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     if "port" not in values:
         return None
     port = text(values, "port")
-    if port.startswith("sim:") and sim_address.parse(port).skin is None:
+    if port.startswith("sim:") and sheets.split(port) is None and sim_address.parse(port).skin is None:
         return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
     return port
 

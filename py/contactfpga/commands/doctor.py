@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable
 
 from contactfpga.console import flags, numbers, self_testing, terminal, watching
-from contactfpga.driver import driver, finding, health, ports
+from contactfpga.driver import driver, finding, health, ports, sheets
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
@@ -122,8 +122,9 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
             skin = Skin.load(args.skin) if args.skin else None
             port = finding.find(port, skin, args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
         if port is not None and "://" not in port:
-            report.add(health.rights(port))
-            report.add(health.ftdi(port))
+            device, _ = sheets.split(port) or (port, None)
+            report.add(health.rights(device))
+            report.add(health.ftdi(device))
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             report.stats = board.stats
             report.add(health.hello(board))

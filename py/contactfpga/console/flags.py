@@ -10,8 +10,8 @@ from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
 
 PORT = (
-    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, sim:// or replay://FILE (default: the one supported "
-    "board that is plugged in, with --skin the one of that Skin)."
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "
+    "replay://FILE (default: the one supported board that is plugged in, with --skin the one of that Skin)."
 )
 SKIN = "Require a board built from this Skin, and use its baud rate."
 

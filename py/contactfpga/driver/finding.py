@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from contactfpga.driver import ports
+from contactfpga.driver import ports, sheets
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.ports import Candidate
 from contactfpga.driver.transport import connect
@@ -52,6 +52,8 @@ def searched(port: object) -> bool:
 
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
     """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
+    if port is not None and (sheet := sheets.split(port)) is not None:
+        return f"{find(sheet[0], None, baud)}#{sheet[1]}"
     found = ports.candidates()
     if port is not None and port.startswith(USB):
         found = _with_number(port.removeprefix(USB), found)
@@ -77,20 +79,25 @@ def survey(candidates: Sequence[Candidate], baud: int) -> list[Found]:
     if not candidates:
         return []
     with ThreadPoolExecutor(len(candidates)) as pool:
-        return list(pool.map(lambda one: _heard(one, baud), candidates))
+        heard = pool.map(lambda one: _heard(one, baud), candidates)
+        return [found for at_one_port in heard for found in at_one_port]
 
 
-def _heard(candidate: Candidate, baud: int) -> Found:
+def _heard(candidate: Candidate, baud: int) -> list[Found]:
+    """What is at a port: a board, or each sheet of one that serves several."""
     try:
-        return Found(candidate, listen(candidate.device, baud), "")
+        names = sheets.open_at(candidate.device) or [candidate.device]
+        heard = [one for name in names for one in listen(name, baud).items()]
+        return [Found(dataclasses.replace(candidate, device=name), hello, "") for name, hello in heard]
     except ContactFPGAError as error:
-        return Found(candidate, None, str(error))
+        return [Found(candidate, None, str(error))]
 
 
-def listen(device: str, baud: int, seconds: float | None = None) -> Hello:
-    """The hello that a board says by itself at this port within ``seconds``; nothing is sent."""
+def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:
+    """The hellos that a board says by itself at this port within ``seconds``, by the port to open; nothing is sent."""
     seconds = LISTEN_S if seconds is None else seconds
     transport = connect(device, baud)
+    of_sheets = sheets.Greetings(device)
     try:
         conversation = Conversation(device)
         until = time.monotonic() + seconds
@@ -98,13 +105,18 @@ def listen(device: str, baud: int, seconds: float | None = None) -> Hello:
             if conversation.stats.before_hello and seconds < PATIENT_S:  # what may be frames
                 until, seconds = until + PATIENT_S - seconds, PATIENT_S
                 continue
-            for event in conversation.receive_runs(transport.read(left), time.monotonic()):
+            data = transport.read(left)
+            if of_sheets.take(data, time.monotonic()):
+                return of_sheets.heard
+            for event in conversation.receive_runs(data, time.monotonic()):
                 if isinstance(event, Hello):
-                    return event
+                    return {device: event}
                 if isinstance(event, ContactFPGAError):
                     raise event
     finally:
         transport.close()
+    if of_sheets.heard:
+        return of_sheets.heard
     came = conversation.stats.bytes
     if came:
         raise OnlyNoise(f"{came} bytes came, but no hello; is the baud rate the Skin's? Asked for was {baud}")

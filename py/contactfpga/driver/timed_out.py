@@ -23,6 +23,9 @@ def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Co
             f"`contactfpga doctor {name}` checks"
         )
     seen = f"{stats.bytes - start} bytes came"
+    if not stats.hellos and (numbers := sorted(said.numbers)):
+        ports = ", ".join(f"{name}#{number}" for number in numbers)
+        return OnlyNoise(f"{name}: this board serves several sheets; open one of them: {ports}")
     if not stats.frames and not stats.hellos:
         damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
         return OnlyNoise(

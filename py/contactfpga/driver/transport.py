@@ -10,7 +10,7 @@ from typing import Protocol
 
 from contactfpga.circuit import Circuit, load_checked
 from contactfpga.cover import Cover, load_cover
-from contactfpga.driver import recording, sim_address
+from contactfpga.driver import recording, sheets, sim_address
 from contactfpga.driver.replay import ReplayTransport
 from contactfpga.errors import MissingExtra, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
@@ -18,6 +18,7 @@ from contactfpga.net.address import SCHEME
 from contactfpga.net.message import Counters
 from contactfpga.net.port import ZenohPort
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 CHUNK = 65_536
 """Most bytes one read returns."""
@@ -182,6 +183,8 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
         if not hasattr(name, "read"):
             raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
         return SimTransport("the virtual board", name)
+    if (sheet := sheets.split(name)) is not None:
+        return sheets.share(*sheet, baud, connect)
     if name.startswith("sim:"):
         return SimTransport.named(name)
     if name.startswith("replay:"):
@@ -212,11 +215,12 @@ def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
     ``skin``: where it names no file."""
     asked = sim_address.parse(name)
     cover, circuit = None, None
+    several = Several.load(asked.sheets) if asked.sheets is not None else None
     if asked.skin is not None:
         skin = Skin.load(asked.skin)
         cover, circuit = load_cover(asked.skin), load_checked(asked.skin, skin)
     try:
-        return _virtual_board(asked, skin, cover, circuit)
+        return _virtual_board(asked, skin, cover, circuit) if several is None else _virtual_sheets(asked, several)
     except ModuleNotFoundError as error:
         raise MissingExtra(f"sim:// ({error})", "sim") from None
     except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -235,6 +239,12 @@ def _virtual_board(
 
         units = LoadCells.load(asked.units)
     return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
+
+
+def _virtual_sheets(asked: sim_address.SimAddress, several: Several) -> SimulatedPort:
+    from contactfpga_sim.board import virtual
+
+    return virtual.sheets_for(several, asked.scene)
 
 
 def _reason(error: Exception) -> str:
