@@ -93,11 +93,12 @@ class CompiledBoard:
         self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
 
     def join(self, shorts: Shorts | None) -> None:
-        """From the next cycle on these lines are joined and these diodes bridged, and all others whole. Rows at the
-        supply and columns with strong pulls are the slow model's only."""
+        """From the next cycle on these lines are joined and these diodes bridged, and all others whole."""
         self._call("part")
         shorts = shorts or Shorts()
-        for kind, pairs in enumerate((shorts.rows, shorts.columns, shorts.crossed, shorts.bridged)):
+        supplied, pulled = ((row, 0) for row in shorts.supplied), ((0, column) for column in shorts.pulled)
+        kinds = (shorts.rows, shorts.columns, shorts.crossed, shorts.bridged, supplied, pulled)
+        for kind, pairs in enumerate(kinds):
             for one, other in pairs:
                 self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 

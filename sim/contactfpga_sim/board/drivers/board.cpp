@@ -82,9 +82,9 @@ public:
         if (shorts.any) {
             const Lines feeding{rows_released, columns_driven & ~stuck};
             const Lines low = shorts.followers(closed_, {selected, columns_held}, true);
-            lifted_ = shorts.followers(closed_, feeding, false);
+            lifted_ = shorts.followers(closed_, {feeding.rows | shorts.supplied, feeding.columns}, false);
             fights += ((low.rows & feeding.rows) | (low.columns & feeding.columns)) != 0;
-            reads = low.columns, lifted = lifted_.columns;
+            reads = low.columns, lifted = lifted_.columns | shorts.pulled;
         } else {
             for (; selected; selected &= selected - 1)
                 reads |= closed_[lowest(selected)];
