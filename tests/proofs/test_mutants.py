@@ -83,6 +83,11 @@ def test_a_table_is_written_only_when_all_of_its_skins_were_run(tmp_path, monkey
     assert [part.split(" ")[0] for part in parts if "old" not in part] == written
 
 
+def test_no_noise_comes_where_pulses_are_bits():
+    noisy = {name: any(one.noise for one in stimuli.quick(SKINS[name])) for name in ("8x8", "4x4, debounced")}
+    assert noisy == {"8x8": True, "4x4, debounced": False}
+
+
 def test_what_only_a_flip_can_reach_has_no_mutants(sample):
     assert not any("upset" in mutant.place for mutant in sample.all)
 

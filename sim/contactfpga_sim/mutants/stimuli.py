@@ -10,6 +10,7 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.cosim import covering
+from contactfpga_sim.golden import uart
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.hello import hello
 from contactfpga_sim.golden.request import requests
@@ -43,7 +44,7 @@ def quick(skin: Skin) -> Iterator[Stimulus]:
     guard lines or a self-test also a sheet at rest with lines that break and touch."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, options.least_cycles(skin)))
-    yield _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
+    yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
     yield from _optional(skin)
     yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
 
@@ -56,7 +57,7 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
     if skin.units:
         timeline, cycles = options.thresholds(skin, 240)
         yield Stimulus("more thresholds", timeline, cycles)
-    yield _noisy(skin, 300)
+    yield from _noisy(skin, 300)
     yield _crowded(skin, 300)
     yield _meeting(skin, 200)
     yield _frames(skin, "frames", _various_frames(skin))
@@ -93,11 +94,13 @@ def _optional(skin: Skin) -> Iterator[Stimulus]:
             yield Stimulus("joined lines", timeline, cycles, shorts=shorts)
 
 
-def _noisy(skin: Skin, scans: int) -> Stimulus:
+def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
     """Requests, and between them what is none: a low level of up to half a bit, or until after the stop bit's middle.
 
-    Most come so far apart that what each does is seen.
+    Most come so far apart that what each does is seen. A board that takes pulses for bits would take these for some.
     """
+    if uart.pulsed(facts(skin).bit_clocks):
+        return
     rng = np.random.default_rng(17)
     known = facts(skin)
     bit, cycles = known.bit_clocks, scans * known.scan_clocks
@@ -113,7 +116,7 @@ def _noisy(skin: Skin, scans: int) -> Stimulus:
             noise.append((start, longest if kind == "break" else int(rng.integers(1, bit // 2 + 1))))
         start += 11 * bit + int(rng.integers(2 * bit)) + int(rng.choice([0, 2, 15])) * known.scan_clocks
     pieces = covering.stimulus(skin, cycles, 19).pieces
-    return Stimulus("noise", Timeline(pieces, requests(asked, bit)), cycles, noise)
+    yield Stimulus("noise", Timeline(pieces, requests(asked, bit)), cycles, noise)
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
