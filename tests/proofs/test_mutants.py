@@ -123,6 +123,13 @@ def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     assert any(proved[len(told) :])
 
 
+@pytest.mark.campaign
+def test_a_design_whose_memories_are_no_powers_of_two_deep_can_be_asked_about():
+    skin, stages = OPTIONS["5x5, closed, serial"]
+    mutant = next(one for one in netlist.candidates(skin) if one.stage in stages)
+    assert proof.equivalent(skin, [mutant], limit_s=2) in ([True], [False])
+
+
 def equals(graph, bits, value):
     result = 1
     for place, bit in enumerate(bits):

@@ -29,9 +29,10 @@ from contactfpga_sim.mutants.solve import reached
 QUICK_S, LONG_S = 4, 45
 """How long may be asked with the same registers cut."""
 
+# What lies beyond the last word of a memory reads 0, as in the compiled board.
 _GATES = (
-    "memory_map; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; "
-    "aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
+    "memory_map; setundef -undriven -zero; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; "
+    "opt_merge; opt_clean; aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
 _STORE = "link.store["  # the frames' memory, by far the most registers
 _CLOCKS = ("scan.clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
