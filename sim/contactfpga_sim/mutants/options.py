@@ -79,13 +79,13 @@ def _threshold(skin: Skin, around: list[int], zeros: list[int], rng: np.random.G
     weights = skin.unit_sums[place] if of_sum else [int(place == unit) for unit in range(skin.units)]
     total = abs(sum(weight * (read - zero) for weight, read, zero in zip(weights, around, zeros, strict=True)))
     shift = number_shift(units.sum_bits if of_sum else units.converter.bits)
-    number = min(2**NUMBER_BITS - 1, max(1, (total + int(rng.integers(2))) >> shift))
+    number = min(2**NUMBER_BITS - 1, max(1, (total >> shift) + int(rng.integers(2))))
     return SUM_THRESHOLD if of_sum else THRESHOLD, place, number
 
 
 def _of_bits(most: int, rng: np.random.Generator) -> int:
-    """A number of up to ``most`` bits, each count of them as likely as another."""
-    return int(rng.integers(1 << int(rng.integers(most + 1))))
+    """A number of up to ``most`` bits: any of them, or each count of bits as likely as another."""
+    return int(rng.integers(1 << (most if rng.random() < 0.5 else int(rng.integers(most + 1)))))
 
 
 def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
