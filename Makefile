@@ -159,7 +159,7 @@ soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does an
 	$(PY) -m contactfpga_sim.board.soak $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
-mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (half an hour and more)
+mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]
 	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.mutants.campaign --page docs/mutants.md $(ARGS)
 
 lint: $(VENV)/.stamp-lint ## check style, types and who imports whom

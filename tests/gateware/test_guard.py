@@ -15,7 +15,7 @@ from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.record import Stimulus
 from contactfpga_sim.golden import Timeline, guard, predict, requests
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.scan import checks
+from contactfpga_sim.golden.raster import checks
 from contactfpga_sim.golden.trace import Cuts
 
 TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True}

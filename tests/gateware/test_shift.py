@@ -18,7 +18,7 @@ from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.covering import stimulus
 from contactfpga_sim.golden import Timeline, predict
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.scan import scans
+from contactfpga_sim.golden.raster import scans
 from contactfpga_sim.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, Sheet
 
 LINES = [(1, 1), (2, 2), (8, 1), (9, 1), (9, 2), (17, 1), (17, 2), (17, 3)]

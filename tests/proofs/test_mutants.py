@@ -10,7 +10,8 @@ from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
 from contactfpga_sim.golden import Timeline
 from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
-from contactfpga_sim.mutants.stimuli import SKINS, Stimulus
+from contactfpga_sim.mutants.skins import OPTIONS, SKINS
+from contactfpga_sim.mutants.stimuli import Stimulus
 
 SAMPLE = 60
 
@@ -40,9 +41,51 @@ def test_short_stimuli_kill_most_mutants(sample, record_property):
 
 
 def test_every_stage_of_the_design_has_mutants(sample):
-    assert {mutant.stage for mutant in sample.mutants} == set(netlist.STAGES.values()) - {"debounce"}
-    assert {mutant.stage for mutant in netlist.candidates(SKINS["4x4, debounced"])} == set(netlist.STAGES.values())
-    assert all(mutant.place.partition(":")[2] for mutant in sample.mutants)
+    assert {mutant.stage for mutant in sample.all} == {"scan", "label", "report", "pack", "link", "serial", "top"}
+    skin, drawn = OPTIONS["3x4, reversal, guard, self-test"]
+    found = netlist.candidates(skin)
+    assert {"guard", "self-test", "faults"} <= {mutant.stage for mutant in found} & {*drawn}
+    files = {mutant.place.partition(":")[0] for mutant in found}
+    assert {"link/request.py", "link/alive.py", "scan/reversal_guard.py", "top.py"} <= files
+
+
+@pytest.mark.parametrize(
+    ("line", "stage"),
+    [
+        (r"-cell $flatten\request$134.$175 -port Y -src /hdl/contactfpga_hdl/link/request.py:124", "serial"),
+        (r"-cell $flatten\label.\walk.$130 -port A -src /site-packages/amaranth/lib/memory.py:9", "label"),
+        (r"-cell $auto$ff.cc:337:slice$2260 -port D -src /hdl/contactfpga_hdl/scan/self_test.py:43", "self-test"),
+        (r"-cell $auto$opt_expr.cc:277$1863 -port Y -wire audit$7.counts -wirebit 3", "report"),
+        (r"-cell $auto$simple.cc:194:make_patterns_logic$2090 -port B", None),
+        (r"-cell $auto$ff.cc:337:slice$2260 -port CLK -src /hdl/contactfpga_hdl/scan/self_test.py:43", None),
+    ],
+)
+def test_a_mutant_counts_for_the_stage_of_its_source_else_of_its_module(line, stage):
+    mutant = netlist.parsed(f"mutate -mode inv -module top {line}")
+    assert (mutant and mutant.stage) == stage
+
+
+@pytest.mark.parametrize(
+    ("flags", "written"),
+    [
+        (["--skin", "8x8"], []),
+        (["--group", "options"], ["options"]),
+        ([], ["mutants", "options"]),
+    ],
+)
+def test_a_table_is_written_only_when_all_of_its_skins_were_run(tmp_path, monkeypatch, flags, written):
+    page = tmp_path / "page.md"
+    page.write_text("".join(f"<!-- figures: {name} -->\nold\n<!-- end -->\n" for name in campaign.GROUPS))
+    monkeypatch.setattr(campaign, "_run", lambda names, *_: [[] for _ in names])
+    monkeypatch.setattr("sys.argv", ["campaign", *flags, "--page", str(page)])
+    assert campaign.main() == 0
+    parts = page.read_text().split("<!-- figures: ")[1:]
+    assert [part.split(" ")[0] for part in parts if "old" not in part] == written
+
+
+def test_no_noise_comes_where_pulses_are_bits():
+    noisy = {name: any(one.noise for one in stimuli.quick(SKINS[name])) for name in ("8x8", "4x4, debounced")}
+    assert noisy == {"8x8": True, "4x4, debounced": False}
 
 
 def test_what_only_a_flip_can_reach_has_no_mutants(sample):
@@ -78,6 +121,13 @@ def test_no_mutant_that_was_killed_is_proved_equivalent_and_others_are():
     proved = proof.equivalent(skin, [*told, *left[:6]], limit_s=4)
     assert not any(proved[: len(told)])
     assert any(proved[len(told) :])
+
+
+@pytest.mark.campaign
+def test_a_design_whose_memories_are_no_powers_of_two_deep_can_be_asked_about():
+    skin, stages = OPTIONS["5x5, closed, serial"]
+    mutant = next(one for one in netlist.candidates(skin) if one.stage in stages)
+    assert proof.equivalent(skin, [mutant], limit_s=2) in ([True], [False])
 
 
 def equals(graph, bits, value):

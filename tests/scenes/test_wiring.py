@@ -1,9 +1,11 @@
 """The wiring of a faulty sheet against nodal analysis and the circuit model; slow columns against the closed form."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
+from reversal import FAST
 
 from contactfpga.circuit import Circuit, phases
 from contactfpga.circuit.network import Network
@@ -11,7 +13,7 @@ from contactfpga.circuit.phases import Levels
 from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.sheet.levels import at_rest
-from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.line import Line, RowLine, lines_of
 from contactfpga_sim.sheet.wiring import Wiring
 
 SIZE = 3
@@ -167,3 +169,59 @@ def test_more_pressed_switches_make_a_row_slower():
     assert len(line.press_s) == len(line.pulled) == 9
     assert line.press_s[8] > 1.5 * line.press_s[1]
     assert line.pulled[8] < line.pulled[1]
+
+
+AT_ONCE = Line((1e-12,) * (FAST.columns + 1), (1.0,) * (FAST.columns + 1), 1e-12, 0.5)
+
+
+@pytest.mark.parametrize(("rise_clocks", "lifted"), [(0.01, 0.9), (40.0, 0.9), (300.0, 0.7), (1.0, 0.49)])
+def test_a_row_that_is_let_go_rises_as_the_closed_form_says(rise_clocks, lifted):
+    """The contact pin rises later by the clocks for which the row is below the threshold, or never."""
+    clock_s, start = 1 / FAST.clock_hz, 20_000
+    cells = np.zeros((FAST.rows, FAST.columns), bool)
+    cells[5, 3] = True
+
+    def rises(line):
+        with CompiledBoard(FAST, capture=("contact",)) as board:
+            board.settle(AT_ONCE, line)
+            board.run(start)
+            board.press(cells)
+            board.run(4_000)
+            return [int(cycle) - start for cycle in board.take("contact")["cycle"]]
+
+    def line(clocks, share):
+        count = FAST.column_lines + 1
+        return RowLine((clocks * clock_s,) * count, (share,) * count, clock_s, 0.5)
+
+    (at_once,) = rises(line(0.001, 1.0))
+    below = math.floor(-math.log(1 - 0.5 / lifted) * rise_clocks) if lifted > 0.5 else None
+    assert rises(line(rise_clocks, lifted)) == ([] if below is None else [at_once + below])
+
+
+def test_a_row_rises_and_falls_when_its_circuit_does():
+    """A switch lifts its row, among eight, and a row that nobody touches comes down: the times of the whole sheet."""
+    circuit, touched = Circuit(switch_ohm=3000.0, line_pf=60.0), np.zeros((8, 8), bool)
+    touched[2, 5] = True
+    levels = Levels.of(circuit)
+    line = RowLine.of(circuit, 8)
+    up = -line.rise_s[1] * math.log(1 - line.threshold / line.lifted[1])
+    down = line.fall_s * math.log(1 / line.threshold)
+    whole = phases.project_rows(Network(circuit, touched), levels, lifted=True)
+    found = phases.passed(whole)
+    risen = whole.arrived(found.trace.seconds, found.trace.volts)[8 + 2]
+    assert up == pytest.approx(risen, rel=0.1)
+    empty = phases.passed(phases.project_rows(Network(circuit, np.zeros((8, 8), bool)), levels)).seconds
+    assert down == pytest.approx(empty, rel=0.15)
+    assert line.lifted[1] < line.lifted[8]
+    with pytest.raises(ValueError, match="a line for 8 columns; the sheet has 16"), CompiledBoard(FAST) as board:
+        board.settle(AT_ONCE, line)
+
+
+@pytest.mark.parametrize("guard", [False, True])
+@pytest.mark.parametrize("scan", ["raster", "reversal"])
+def test_the_lines_of_a_sheet_have_its_guard_lines(guard, scan):
+    skin = FAST.replace(scan=scan, guard=guard, settle_us=5.0)
+    columns, rows = lines_of(Circuit(), skin)
+    assert len(columns.press_s) == FAST.columns + guard + 1
+    assert (rows is None) == (scan == "raster")
+    assert rows is None or len(rows.rise_s) == FAST.columns + guard + 1

@@ -48,8 +48,14 @@ BREAKS = {
     ("settle", "40 kΩ pull-up, the same"): (68, 100),
     ("settle", "40 kΩ, lines of 2 kΩ, `release_us = 40`"): (316, 464),
     ("settle", "the same with guard lines"): (215, 316),
+    ("settle_reversal", "4.7 kΩ pull-up"): (1000, 1468),
+    ("settle_reversal", "the same with guard lines"): (681, 1000),
+    ("project_reversal", "rows pulled by 10 kΩ"): (10, 15),
+    ("project_reversal", "the same with guard lines"): (10, 15),
     ("diodes", "three fingers at corners"): (0, 1),
     ("diodes", "the same with guard lines"): (0, 1),
+    ("diodes_reversal", "three fingers at corners"): (0, 1),
+    ("diodes_reversal", "the same with guard lines"): (0, 1),
     ("ghost", "zones"): (2, 3),
     ("ghosts", "zones, random places"): (1, 2),
     ("ghosts", "cells, random places"): (1, 2),
@@ -84,6 +90,9 @@ TOLD = {
     ("settle", "4.7 kΩ pull-up, `release_us = 1`"): {"stuck"},
     ("settle", "40 kΩ pull-up, the same"): {"stuck"},
     ("settle", "the same with guard lines"): {"row N open", "guard row open", "guard column open"},
+    ("settle_reversal", "4.7 kΩ pull-up"): {"motion"},
+    ("settle_reversal", "the same with guard lines"): {"motion", "guard row open"},
+    ("project_reversal", "the same with guard lines"): {"guard row open", "guard column open"},
     ("broken", "row, with guard lines"): {"row N open"},
     ("broken", "column, with guard lines"): {"column N open"},
     ("broken_reversal", "row, with guard lines"): {"row N open"},
@@ -105,6 +114,7 @@ TOLD = {
 NOT_NOTICED = {
     ("silence", "`latest()`"): (6, 1000),
     ("diodes", "the same with guard lines"): (1, 2),
+    ("diodes_reversal", "the same with guard lines"): (1, 2),
     ("ghosts", "zones, random places"): (8, 8),
     ("clock", "board with `clock_hz` off"): (0.3, 1),
 }
@@ -267,6 +277,17 @@ def test_a_switch_is_missed_where_the_column_stays_above_vil(turn):
     rest = 0.2 + path * (3.3 - 0.5) / 40_000
     missed = 5e-6 / (1e-12 * path * math.log((3.3 - rest) / (0.8 - rest))) - OTHERS_PF
     assert between(turn("settle", "40 kΩ, lines of 2 kΩ, `release_us = 40`"), missed)
+
+
+@pytest.mark.campaign
+def test_a_row_is_missed_where_its_switches_do_not_lift_it_to_vih(turn):
+    """A finger closes two of a row, the guard column one: drop of the diode 0.25 to 0.35 V, pull of the row 10 kOhm."""
+    most = [(3.3 - drop - 2.0) / 2.0 * 10 for drop in (0.35, 0.25)]
+    found = turn("project_reversal", "the same with guard lines")
+    assert found.holds_until <= 2 * most[1]
+    assert found.breaks_at >= 2 * most[0]
+    assert found.warns_at >= most[0]
+    assert found.values[found.values.index(found.warns_at) - 1] <= most[1]
 
 
 @pytest.mark.campaign

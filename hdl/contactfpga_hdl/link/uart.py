@@ -49,6 +49,9 @@ its byte ``index``. After the last one ``good`` or ``bad`` is high for a clock."
 class Receiver(wiring.Component):
     """Line level in, bits out, each taken in its middle; ``good`` and ``bad`` in that of the stop bit.
 
+    Bit n, the lowest is 1 and the stop bit 9, is taken ``2 + bit_clocks // 2 + n * bit_clocks`` clocks after the pin
+    fell. A start bit that is over in its middle is none.
+
     pin (in): the line; it passes two synchronizer stages.
     bits (out): see :data:`LINE_BITS`.
     """

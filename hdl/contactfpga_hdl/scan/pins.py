@@ -146,7 +146,8 @@ def released_levels(skin: Skin, lines: int) -> int:
 
 
 class DirectRows(wiring.Component):
-    """The pins come from registers, so that no row is selected by a glitch. Nothing needs to be shifted."""
+    """The pins come from registers, so that no row is selected by a glitch; they follow ``drive`` and ``release`` by a
+    clock. Nothing needs to be shifted."""
 
     def __init__(self, skin: Skin):
         self.skin = skin
@@ -168,7 +169,7 @@ class DirectRows(wiring.Component):
 
 
 class DirectColumns(wiring.Component):
-    """Two synchronizer stages."""
+    """Two synchronizer stages: levels are there two clocks after the pins had them."""
 
     def __init__(self, skin: Skin):
         self.skin = skin

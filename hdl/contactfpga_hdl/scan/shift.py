@@ -15,7 +15,8 @@ from contactfpga_hdl.scan.pins import column_reader, of_lines, on_lines, release
 
 
 class RowChain(wiring.Component):
-    """Rows on chains of 74HC595.
+    """Rows on chains of 74HC595. A pattern is in ``Derived.row_shift_clocks`` clocks after ``shift``; the enable pin
+    follows ``drive`` and ``release`` by one.
 
     A pattern goes in whole, highest line of each chain first, while the one before it is driven. What the chips hold at
     power-up, or after a disturbance, is therefore gone with the next pattern. The latch rises once it is in; by then no

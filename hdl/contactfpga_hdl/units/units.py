@@ -13,7 +13,10 @@ from contactfpga_hdl.units.watch import Watch
 
 
 class Units(wiring.Component):
-    """pins: those at the converter.
+    """Sweeps of the converter, a packet for each; ``over`` follows a unit's reading by two clocks, the last sum's by up
+    to seven, the packet's ``due`` as docs/timing.md says.
+
+    pins: those at the converter.
     command, what, value (in): see :class:`~contactfpga_hdl.units.settings.Settings`.
     over, armed (out): see :class:`~contactfpga_hdl.units.watch.Watch`.
     packet (out): see :func:`~contactfpga_hdl.units.pack.packet_signature`.

@@ -14,6 +14,7 @@ from contactfpga.errors import SkinError
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
     from contactfpga.skin.derived import Derived
+    from contactfpga.skin.row_times import RowTimes
 
 Count = Callable[["Derived"], int]
 
@@ -41,7 +42,7 @@ class Scan(Choice):
     """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.sample_at.sample_at_ports`."""
     check: Callable[[Skin], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
-    choice_clocks: Count
+    choice_clocks: Callable[[RowTimes], int]
     """From a strobe until the next rows to drive are known; 0 where they are known beforehand."""
     max_frame_slots: Count
     """The most row times that a frame can take."""
@@ -119,7 +120,7 @@ SCANS: dict[str, Scan] = {
             name="raster",
             title="raster",
             gateware="contactfpga_hdl.scan.raster:Scanner",
-            golden="contactfpga_sim.golden.scan:RASTER",
+            golden="contactfpga_sim.golden.raster:RASTER",
             even=True,
             reads_rows=False,
             waits=False,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.ros.markers import Place
+from contactfpga.surfaces.shapes import Vector
 from contactfpga.tracking.tracks import Tracks
-from contactfpga.zones.zone import Vector, Zone
+from contactfpga.zones.zone import Zone
 
 
 @dataclasses.dataclass(frozen=True)

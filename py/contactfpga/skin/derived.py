@@ -1,24 +1,18 @@
-"""Everything that follows from a Skin: clocks, widths and depths, computed in this one place."""
+"""Everything that follows from a Skin: clocks, widths and depths, computed here and in the classes that it extends."""
 
 from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING
 
-from contactfpga.choices import debounces, labellers, scans
+from contactfpga.choices import debounces, labellers
 from contactfpga.choices.labellers import Labeller
-from contactfpga.choices.scans import Scan
-from contactfpga.skin import rates
+from contactfpga.skin.row_times import RowTimes, whole
 from contactfpga.skin.units import Units
 from contactfpga.skin.widths import CHECK_BYTES as CHECK_BYTES
 from contactfpga.skin.widths import HEARD_BITS as HEARD_BITS
 from contactfpga.skin.widths import SEQUENCE_BITS as SEQUENCE_BITS
 from contactfpga.skin.widths import TIME_BITS as TIME_BITS
-from contactfpga.skin.widths import Widths
-
-if TYPE_CHECKING:
-    from contactfpga.skin import Skin
 
 HELLO_PERIOD_US = 500_000
 """The board says hello this often, so that one can wait for a frame and still come every second."""
@@ -40,22 +34,12 @@ SAMPLE_AT = 2
 """Of another one: sample the columns at another clock of the time for which a row is driven."""
 
 
-class Derived(Widths):
+class Derived(RowTimes):
     """Clocks, widths and depths of a :class:`~contactfpga.Skin`."""
-
-    skin: Skin
-
-    def __init__(self, skin: Skin):
-        super().__init__(skin.sheet)
-        self.skin = skin
 
     @functools.cached_property
     def labeller(self) -> Labeller:
         return labellers.find(self.skin.labeller)
-
-    @functools.cached_property
-    def scan(self) -> Scan:
-        return scans.find(self.skin.scan)
 
     @functools.cached_property
     def debounced(self) -> bool:
@@ -76,84 +60,6 @@ class Derived(Widths):
     # ---- times, in clocks unless named otherwise
 
     @property
-    def clocks_per_us(self) -> int:
-        return self.skin.clock_hz // 1_000_000
-
-    def clocks(self, us: float) -> int:
-        """Clocks that last at least this many microseconds."""
-        return _whole(us * self.clocks_per_us)
-
-    @property
-    def settle_clocks(self) -> int:
-        """How long a row is driven: as asked, until the columns of the slot before and the next row are shifted."""
-        row = 2 if self.scan.waits else self.row_shift_clocks - self.release_clocks
-        return max(self.clocks(self.skin.settle_us), self.column_load_clocks + self.column_shift_clocks, row)
-
-    @property
-    def first_sample_clocks(self) -> int:
-        """The least value of the command "sample at": with shift registers the columns of the slot before are in by
-        then."""
-        return max(2, self.column_load_clocks + self.column_shift_clocks)
-
-    @property
-    def release_clocks(self) -> int:
-        """How long no row is driven: as asked, until the columns are shifted, the next row is latched, or chosen and
-        then shifted."""
-        column = self.column_load_clocks + self.column_shift_clocks
-        row = self.choice_clocks + self.row_shift_clocks if self.choice_clocks else self.row_latch_clocks
-        precharge = self.precharge_clocks + 2 if self.precharge_clocks else 0  # a gap on either side
-        return max(self.clocks(self.skin.release_us), column, row, precharge)
-
-    @property
-    def precharge_clocks(self) -> int:
-        """How long columns are driven at least before a row is; 0: they never are."""
-        return self.clocks(self.skin.precharge_us)
-
-    @property
-    def project_clocks(self) -> int:
-        """How long all columns are driven and rows let go before these are sampled."""
-        return self.clocks(self.skin.project_us)
-
-    @property
-    def row_clocks(self) -> int:
-        return self.settle_clocks + self.release_clocks
-
-    @property
-    def shift_clocks(self) -> int:
-        """A bit on a chain of shift registers; two at least, as its clock has to rise and fall."""
-        return max(2, math.ceil(self.skin.clock_hz / self.skin.shift_hz))
-
-    @property
-    def row_latch_clocks(self) -> int:
-        """The pulse that puts a shifted row pattern on the outputs; 0 with direct rows."""
-        return self.shift_clocks if self.skin.row_drive == "74hc595" else 0
-
-    @property
-    def row_shift_clocks(self) -> int:
-        """From the order to shift a row pattern until it can be driven; 0 with direct rows."""
-        return (self.row_chain_lines + 1) * self.shift_clocks + 1 if self.row_latch_clocks else 0
-
-    @property
-    def column_load_clocks(self) -> int:
-        """The pulse that takes all columns at once, in whose last clock they are sampled; 0 with direct columns."""
-        return self.shift_clocks if self.skin.column_read == "74hc165" else 0
-
-    @property
-    def column_shift_clocks(self) -> int:
-        """How much later than direct ones the columns of a sample are known; 0 with direct columns."""
-        return self.column_chain_lines * self.column_load_clocks
-
-    @property
-    def row_levels(self) -> int:
-        """ceil(log2 rows): how often the rows can be halved until one is left."""
-        return (self.skin.rows - 1).bit_length()
-
-    @property
-    def choice_clocks(self) -> int:
-        """From a strobe until the scan can drive its next rows; 0 where it knows them beforehand."""
-        return self.scan.choice_clocks(self)
-
-    @property
     def max_frame_slots(self) -> int:
         """The most row times that a frame can take."""
         return self.scan.max_frame_slots(self)
@@ -167,20 +73,6 @@ class Derived(Widths):
     def skips(self) -> bool:
         """Rows that were not driven are not handed on, but for an empty one where zones have to end."""
         return self.scan.waits and self.report.zones
-
-    @property
-    def frame_clocks(self) -> int:
-        """One scan period: every row once, a guard row too. Frames of an adaptive scan take fewer or more clocks."""
-        return self.row_clocks * self.skin.row_lines
-
-    @property
-    def bit_clocks(self) -> int:
-        return rates.bit_clocks(self.skin.clock_hz, self.skin.baud)
-
-    @property
-    def pulsed(self) -> bool:
-        """Requests come as pulses: a bit is too short to be sampled."""
-        return rates.pulsed(self.skin.clock_hz, self.skin.baud)
 
     @property
     def min_row_clocks(self) -> int:
@@ -239,12 +131,12 @@ class Derived(Widths):
     @property
     def press_scans(self) -> int:
         """Scan periods that last at least debounce_press_us."""
-        return _whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
+        return whole(self.skin.debounce_press_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def release_scans(self) -> int:
         """Scan periods that last at least debounce_release_us."""
-        return _whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
+        return whole(self.skin.debounce_release_us * self.clocks_per_us / self.frame_clocks)
 
     @property
     def press_ticks(self) -> int:
@@ -258,7 +150,7 @@ class Derived(Widths):
 
     def _debounce_ticks(self, us: float, scans: int) -> int:
         if self.scan.waits:
-            return _whole(us) + 1 if us else 0
+            return whole(us) + 1 if us else 0
         return max(0, (scans - 1) * self.skin.rows + 1)
 
     # ---- widths in bits and sizes in bytes
@@ -288,15 +180,7 @@ class Derived(Widths):
         divided = self.quotient_bits + 1 if self.report.divided else 0
         return max(self.item_bytes, divided)
 
-    # ---- sizes of tables and chains
-
-    @property
-    def row_chain_lines(self) -> int:
-        return math.ceil(self.skin.row_lines / self.skin.row_chains)
-
-    @property
-    def column_chain_lines(self) -> int:
-        return math.ceil(self.skin.column_lines / self.skin.column_chains)
+    # ---- sizes of tables
 
     @functools.cached_property
     def open_zones(self) -> int:
@@ -335,8 +219,3 @@ class Derived(Widths):
         busy = self.open_zones * self.item_clocks
         late = max(0.0, 1 - (2 if self.scan.even else 1) * self.row_clocks / busy)
         return 2 * self.open_zones + math.ceil(2 * self.zone_capacity * late) + 2
-
-
-def _whole(value: float) -> int:
-    """The next whole number upward, not counting what a float's rounding added."""
-    return math.ceil(value - 1e-9)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.converter import check_simulated
-from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.line import Line, RowLine
 from contactfpga_sim.sheet.matrix import Contention
 from contactfpga_sim.sheet.shorts import Shorts
 
@@ -93,22 +93,29 @@ class CompiledBoard:
         self._call("cut", *(end.ctypes.data_as(ctypes.c_void_p) for end in ends))
 
     def join(self, shorts: Shorts | None) -> None:
-        """From the next cycle on these lines are joined and these diodes bridged, and all others whole. Rows at the
-        supply and columns with strong pulls are the slow model's only."""
+        """From the next cycle on these lines are joined and these diodes bridged, and all others whole."""
         self._call("part")
         shorts = shorts or Shorts()
-        for kind, pairs in enumerate((shorts.rows, shorts.columns, shorts.crossed, shorts.bridged)):
+        supplied, pulled = ((row, 0) for row in shorts.supplied), ((0, column) for column in shorts.pulled)
+        kinds = (shorts.rows, shorts.columns, shorts.crossed, shorts.bridged, supplied, pulled)
+        for kind, pairs in enumerate(kinds):
             for one, other in pairs:
                 self._call("join", *map(ctypes.c_uint, (kind, one, other)))
 
-    def settle(self, line: Line) -> None:
-        """From the next cycle on columns take the time that such a line takes, and not none."""
+    def settle(self, line: Line, rows: RowLine | None = None) -> None:
+        """From the next cycle on columns take the time that such a line takes, and not none; so do ``rows`` that are
+        let go."""
+        self._settle("settle", line.press_s, line.pulled, line.release_s, line.threshold)
+        if rows is not None:
+            self._settle("settle_rows", rows.rise_s, rows.lifted, rows.fall_s, rows.threshold)
+
+    def _settle(self, name: str, toward_s: Sequence[float], ends: Sequence[float], back_s: float, at: float) -> None:
+        if len(toward_s) != self.skin.column_lines + 1:
+            raise ValueError(f"a line for {len(toward_s) - 1} columns; the sheet has {self.skin.column_lines}")
         clock_s = 1 / self.skin.clock_hz
-        press, pulled = (np.array(each) for each in ([line.share(tau, clock_s) for tau in line.press_s], line.pulled))
-        if len(press) != self.skin.column_lines + 1:
-            raise ValueError(f"a line for {len(press) - 1} columns; the sheet has {self.skin.column_lines}")
-        arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (press, pulled))
-        self._call("settle", *arrays, *map(ctypes.c_double, (line.share(line.release_s, clock_s), line.threshold)))
+        shares = np.array([Line.share(tau, clock_s) for tau in toward_s])
+        arrays = (each.ctypes.data_as(ctypes.c_void_p) for each in (shares, np.array(ends, float)))
+        self._call(name, *arrays, *map(ctypes.c_double, (Line.share(back_s, clock_s), at)))
 
     def slow(self, rows: Mapping[int, float], columns: Mapping[int, float]) -> None:
         """From the next cycle on, where columns take time (:meth:`settle`), they take longer by these factors: all

@@ -20,7 +20,7 @@ from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
 from contactfpga_sim.scenes.scene import scene as make_scene
-from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.line import lines_of
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -61,7 +61,7 @@ class VirtualBoard:
 
     skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
     function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
-    contacts press, by default none; circuit: the sheet's, by which its columns take time to settle, by default none;
+    contacts press, by default none; circuit: the sheet's, by which its lines take time to settle, by default none;
     slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
     of the simulated time in s that returns what each pressure unit reads, by default half of full scale; or the
     LoadCells that the scene's contacts press on, if it has contacts; look_s: simulated time between two looks at the
@@ -92,7 +92,7 @@ class VirtualBoard:
         """(rows, columns) bool: the switches that are closed since the last :meth:`advance`."""
         self._board = CompiledBoard(self.skin)
         if circuit is not None:
-            self._board.settle(Line.of(circuit, self.skin.rows, self.skin.columns, self.skin.diodes))
+            self._board.settle(*lines_of(circuit, self.skin))
         elif slow_rows or slow_columns:
             raise ValueError("slow_rows and slow_columns are factors of a circuit's times; give the circuit")
         if slow_rows or slow_columns:

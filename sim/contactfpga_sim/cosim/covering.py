@@ -17,7 +17,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga.skin.limits import MIN_AROUND
 from contactfpga.skin.sheet import max_zones
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import request
+from contactfpga_sim.golden.request import command, request
 from contactfpga_sim.golden.trace import Timeline
 
 Pair = tuple[int, int, int, int]
@@ -210,12 +210,12 @@ def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
 def traffic(
     skin: Skin, gaps: Iterable[int], start: int, cycles: int, rng: np.random.Generator
 ) -> list[tuple[int, bytes]]:
-    """What a host sends from ``start`` on, with these gaps after each part: requests, and packets that are none as they
-    are damaged, cut off, of another kind, or any bytes."""
+    """What a host sends from ``start`` on, with these gaps after each part: requests, on a board that takes them
+    commands, and packets that are none as they are damaged, cut off, of another kind, or any bytes."""
     byte = 10 * facts(skin).bit_clocks
     sent = []
     for gap in gaps:
-        data = _packet(rng, facts(skin).bit_clocks)
+        data = _packet(skin, rng)
         if start + len(data) * byte > cycles:
             break
         sent.append((start, data))
@@ -223,8 +223,12 @@ def traffic(
     return sent
 
 
-def _packet(rng: np.random.Generator, bit_clocks: int) -> bytes:
-    data = bytearray(request(int(rng.integers(1, 1 << 21)), bool(rng.random() < 0.5), bit_clocks))
+def _packet(skin: Skin, rng: np.random.Generator) -> bytes:
+    number, hello = int(rng.integers(1, 1 << 21)), bool(rng.random() < 0.5)
+    data = bytearray(request(number, hello, facts(skin).bit_clocks))
+    if facts(skin).commands and rng.random() < 0.7:
+        hello = bool(rng.random() < 0.1)  # each takes the line from what commands bring about
+        data = bytearray(command(number, *_order(skin, rng), hello, facts(skin).bit_clocks))
     match rng.choice(["whole", "flip", "cut", "kind", "bytes"], p=[0.6, 0.15, 0.1, 0.05, 0.1]):
         case "flip":
             data[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
@@ -235,3 +239,11 @@ def _packet(rng: np.random.Generator, bit_clocks: int) -> bytes:
         case "bytes":
             data = bytearray(rng.choice([0, 5, 0x51, 0x81, 0xFF], size=int(rng.integers(1, 13))).astype(np.uint8))
     return bytes(data)
+
+
+def _order(skin: Skin, rng: np.random.Generator) -> tuple[int, int]:
+    """Number and value of a command: mostly one that the board takes, with a value that changes something."""
+    what = rng.choice(np.array([*facts(skin).commands, rng.integers(128)]))
+    number = rng.choice(np.array([0, 1, rng.integers(1 << 12), rng.integers(1 << 18)]))
+    clock, of_place = rng.integers(facts(skin).settle + 3), rng.integers(8) | number << 3
+    return int(what), int(rng.choice(np.array([of_place, clock, rng.integers(1 << 21)])))

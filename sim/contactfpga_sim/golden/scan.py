@@ -1,19 +1,16 @@
-"""Scanner: which cells are sampled when, the contact pin, stuck columns, device time and requests."""
+"""What every scan is given, what it hands to the stages after it, and what it leaves at the pins."""
 
 from __future__ import annotations
 
 import abc
 import bisect
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
-from contactfpga_sim.golden import guard
-from contactfpga_sim.golden.debounce import debounced
 from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.guard import Told, closed, stuck
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.trace import Timeline
 
@@ -139,57 +136,6 @@ class ScanRule(abc.ABC):
         """The frames of all its cycles, or more; each is handed to its stages."""
 
 
-class Raster(ScanRule):
-    """Row after row, each for the same time."""
-
-    even = True
-    waits = False
-
-    def choice(self, facts: Facts) -> int:
-        return 0
-
-    def frame_slots(self, facts: Facts) -> int:
-        return facts.row_lines
-
-    def scan(self, play: Play) -> Scanned:
-        facts, frames = play.facts, play.cycles // play.facts.scan_clocks + 1
-        scanned = scans(facts, play.timeline, play.requests, frames)
-        counted = debounced(
-            np.array([one.cells for one in scanned]), facts.skin.debounce, facts.press_scans, facts.release_scans
-        )
-        told = checks(facts, play.timeline, frames, play.requests)
-        for change in (change for frame in told for change in frame):
-            play.stages.tell(*change)
-        for one, cells, changes in zip(scanned, counted, told, strict=True):
-            play.stages.frame(dataclasses.replace(one, faults=changes[-1][1] if changes else 0), cells)
-        driven = []
-        for slot in range(frames * facts.row_lines):
-            start = facts.row_shift + slot * facts.row_clocks
-            driven += [(start, 1 << _line(facts, slot)), (start + facts.settle, 0)]
-        beginnings = [facts.row_shift + number * facts.scan_clocks for number in range(frames + 1)]
-        return Scanned(contact(facts, scanned), driven, beginnings)
-
-
-RASTER = Raster()
-
-
-def strobe(facts: Facts, slot: int) -> int:
-    """The cycle in which the sample of a row slot has come through shift registers and synchronizers."""
-    return sampled(facts, slot) + 2 + facts.column_shift
-
-
-def sampled(facts: Facts, slot: int) -> int:
-    """The cycle whose column levels count for the row of a slot."""
-    return facts.row_shift + slot * facts.row_clocks + facts.settle - 1
-
-
-def _asked_before(facts: Facts, slot: int) -> int:
-    """The cycle from which on a request comes too late for a frame that begins with this slot."""
-    if facts.samples_early:
-        return facts.row_shift + slot * facts.row_clocks
-    return sampled(facts, slot) - facts.load if facts.load else strobe(facts, slot)
-
-
 def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
     """By how many clocks the samples of a frame come before the end of the settle time: it takes the commands over that
     were received before cycle ``late``."""
@@ -198,121 +144,7 @@ def early_clocks(facts: Facts, requests: Sequence[Request], late: int) -> int:
     return facts.settle - moved[-1] if fits else 0
 
 
-def scans(facts: Facts, timeline: Timeline, requests: Sequence[Request], count: int) -> list[Scan]:
-    """The first ``count`` scans, with the requests in the order in which they were received."""
-    result = []
-    for index in range(count):
-        slots = row_slots(facts, index)
-        begin = strobe(facts, slots[0])
-        late = _asked_before(facts, slots[0])
-        early = _asked_before(facts, slots[0] - facts.row_lines) if index else 0
-        ahead = early_clocks(facts, requests, late)
-        result.append(
-            Scan(
-                cells=np.array([_read(facts, timeline, slot, ahead)[: facts.columns] for slot in slots]) & ~facts.mask,
-                offered=[strobe(facts, slot) + 1 for slot in slots],
-                stuck=int(np.sum((_stuck(facts, timeline, index)[: facts.columns]) & ~facts.mask.all(axis=0))),
-                time_us=(begin - facts.column_shift) // facts.clocks_per_us,
-                requested=any(early <= request.cycle < late for request in requests),
-                heard=last_number(requests, late) % 8,
-                told=strobe(facts, slots[-1]) + 2,
-                slots=facts.row_lines,
-                alone=frozenset(range(facts.rows)),
-            )
-        )
-    return result
-
-
 def last_number(requests: Sequence[Request], cycle: int) -> int:
     """Of the last request that was received before ``cycle``; 0 if there was none."""
     index = bisect.bisect_left(requests, cycle, key=lambda request: request.cycle)
     return requests[index - 1].number if index else 0
-
-
-def contact(facts: Facts, scanned: Iterable[Scan]) -> list[tuple[int, int]]:
-    """(cycle, level) of every change of the contact pin."""
-    changes = []
-    level = 0
-    for scan in scanned:
-        for row, cycle in enumerate(scan.offered):
-            last = row == facts.rows - 1
-            if scan.cells[row].any():
-                new = 1
-            elif last and not scan.cells.any():
-                new = 0
-            else:
-                new = level
-            if new != level:
-                changes.append((cycle, new))
-            level = new
-    return changes
-
-
-def row_slots(facts: Facts, frame: int) -> range:
-    """The slots of a frame's rows; a guard row has the one before them."""
-    end = (frame + 1) * facts.row_lines
-    return range(end - facts.rows, end)
-
-
-def _row(facts: Facts, slot: int) -> int:
-    """The row of a slot, counting a guard row as the last one."""
-    return (slot - (facts.row_lines - facts.rows)) % facts.row_lines
-
-
-def _line(facts: Facts, slot: int) -> int:
-    """The line that is driven in a slot."""
-    return (*(facts.skin.row_order or range(facts.rows)), facts.rows)[_row(facts, slot)]
-
-
-def _read(facts: Facts, timeline: Timeline, slot: int, ahead: int = 0) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed in a slot, sampled some clocks ahead of the settle time's end."""
-    cycle = sampled(facts, slot) - ahead
-    return np.asarray(closed(facts, timeline, cycle)[_row(facts, slot)] | stuck(facts, timeline, cycle))
-
-
-def _stuck(facts: Facts, timeline: Timeline, frame: int) -> np.ndarray:
-    """(column lines,) bool: columns that read pressed while no row was driven, from the sample before the frame's first
-    slot to the one before its last."""
-    columns = np.zeros(facts.column_lines, bool)
-    for slot in range(max(0, frame * facts.row_lines), (frame + 1) * facts.row_lines):
-        if slot:
-            columns |= stuck(facts, timeline, facts.row_shift + slot * facts.row_clocks - 1)
-    return columns
-
-
-def checks(facts: Facts, timeline: Timeline, count: int, requests: Sequence[Request] = ()) -> list[Changes]:
-    """By frame what is told of faulty lines: (cycle, word) of each check, the last one at the frame's end. Rows are not
-    checked in a frame that is sampled early."""
-    if not facts.skin.guard:
-        return [[]] * count
-    told, result = Told(facts), []
-    for frame in range(count):
-        changes, renews = [], _renews(facts, frame)
-        slots = row_slots(facts, frame)
-        ahead = early_clocks(facts, requests, _asked_before(facts, slots[0]))
-        told.check("columns", ~_read(facts, timeline, slots[0] - 1)[: facts.columns], renews)
-        changes.append((strobe(facts, slots[0] - 1) + 1, told.word))
-        for row, slot in enumerate(slots):
-            whole = _read(facts, timeline, slot)[-1]
-            if not ahead:
-                told.check("rows", np.full(facts.rows, not whole), renews, row)
-            if slot == slots[-1]:
-                told.check("stuck", _stuck(facts, timeline, frame), renews)
-            changes.append((strobe(facts, slot) + 1, told.word))
-        result.append(changes)
-    return result
-
-
-def _renews(facts: Facts, frame: int) -> bool:
-    """Whether a frame's checks end what is told no more: the clock in us passed a multiple of 2^16 in the frame before,
-    which ends with its last row's strobe."""
-    late = facts.column_shift + (facts.rows - 1) * facts.row_clocks
-
-    def turns(ended: int) -> int:
-        return (
-            0
-            if ended < 0
-            else (strobe(facts, row_slots(facts, ended)[-1]) - late) // (guard.RETRY_US * facts.clocks_per_us)
-        )
-
-    return turns(frame - 1) != turns(frame - 2)

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
+import itertools
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -18,8 +20,10 @@ from contactfpga.console import interrupt, numbers
 from contactfpga.skin import Skin
 from contactfpga_sim.mutants import netlist, proof, trial
 from contactfpga_sim.mutants.netlist import STAGES, Mutant
-from contactfpga_sim.mutants.stimuli import SKINS, Stimulus, quick, thorough, until_time_wraps
+from contactfpga_sim.mutants.skins import OPTIONS, SKINS
+from contactfpga_sim.mutants.stimuli import Stimulus, quick, thorough, until_time_wraps
 from contactfpga_sim.pages import writer
+from contactfpga_sim.studies import kept
 
 BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
@@ -29,6 +33,10 @@ CHECKED = 2
 
 
 EACH = numbers.whole(1, 1_000_000, "mutants")
+PROOF_S = numbers.whole(1, 3600, "seconds")
+
+GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS}
+"""Skins by the table of the page that they fill."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,14 +59,17 @@ def left_by(skin: Skin, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) 
     return left
 
 
-def examine(name: str, count: int, seed: int, say: Callable[[str], None] = lambda _: None) -> list[Result]:
-    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`.
+def examine(
+    name: str, count: int, seed: int, long_s: int = proof.LONG_S, say: Callable[[str], None] = lambda _: None
+) -> list[Result]:
+    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`, or of the stages that go with it in
+    :data:`OPTIONS`; ``long_s`` are the seconds of a longer proof.
 
     Raises :class:`contactfpga_sim.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
     """
-    skin = SKINS[name]
+    skin, stages = OPTIONS[name] if name in OPTIONS else (SKINS[name], tuple(STAGES))
     say("draw")
-    drawn = netlist.draw(netlist.candidates(skin), count, seed)
+    drawn = netlist.draw([mutant for mutant in netlist.candidates(skin) if mutant.stage in stages], count, seed)
     say(f"{len(drawn)} mutants, short stimuli")
     left = left_by(skin, drawn, quick(skin))
     say(f"{len(left)} left, proofs")
@@ -68,9 +79,10 @@ def examine(name: str, count: int, seed: int, say: Callable[[str], None] = lambd
         raise proof.ProofFailed(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
     left = [mutant for mutant in left if mutant not in proved]
     say(f"{len(left)} left, long stimuli")
-    left = left_by(skin, left, [*thorough(skin), until_time_wraps(skin)])
+    longest = [until_time_wraps(skin)] if name in SKINS else []  # minutes in the golden model of an option
+    left = left_by(skin, left, [*thorough(skin), *longest])
     say(f"{len(left)} left, longer proofs")
-    proved |= _proved(skin, left, proof.LONG_S)
+    proved |= _proved(skin, left, long_s)
     alive = {*left} - proved
     say(f"{len(alive)} alive")
     fates = (
@@ -86,7 +98,8 @@ def _proved(skin: Skin, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
 def table(results: Sequence[Result]) -> str:
     """Counts by stage, as Markdown; the share is that of the mutants not proved equivalent."""
     rows = [["stage", "mutants", "killed", "equivalent, proved", "alive", "killed of the rest"]]
-    for stage in [*dict.fromkeys(STAGES.values()), "all"]:
+    drawn = {result.mutant.stage for result in results}
+    for stage in [*(stage for stage in STAGES if stage in drawn), "all"]:
         fates = [result.fate for result in results if stage in ("all", result.mutant.stage)]
         killed, equivalent, alive = (fates.count(fate) for fate in ("killed", "equivalent", "alive"))
         share = f"{100 * killed / (killed + alive):.1f} %" if killed + alive else ""
@@ -101,24 +114,33 @@ def listed(results: Iterable[Result]) -> str:
 
 
 def main() -> int:
-    """Run the campaign; with a page named, write the table into it."""
+    """Run the campaign; with a page named, write into it the tables of those groups of Skins that were run whole."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=EACH, default=40, help="mutants of each Skin (default %(default)s)")
     parser.add_argument("--seed", type=numbers.SEED, default=0, help="for the choice of mutants (default %(default)s)")
-    parser.add_argument("--skin", action="append", choices=SKINS, help="only this Skin; can be repeated")
+    parser.add_argument("--group", action="append", choices=GROUPS, help="only these Skins; can be repeated")
+    parser.add_argument("--skin", action="append", choices=[*SKINS, *OPTIONS], help="only this Skin; can be repeated")
+    parser.add_argument("--proof-s", type=PROOF_S, default=proof.LONG_S, help="of a longer proof (default %(default)s)")
     parser.add_argument("--jobs", type=numbers.JOBS, default=2, help="Skins at once (default %(default)s)")
-    parser.add_argument("--page", type=Path, help="write the table into this page")
+    parser.add_argument("--page", type=Path, help="write the tables into this page")
     args = parser.parse_args()
     page = writer.page(args.page, "--page") if args.page else None
-    results = _run(args.skin or list(SKINS), args.each, args.seed, args.jobs)
+    names = args.skin or [name for group in args.group or GROUPS for name in GROUPS[group]]
+    found = dict(zip(names, _run(names, args.each, args.seed, args.proof_s, args.jobs), strict=True))
+    results = list(itertools.chain(*found.values()))
     print(f"{listed(results)}\n\n{table(results)}")
-    if page:
-        writer.write(page, {"mutants": lambda: table(results)})
+    whole = {
+        group: functools.partial(table, list(itertools.chain(*(found[name] for name in members))))
+        for group, members in GROUPS.items()
+        if found.keys() >= members.keys()
+    }
+    if page and whole:
+        writer.write(page, whole)
         print(f"wrote {page}")
     return 0
 
 
-def _run(names: Sequence[str], each: int, seed: int, jobs: int) -> list[Result]:
+def _run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> list[list[Result]]:
     """All Skins, with a bar of progress for each, or where stderr is no terminal with a line for each step."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -139,9 +161,19 @@ def _run(names: Sequence[str], each: int, seed: int, jobs: int) -> list[Result]:
                 if not live:
                     print(f"{time.monotonic() - started:5.0f} s  {name}: {step}", file=sys.stderr, flush=True)
 
-            return examine(name, each, seed, say)
+            return _kept(name, each, seed, long_s, say)
 
-        return [result for results in pool.map(one, names) for result in results]
+        return list(pool.map(one, names))
+
+
+def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
+    """As :func:`examine`, or what it found before with the same code."""
+    skin = OPTIONS[name][0] if name in OPTIONS else SKINS[name]
+    key = f"{name}, {each} of {seed}, {long_s} s, {kept.sources(skin)}"
+    found = kept.kept(
+        "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]
+    )
+    return [Result(one["skin"], Mutant(**one["mutant"]), one["fate"]) for one in found]
 
 
 if __name__ == "__main__":

@@ -13,20 +13,45 @@ from contactfpga.skin import Skin
 from contactfpga_sim.board import compiled, native
 
 STAGES = {
-    "scan": "scan",
-    "debounce": "debounce",
-    "label": "label",
-    "audit": "report",
-    "bitmap": "report",
-    "backlog": "report",
-    "divide": "report",
-    "packer": "pack",
-    "link": "link",
-    "transmitter": "serial",
-    "receiver": "serial",
-    "request": "serial",
+    "scan": ("scan",),
+    "guard": ("scan",),
+    "self-test": ("scan",),
+    "debounce": ("debounce",),
+    "label": ("label",),
+    "closed": ("label",),
+    "report": ("audit", "bitmap", "backlog", "divide"),
+    "pack": ("packer",),
+    "units": ("units",),
+    "link": ("link",),
+    "faults": ("link", "alive"),
+    "serial": ("transmitter", "receiver", "request"),
+    "top": (),
 }
-"""Modules of the design, as Top names them, and the stage they count for."""
+"""Stages, and the modules of the design, as Top names them, that hold their registers."""
+
+# Longest first: a file before its room. What several stages use is of the stage whose module holds it.
+_FILES = {
+    "scan/guard.py": "guard",
+    "scan/reversal_guard.py": "guard",
+    "scan/self_test.py": "self-test",
+    "label/serial_turns.py": "closed",
+    "label/turns.py": "closed",
+    "label/unwrap.py": "closed",
+    "link/faults.py": "faults",
+    "link/alive.py": "faults",
+    "link/pack.py": "pack",
+    "link/pulses.py": "serial",
+    "link/request.py": "serial",
+    "link/uart.py": "serial",
+    "scan/": "scan",
+    "debounce/": "debounce",
+    "label/": "label",
+    "report/": "report",
+    "units/": "units",
+    "link/": "link",
+    "top.py": "top",
+}
+_MODULES = {module: stage for stage, modules in reversed(STAGES.items()) for module in modules}
 
 # No test drives the reset: registers start from their initial values. Nor is there a restart without a flip: that none
 # is asked for is proved. What does nothing is dropped, as a mutant of it would be none. Memories stay whole: what is in
@@ -63,7 +88,7 @@ def candidates(skin: Skin) -> list[Mutant]:
         commands = ("read_rtlil model.il", native.FLATTEN, PREPARE, f"mutate -list {_ALL} -o list.txt")
         native.yosys("; ".join(commands), folder)
         lines = (folder / "list.txt").read_text().splitlines()
-    return [mutant for line in lines if (mutant := _parsed(line))]
+    return [mutant for line in lines if (mutant := parsed(line))]
 
 
 def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
@@ -90,25 +115,34 @@ def switches(mutants: Sequence[Mutant]) -> list[str]:
     return [f"mutate -ctrl mutant {_SELECT_BITS} {n} {mutant.change}" for n, mutant in enumerate(mutants, 1)]
 
 
-def _parsed(line: str) -> Mutant | None:
+def parsed(line: str) -> Mutant | None:
     """A line of Yosys' list, None for a mutant that is left out."""
     options = re.findall(r"-(\w+) (\S+)", line)
     values = dict(options)
-    if values["port"] in _LEFT_OUT or (stage := _stage(values["cell"])) is None:
+    if values["port"] in _LEFT_OUT:
         return None
     places = [value for name, value in options if name == "src"]
     own = [place for place in places if "contactfpga_hdl/" in place] or places or ["unknown"]
+    place = re.sub(r".*(contactfpga_hdl|site-packages)/", "", own[-1])
+    stage = _stage(place, values["cell"], values.get("wire", ""))
+    if stage is None:
+        return None
     change = " ".join(f"-{name} {value}" for name, value in options if name not in ("wire", "wirebit", "src"))
-    return Mutant(stage, re.sub(r".*(contactfpga_hdl|site-packages)/", "", own[-1]), change)
+    return Mutant(stage, place, change)
 
 
-def _stage(cell: str) -> str | None:
-    """The stage of a cell by its path in the flattened design; None for one that is in no stage."""
-    path = cell.removeprefix("$flatten").replace("\\", "")
-    for module in sorted(STAGES, key=len, reverse=True):
-        if path.startswith(f"{module}."):
-            return STAGES[module]
-    return None
+def _stage(place: str, *names: str) -> str | None:
+    """The stage of a source place, else of the cell or wire of these names; None where nothing of it tells one."""
+    for file, stage in _FILES.items():
+        if place.startswith(file):
+            return stage
+    return next((_MODULES[module] for name in names if (module := module_of(name)) in _MODULES), None)
+
+
+def module_of(name: str) -> str:
+    """The module of Top that holds this cell, wire or register of the flattened design. Where a signal of Top has its
+    name, a number follows it."""
+    return re.sub(r"\$\d+$", "", name.removeprefix("$flatten").replace("\\", "").partition(".")[0])
 
 
 def _with_places(rtlil: str) -> str:

@@ -23,15 +23,16 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga_sim.board import compiled, native
 from contactfpga_sim.mutants import aig
-from contactfpga_sim.mutants.netlist import PREPARE, Mutant, switches
+from contactfpga_sim.mutants.netlist import PREPARE, STAGES, Mutant, module_of, switches
 from contactfpga_sim.mutants.solve import reached
 
 QUICK_S, LONG_S = 4, 45
 """How long may be asked with the same registers cut."""
 
+# What lies beyond the last word of a memory reads 0, as in the compiled board.
 _GATES = (
-    "memory_map; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; opt_merge; opt_clean; "
-    "aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
+    "memory_map; setundef -undriven -zero; opt_expr; opt_merge; opt_clean; techmap; dffunmap; simplemap; opt_expr; "
+    "opt_merge; opt_clean; aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
 _STORE = "link.store["  # the frames' memory, by far the most registers
 _CLOCKS = ("scan.clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
@@ -79,8 +80,7 @@ class Prover:
     def _cuts(self, mutant: Mutant) -> Iterator[frozenset[int]]:
         """Sets of registers that may hold anything, the largest first."""
         every, store = frozenset(range(len(self._latches))), self._named(_STORE)
-        part = re.findall(r"-cell (?:\$flatten)?\\?(\w+)\.", mutant.change)[0]
-        inside = self._named(f"{part}.", "?") - store
+        inside = self._inside(STAGES[mutant.stage]) - store
         yield every - inside
         yield every - inside - (self._named("scan.") - self._named(*_CLOCKS))
         yield store
@@ -137,6 +137,11 @@ class Prover:
             values = self._graph.values({**state, **inputs}, takes.values())
             state = {node: _value(values, literal) for node, literal in takes.items()}
         return self._graph.values({**state, **path[-1]}, roots)
+
+    def _inside(self, modules: Collection[str]) -> frozenset[int]:
+        """Registers of these modules, and those without a name."""
+        names = enumerate(self._circuit.latches)
+        return self._named("?") | {index for index, some in names if any(module_of(name) in modules for name in some)}
 
     def _named(self, *prefixes: str) -> frozenset[int]:
         names = enumerate(self._circuit.latches)

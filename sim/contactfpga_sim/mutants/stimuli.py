@@ -1,4 +1,4 @@
-"""Skins in which every option's logic exists, and what is done to their boards."""
+"""What is done to the boards of mutants."""
 
 from __future__ import annotations
 
@@ -10,150 +10,17 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.cosim import covering
+from contactfpga_sim.golden import uart
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.hello import hello
 from contactfpga_sim.golden.request import requests
 from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.mutants import options
 from contactfpga_sim.scenes import shapes
-
-# Slow clocks bring what comes once in half a second within reach.
-SKINS = {
-    "8x8": Skin(rows=8, columns=8, clock_hz=1_000_000, baud=250_000, settle_us=30.0),
-    "8x8, 4-connectivity": Skin(
-        rows=8,
-        columns=8,
-        connectivity=4,
-        diodes="row2col",
-        mask=((0, 0), (7, 7), *((row, 3) for row in range(8))),
-        zone_capacity=5,
-        clock_hz=2_000_000,
-        baud=250_000,
-        settle_us=20.5,
-        release_us=1.5,
-    ),
-    "4x4, debounced": Skin(
-        rows=4,
-        columns=4,
-        debounce="sym_defer_pk",
-        debounce_press_us=250.0,
-        debounce_release_us=150.0,
-        send="on_change",
-        keep_alive_ms=0.7,
-        clock_hz=1_000_000,
-        baud=500_000,
-        settle_us=20.0,
-        release_us=2.0,
-    ),
-    "5x6, eager, 4-connectivity": Skin(
-        rows=5,
-        columns=6,
-        connectivity=4,
-        debounce="asym_eager_defer_pk",
-        debounce_press_us=400.0,
-        debounce_release_us=200.0,
-        mask=((2, 1), (4, 5)),
-        zone_capacity=1,
-        clock_hz=1_000_000,
-        baud=500_000,
-        settle_us=28.0,
-    ),
-    "5x9, cells": Skin(
-        rows=5,
-        columns=9,
-        diodes="row2col",
-        report="cells",
-        send="on_change",
-        keep_alive_ms=1.0,
-        mask=((1, 1),),
-        clock_hz=1_000_000,
-        baud=500_000,
-        settle_us=14.0,
-        release_us=3.0,
-    ),
-    "4x4, fast": Skin(rows=4, columns=4, clock_hz=1_000_000, baud=250_000, settle_us=10.0, release_us=1.0),
-    "64x32, cells, shift registers": Skin(
-        rows=64,
-        columns=32,
-        report="cells",
-        row_drive="74hc595",
-        row_chains=2,
-        column_read="74hc165",
-        column_chains=4,
-        shift_hz=500_000,
-        clock_hz=1_000_000,
-        baud=500_000,
-        settle_us=80.0,
-        release_us=30.0,
-    ),
-    "6x7, serial": Skin(
-        rows=6,
-        columns=7,
-        labeller="serial",
-        mask=((2, 3),),
-        zone_capacity=6,
-        clock_hz=1_000_000,
-        baud=250_000,
-        settle_us=24.0,
-        release_us=2.0,
-    ),
-    "5x6, adaptive": Skin(
-        rows=5,
-        columns=6,
-        scan="adaptive",
-        debounce="sym_defer_pk",
-        debounce_press_us=400.0,
-        debounce_release_us=600.0,
-        mask=((1, 4),),
-        clock_hz=1_000_000,
-        baud=500_000,
-        settle_us=60.0,
-        release_us=4.0,
-    ),
-    "5x6, reversal": Skin(
-        rows=5,
-        columns=6,
-        scan="reversal",
-        settle_us=3.0,
-        release_us=1.0,
-        precharge_us=2.0,
-        project_us=4.0,
-        debounce="sym_defer_pk",
-        debounce_press_us=40.0,
-        debounce_release_us=70.0,
-        mask=((1, 4), *((row, 2) for row in range(5))),
-        send="on_change",
-        keep_alive_ms=4.5,
-        clock_hz=1_000_000,
-        baud=250_000,
-    ),
-    "4x5, cells, reversal": Skin(
-        rows=4,
-        columns=5,
-        diodes="row2col",
-        scan="reversal",
-        settle_us=2.0,
-        release_us=1.0,
-        precharge_us=1.0,
-        project_us=1.0,
-        report="cells",
-        mask=tuple((1, column) for column in range(5)),
-        clock_hz=1_000_000,
-        baud=250_000,
-    ),
-    "4x4, precharge": Skin(
-        rows=4,
-        columns=4,
-        settle_us=20.0,
-        release_us=2.0,
-        precharge_us=3.0,
-        mask=tuple((row, 1) for row in range(4)),
-        clock_hz=1_000_000,
-        baud=250_000,
-    ),
-    "1x5, slow": Skin(rows=1, columns=5, clock_hz=1_000_000, baud=100_000, settle_us=9_000.0, release_us=1_000.0),
-}
+from contactfpga_sim.sheet.shorts import Shorts
 
 _TIME_WRAPS_US = 1 << 24
+_AT_REST = 400_000
 _ALL_FRAMES = 16
 """Cells of a sheet of which every frame is tried."""
 
@@ -167,13 +34,18 @@ class Stimulus(NamedTuple):
     noise: Sequence[tuple[int, int]] = ()
     """At which cycle the receive pin goes low, and for how many: too short for a start bit, or with no stop bit after
     it, so that no byte is received."""
+    shorts: Sequence[tuple[int, Shorts]] = ()
+    """From which cycle on which lines are joined. The golden model knows no such sheet: a mutant is compared with the
+    gateware, whose findings ``tests/gateware/test_self_test.py`` holds to the list of faults."""
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan."""
+    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan. With
+    guard lines or a self-test also a sheet at rest with lines that break and touch."""
     for seed in range(3):
-        yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks))
-    yield _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
+        yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, options.least_cycles(skin)))
+    yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
+    yield from _optional(skin)
     yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
 
 
@@ -181,8 +53,11 @@ def thorough(skin: Skin) -> Iterator[Stimulus]:
     """For the mutants that :func:`quick` leaves: the same for longer, all frames of a small sheet, random ones of a
     larger one, and more than half a second of board time, after which a hello comes unasked."""
     for seed in range(3, 9):
-        yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks))
-    yield _noisy(skin, 300)
+        yield _random(skin, seed, max(50_000, 60 * facts(skin).scan_clocks, 4 * options.least_cycles(skin)))
+    if skin.units:
+        timeline, cycles = options.thresholds(skin, 240)
+        yield Stimulus("more thresholds", timeline, cycles)
+    yield from _noisy(skin, 300)
     yield _crowded(skin, 300)
     yield _meeting(skin, 200)
     yield _frames(skin, "frames", _various_frames(skin))
@@ -199,16 +74,33 @@ def _random(skin: Skin, seed: int, cycles: int) -> Stimulus:
     rng = np.random.default_rng([seed, 11])
     known = facts(skin)
     scan = known.scan_clocks
-    gaps = rng.choice([0, 0, 1, 7, scan, 8 * scan, 30 * scan], size=cycles // (10 * known.bit_clocks))
+    usual = [0, 0, 1, 7, scan, 8 * scan, 30 * scan]
+    if skin.self_test:
+        usual += [options.test_clocks(skin)] * 3
+    gaps = rng.choice(usual, size=cycles // (10 * known.bit_clocks))
     received = covering.traffic(skin, gaps.tolist(), int(rng.integers(scan)), cycles, rng)
-    return Stimulus(f"random {seed}", Timeline(covering.stimulus(skin, cycles, seed).pieces, received), cycles)
+    timeline = Timeline(covering.stimulus(skin, cycles, seed).pieces, received)
+    return Stimulus(f"random {seed}", options.added(skin, timeline, cycles, seed), cycles)
 
 
-def _noisy(skin: Skin, scans: int) -> Stimulus:
+def _optional(skin: Skin) -> Iterator[Stimulus]:
+    if skin.units:
+        timeline, cycles = options.thresholds(skin, 60)
+        yield Stimulus("thresholds", timeline, cycles)
+    if skin.guard or skin.self_test:
+        yield Stimulus("at rest", options.at_rest(skin, _AT_REST), _AT_REST)
+    if skin.self_test:
+        for timeline, shorts, cycles in (options.joined(skin), *options.bridged(skin)):
+            yield Stimulus("joined lines", timeline, cycles, shorts=shorts)
+
+
+def _noisy(skin: Skin, scans: int) -> Iterator[Stimulus]:
     """Requests, and between them what is none: a low level of up to half a bit, or until after the stop bit's middle.
 
-    Most come so far apart that what each does is seen.
+    Most come so far apart that what each does is seen. A board that takes pulses for bits would take these for some.
     """
+    if uart.pulsed(facts(skin).bit_clocks):
+        return
     rng = np.random.default_rng(17)
     known = facts(skin)
     bit, cycles = known.bit_clocks, scans * known.scan_clocks
@@ -224,7 +116,7 @@ def _noisy(skin: Skin, scans: int) -> Stimulus:
             noise.append((start, longest if kind == "break" else int(rng.integers(1, bit // 2 + 1))))
         start += 11 * bit + int(rng.integers(2 * bit)) + int(rng.choice([0, 2, 15])) * known.scan_clocks
     pieces = covering.stimulus(skin, cycles, 19).pieces
-    return Stimulus("noise", Timeline(pieces, requests(asked, bit)), cycles, noise)
+    yield Stimulus("noise", Timeline(pieces, requests(asked, bit)), cycles, noise)
 
 
 def _crowded(skin: Skin, scans: int) -> Stimulus:
@@ -279,4 +171,5 @@ def _rare(skin: Skin, name: str, microseconds: int) -> Stimulus:
         (start * clocks, rng.random(shape) < 0.1, rng.random(skin.columns) < 0.5 if start % 2 else None)
         for start in range(0, microseconds, 300_001)
     ]
-    return Stimulus(name, Timeline(pieces), microseconds * clocks)
+    cycles = microseconds * clocks
+    return Stimulus(name, options.added(skin, Timeline(pieces), cycles, 13), cycles)

@@ -1,4 +1,4 @@
-"""Columns that take time, as the compiled board has them: what is left of the sheet's circuit at each clock."""
+"""Lines that take time, as the compiled board has them: what is left of the sheet's circuit at each clock."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from contactfpga.circuit import phases
 from contactfpga.circuit.network import Network
 from contactfpga.circuit.phases import Levels
 from contactfpga.circuit.values import Circuit
+from contactfpga.skin import Skin
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +52,57 @@ class Line:
     def share(constant_s: float, seconds: float) -> float:
         """How much of its way a level goes in this time."""
         return -math.expm1(-seconds / constant_s) if constant_s else 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class RowLine:
+    """Likewise a row that is let go while columns drive: it goes to the level to which pressed switches lift it, or
+    back to the untouched one. Levels are shares of the way from the untouched level to the columns' one."""
+
+    rise_s: tuple[float, ...]
+    """Time constants toward touched, by how many pressed switches lift the row."""
+    lifted: tuple[float, ...]
+    """Share of the way at which it comes to rest, by the same number."""
+    fall_s: float
+    """Time constant toward untouched."""
+    threshold: float
+    """Share at which the pin reads touched."""
+
+    @classmethod
+    def of(cls, circuit: Circuit, columns: int, diodes: str = "col2row") -> RowLine:
+        """Of a row that is touched alone."""
+        levels = Levels.of(circuit, diodes)
+        threshold = levels.high / circuit.supply_v
+        counts = [count for count in (1, 2, 4, 8, 16, 32) if count < columns] + [columns]
+        found = [_lifted(circuit, levels, columns, count) for count in counts]
+        wanted = np.arange(columns + 1)
+        lifted = np.interp(wanted, counts, [share for _, share in found])
+        seconds = np.interp(wanted, counts, [time_s for time_s, _ in found])
+        reached = np.maximum(lifted, threshold * (1 + 1e-9))
+        rise = seconds / -np.log1p(-threshold / reached)
+        fall = phases.passed(phases.project_rows(_one_row(circuit, columns, 0), levels)).seconds
+        return cls(tuple(rise.tolist()), tuple(lifted.tolist()), fall / math.log(1 / threshold), threshold)
+
+
+def lines_of(circuit: Circuit, skin: Skin, most: int | None = None) -> tuple[Line, RowLine | None]:
+    """Columns of a Skin's sheet, with at most ``most`` pressed switches a row, and rows if they are read."""
+    if skin.guard:
+        most = None  # the guard row presses all columns
+    columns = Line.of(circuit, skin.row_lines, skin.column_lines, skin.diodes, most)
+    return columns, RowLine.of(circuit, skin.column_lines, skin.diodes) if skin.reads_rows else None
+
+
+def _one_row(circuit: Circuit, columns: int, count: int) -> Network:
+    return Network(circuit, np.arange(columns)[None] < count)
+
+
+def _lifted(circuit: Circuit, levels: Levels, columns: int, count: int) -> tuple[float, float]:
+    """Seconds until a row that so many pressed switches lift reads touched, 0 if that is never, and the share at which
+    it comes to rest."""
+    phase = phases.project_rows(_one_row(circuit, columns, count), levels, lifted=True)
+    seconds = phases.passed(phase).seconds
+    share = float(phases.rest_volts(phase)[columns]) / circuit.supply_v
+    return (seconds if math.isfinite(seconds) else 0.0), share
 
 
 def _alike(circuit: Circuit, rows: int, columns: int, count: int) -> Network:

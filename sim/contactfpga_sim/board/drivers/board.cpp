@@ -39,6 +39,9 @@ public:
     bool slow = false;
     std::vector<double> row_factor, column_factor;
     double press_share[COLUMN_LINES + 1], pulled[COLUMN_LINES + 1], release_share = 1, threshold = 0.5;
+    // A row that is let go likewise: to the level that the driven columns lift it to, or back to 0.
+    bool slow_rows = false;
+    double rise_share[COLUMN_LINES + 1], lifted[COLUMN_LINES + 1], fall_share = 1, row_threshold = 0.5;
 
     Matrix() {
         std::fill_n(row_end_, ROW_LINES, COLUMN_LINES);
@@ -79,9 +82,9 @@ public:
         if (shorts.any) {
             const Lines feeding{rows_released, columns_driven & ~stuck};
             const Lines low = shorts.followers(closed_, {selected, columns_held}, true);
-            lifted_ = shorts.followers(closed_, feeding, false);
+            lifted_ = shorts.followers(closed_, {feeding.rows | shorts.supplied, feeding.columns}, false);
             fights += ((low.rows & feeding.rows) | (low.columns & feeding.columns)) != 0;
-            reads = low.columns, lifted = lifted_.columns;
+            reads = low.columns, lifted = lifted_.columns | shorts.pulled;
         } else {
             for (; selected; selected &= selected - 1)
                 reads |= closed_[lowest(selected)];
@@ -94,12 +97,15 @@ public:
     }
 
     // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
-    Word row_levels(Word levels, Word rows_driven, Word columns_driven) const {
+    Word row_levels(Word levels, Word rows_driven, Word columns_driven) {
+        const Word feeding = columns_driven & ~stuck;
         Word touched = 0;
         if (shorts.any)
             touched = lifted_.rows;
         else for (unsigned line = 0; line < ROW_LINES; line++)
-            touched |= Word{(closed_[line] & columns_driven & ~stuck) != 0} << line;
+            touched |= Word{(closed_[line] & feeding) != 0} << line;
+        if (slow_rows)
+            touched = risen(touched, COL2ROW ? levels : ~levels, rows_driven, feeding);
         return (levels & rows_driven) | ((COL2ROW ? touched : ~touched) & ~rows_driven & mask(ROW_LINES));
     }
 
@@ -116,6 +122,24 @@ private:
         return -std::expm1(std::log1p(-usual) / (column_factor[column] * (pull ? row_factor[selected_] : 1)));
     }
 
+    // `released`: rows whose pin has the released level, which is the touched one, where it is driven.
+    Word risen(Word touched, Word released, Word driven, Word feeding) {
+        Word reads = 0;
+        for (unsigned line = 0; line < ROW_LINES; line++) {
+            const unsigned switches = count(closed_[line] & feeding);
+            double &volts = row_volts_[line];
+            if (driven >> line & 1)
+                volts = released >> line & 1;
+            else if (touched >> line & 1)
+                volts += (lifted[switches] - volts) * rise_share[switches];
+            else
+                volts -= volts * fall_share;
+            reads |= Word{volts > row_threshold} << line;
+        }
+        return reads;
+    }
+
+    double row_volts_[ROW_LINES] = {};
     Lines lifted_ = {};          // with shorts, to the released level
     Word kept_ = 0, kept_for_ = 0;  // columns that were discharged, and clocks for which they stay so
 
@@ -392,6 +416,15 @@ EXPORT void board_settle(
     }
     matrix.release_share = release_share;
     matrix.threshold = threshold;
+}
+EXPORT void board_settle_rows(
+    Board *board, const double *rise_share, const double *lifted, double fall_share, double threshold) {
+    Matrix &matrix = board->matrix;
+    matrix.slow_rows = true;
+    std::copy_n(rise_share, COLUMN_LINES + 1, matrix.rise_share);
+    std::copy_n(lifted, COLUMN_LINES + 1, matrix.lifted);
+    matrix.fall_share = fall_share;
+    matrix.row_threshold = threshold;
 }
 EXPORT void board_load(Board *board, const uint32_t *codes) {
 #if UNITS

@@ -7,12 +7,13 @@ struct Lines {
     Word rows, columns;
 };
 
-enum Joint { ROW_PAIR, COLUMN_PAIR, CROSSED, BRIDGED };
+enum Joint { ROW_PAIR, COLUMN_PAIR, CROSSED, BRIDGED, SUPPLIED, PULLED };
 
 template <unsigned ROW_COUNT, unsigned COLUMN_COUNT>
 class Shorts {
 public:
     bool any = false;
+    Word supplied = 0, pulled = 0;  // rows at the supply of the released level; columns that are lifted at once
 
     void join(unsigned kind, unsigned one, unsigned other) {
         any = true;
@@ -24,6 +25,10 @@ public:
             crossed_[one] |= Word{1} << other;
         if (kind == BRIDGED)
             bridged_[one] |= Word{1} << other;
+        if (kind == SUPPLIED)
+            supplied |= Word{1} << one;
+        if (kind == PULLED)
+            pulled |= Word{1} << other;
     }
 
     // Lines that take the level of the sources: the selecting one passes closed switches from row to column, the released

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.studies.failures import electric, line, lines, shapes, touch
+from contactfpga_sim.studies.failures import electric, electric_reversal, line, lines, shapes, touch
 
 STUDIES = {
     study.name: study
@@ -14,7 +14,10 @@ STUDIES = {
         touch.MOVING,
         touch.BOUNCE,
         electric.SETTLE,
+        electric_reversal.SETTLE_REVERSAL,
+        electric_reversal.PROJECT_REVERSAL,
         electric.DIODES,
+        electric_reversal.DIODES_REVERSAL,
         electric.GHOST,
         electric.GHOSTS,
         lines.BROKEN,

@@ -11,7 +11,7 @@ from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.sheet import guards
 from contactfpga_sim.sheet.levels import at_rest
-from contactfpga_sim.sheet.line import Line
+from contactfpga_sim.sheet.line import lines_of
 from contactfpga_sim.sheet.wiring import Wiring
 from contactfpga_sim.studies.failures.knob import Outcome, Study
 from contactfpga_sim.studies.failures.rig import (
@@ -56,10 +56,7 @@ def _slow(skin: Skin, circuit: Circuit, picofarad: float) -> Outcome:
     spots = [(3, 4), (9, 10)]
     cells = finger(skin, *spots)
     with Rig(skin) as rig:
-        slow = circuit.replace(line_pf=picofarad)
-        most = skin.column_lines if skin.guard else 2  # a guard row presses all columns
-        line = Line.of(slow, skin.row_lines, skin.column_lines, skin.diodes, most)
-        rig.board.settle(line)
+        rig.board.settle(*lines_of(circuit.replace(line_pf=picofarad), skin, most=2))
         rig.board.hold(cells[None], hello_clocks(skin) + 4 * rig.scan)
         zones = rig.frames()[-1]
     return judged(zones, cells, [finger(skin, spot) for spot in spots])
@@ -86,7 +83,7 @@ SETTLE = Study(
 # ---- diodes
 
 
-def _bare(skin: Skin, count: float) -> Outcome:
+def bare(skin: Skin, count: float) -> Outcome:
     """Three fingers at the corners of a rectangle; of one of them the switches lose their diodes one by one. Undefined
     levels are tried both ways."""
     spots = [(3, 4), (3, 10), (11, 4)]
@@ -124,8 +121,8 @@ DIODES = Study(
     amount="cells that surely read pressed",
     values=(0, 1, 2, 3, 4),
     runs={
-        "three fingers at corners": functools.partial(_bare, REFERENCE),
-        "the same with guard lines": functools.partial(_bare, GUARDED),
+        "three fingers at corners": functools.partial(bare, REFERENCE),
+        "the same with guard lines": functools.partial(bare, GUARDED),
     },
     helps='test each diode before fitting; a board for `diodes = "none"` lets rows float and flags ghosts',
     unnoticed="two row pins drive against each other, and the level between low and high may read either way; the "

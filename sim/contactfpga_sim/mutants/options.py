@@ -1,0 +1,156 @@
+"""What is done to the options of a Skin: lines that break, lines that touch, readings that change, commands."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import SELF_TEST, Derived
+from contactfpga.skin.units import NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.request import command
+from contactfpga_sim.golden.trace import Cuts, Timeline
+from contactfpga_sim.sheet.shorts import Shorts
+
+
+def least_cycles(skin: Skin) -> int:
+    """In which the options have had their turn: sweeps of the units, slots of a few self-tests."""
+    sweeps = 40 * Derived(skin).units.sweep_clocks if skin.units else 0
+    return max(sweeps, 5 * test_clocks(skin) if skin.self_test else 0)
+
+
+def added(skin: Skin, timeline: Timeline, cycles: int, seed: int) -> Timeline:
+    """A timeline in which lines break, the guard column is stuck and units read something now and then."""
+    rng = np.random.default_rng([seed, 23])
+    pieces, cuts, units = list(timeline.pieces), [], []
+    if skin.guard:
+        pieces = [(start, cells, _with_guard(skin, stuck, rng)) for start, cells, stuck in pieces]
+        cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 6 * facts(skin).scan_clocks)]
+    if skin.units:
+        most = 2 ** Derived(skin).units.converter.bits - 1
+        sweep = Derived(skin).units.sweep_clocks
+        units = [(start, _readings(skin.units, most, rng)) for start in _starts(rng, cycles, sweep)]
+    return Timeline(pieces, timeline.received, cuts, units)
+
+
+def at_rest(skin: Skin, cycles: int) -> Timeline:
+    """Hardly a touch; lines are cut for so long that what is told of them is renewed, and self-tests come to an end."""
+    rng = np.random.default_rng(37)
+    pieces: list[tuple[int, np.ndarray, None]] = []
+    for start in range(100, cycles, 30_000):
+        cells = rng.random((skin.rows, skin.columns)) < 0.1
+        pieces += [(start, cells, None), (start + 40 * facts(skin).scan_clocks, np.zeros_like(cells), None)]
+    cuts = [(start, _cuts(skin, rng)) for start in _starts(rng, cycles, 70_000)] if skin.guard else []
+    return Timeline(pieces, _self_tests(skin, range(5_000, cycles, 40_000)), cuts)
+
+
+def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
+    """One zero and one threshold after the other, of readings about them and on either side of the zero; nothing else
+    touches the sheet."""
+    rng = np.random.default_rng(41)
+    units, bits = Derived(skin).units, facts(skin).bit_clocks
+    zeros = [0] * skin.units
+    received: list[tuple[int, bytes]] = []
+    readings: list[tuple[int, list[int]]] = []
+    start, before = 0, (THRESHOLD, 0)
+    for _ in range(epochs):
+        around = [_of_bits(units.converter.bits, rng) for _ in range(skin.units)]
+        unit, zero = int(rng.integers(skin.units)), _of_bits(NUMBER_BITS, rng)
+        zeros[unit] = (zero << number_shift(units.converter.bits)) % 2**units.converter.bits
+        what, place, number = _threshold(skin, around, zeros, rng)
+        for order, value in (before, (ZERO, unit | zero << 3), (what, place | number << 3)):
+            received.append((start, command(129 + len(received) % 64, order, value, False, bits)))
+            start += 14 * 10 * bits
+        before = (what, place)
+        for step in (0, -1, 1, 2):
+            moved = min(max(around[unit] + step, 0), 2**units.converter.bits - 1)
+            readings.append((start, [*around[:unit], moved, *around[unit + 1 :]]))
+            start += 2 * units.sweep_clocks
+    return Timeline([], received, units=readings), start
+
+
+def _threshold(skin: Skin, around: list[int], zeros: list[int], rng: np.random.Generator) -> tuple[int, int, int]:
+    """Of a unit or a sum that these readings reach or miss by little: command, place and number."""
+    units, of_sum = Derived(skin).units, bool(rng.random() < 0.5)
+    place = int(rng.integers(len(skin.unit_sums) if of_sum else skin.units))
+    weights = skin.unit_sums[place] if of_sum else [int(place == unit) for unit in range(skin.units)]
+    total = abs(sum(weight * (read - zero) for weight, read, zero in zip(weights, around, zeros, strict=True)))
+    shift = number_shift(units.sum_bits if of_sum else units.converter.bits)
+    number = min(2**NUMBER_BITS - 1, max(1, (total >> shift) + int(rng.integers(2))))
+    return SUM_THRESHOLD if of_sum else THRESHOLD, place, number
+
+
+def _of_bits(most: int, rng: np.random.Generator) -> int:
+    """A number of up to ``most`` bits: any of them, or each count of bits as likely as another."""
+    return int(rng.integers(1 << (most if rng.random() < 0.5 else int(rng.integers(most + 1)))))
+
+
+def joined(skin: Skin) -> tuple[Timeline, list[tuple[int, Shorts]], int]:
+    """Each pair of rows and of columns joined, each row joined with the supply and each column with a strong pull,
+    alone and joined with another one; a whole sheet after each of them, and a self-test in either. Timeline, what is
+    joined from which cycle on, and for how many cycles."""
+    shorts = [Shorts(rows=(pair,)) for pair in itertools.combinations(range(skin.rows), 2)]
+    shorts += [Shorts(columns=(pair,)) for pair in itertools.combinations(range(skin.columns), 2)]
+    shorts += [Shorts(supplied=(row,)) for row in range(skin.rows)]
+    pulled = [
+        (column, pair) for column in range(skin.columns) for pair in (((column - 1) % skin.columns, column), None)
+    ]
+    shorts += [Shorts(pulled=(column,), columns=(pair,) if pair else ()) for column, pair in pulled]
+    each = 2 * test_clocks(skin)
+    starts = range(each, each * (1 + 2 * len(shorts)), each)
+    changes = list(zip(starts, itertools.chain(*((one, Shorts()) for one in shorts)), strict=True))
+    return Timeline([], _self_tests(skin, starts)), changes, starts[-1] + each
+
+
+def bridged(skin: Skin) -> Iterator[tuple[Timeline, list[tuple[int, Shorts]], int]]:
+    """Likewise each diode bridged at power-up, its switch pressed for the self-test: a frame would drive the row
+    against the column."""
+    first = (1 + skin.rows + skin.columns) * (2 * facts(skin).project + facts(skin).settle + 8)
+    for place in itertools.product(range(skin.rows), range(skin.columns)):
+        cells = np.zeros((skin.rows, skin.columns), bool)
+        cells[place] = True
+        timeline = Timeline([(0, cells, None), (first, np.zeros_like(cells), None)])
+        yield timeline, [(0, Shorts(bridged=(place,)))], 300 * 10 * facts(skin).bit_clocks
+
+
+def test_clocks(skin: Skin) -> int:
+    """More than a self-test takes whose slots go out."""
+    slots = 1 + skin.rows + skin.columns
+    packet = 10 * facts(skin).bit_clocks * (12 + (skin.rows + skin.columns) // 7)
+    return slots * (3 * packet + facts(skin).scan_clocks)
+
+
+def _self_tests(skin: Skin, starts: range) -> list[tuple[int, bytes]]:
+    if not skin.self_test:
+        return []
+    return [(start, command(129 + index % 64, SELF_TEST, 0, False, facts(skin).bit_clocks)) for index, start in
+            enumerate(starts)]  # fmt: skip
+
+
+def _starts(rng: np.random.Generator, cycles: int, mean: int) -> Iterator[int]:
+    start = int(rng.integers(mean))
+    while start < cycles:
+        yield start
+        start += 1 + int(rng.integers(2 * mean))
+
+
+def _with_guard(skin: Skin, stuck: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
+    return np.append(np.zeros(skin.columns, bool) if stuck is None else stuck, rng.random() < 0.2)
+
+
+def _cuts(skin: Skin, rng: np.random.Generator) -> Cuts:
+    """None, some, or half of the lines, each at any place."""
+    share = rng.choice([0, 0, 0.2, 0.5])
+    ends = (
+        {line: int(rng.integers(across + 1)) for line in range(lines) if rng.random() < share}
+        for lines, across in ((skin.row_lines, skin.column_lines), (skin.column_lines, skin.row_lines))
+    )
+    return Cuts(*ends)
+
+
+def _readings(units: int, most: int, rng: np.random.Generator) -> list[int]:
+    low = rng.integers(min(most + 1, 256), size=units)
+    return [int(rng.choice(np.array([0, 1, most // 2, most, near, rng.integers(most + 1)], np.int64))) for near in low]
