@@ -490,7 +490,7 @@ EXTRAS = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:5]))
+@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:3]))
 def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):
     code = f"""
 import sys
