@@ -130,7 +130,7 @@ def test_hands_need_an_exact_labeller(file, shortcuts):
 
 def test_neither_names_nor_orders_make_a_difference(file, shortcuts):
     texts = [BUMPER, HANDS]
-    names = [("bumper.toml", "hands.toml"), ("hands.toml", "bumper.toml"), ("x.toml", "0.toml")]
+    names = [("bumper.toml", "hands.toml"), ("x.toml", "0.toml")]
     answers = set()
     for shuffled, ((one, other), turned) in enumerate(itertools.product(names, (False, True))):
         paths = [file(text, name) for text, name in zip(texts, (one, other))]
