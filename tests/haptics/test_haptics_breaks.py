@@ -61,7 +61,7 @@ def test_1000_placements_end_to_end(setting, most_mm):
 
 
 def test_two_contacts_60_mm_apart_are_felt_apart():
-    pairs = [felt.two(60.0, seed) for seed in range(4)]
-    assert [one.zones for one in pairs] == [2] * 4
+    pairs = [felt.two(60.0, seed) for seed in range(2)]
+    assert [one.zones for one in pairs] == [2] * 2
     off = [one for pair in pairs for one in pair.off_n]
     assert np.sqrt(np.mean(np.square(off))) < 1.2  # 0.6 N over many
