@@ -17,6 +17,8 @@ JOBS ?= auto
 # drop the asserts of the tests, or point at another Verilator. MAKEFLAGS would reach the makefiles of Verilator.
 unexport VIRTUAL_ENV CONDA_PREFIX PYTHONHOME PYTHONPATH PYTHONSTARTUP PYTHONUSERBASE PYTHONOPTIMIZE PYTHONWARNINGS
 unexport PYTHONSAFEPATH PYTHONPLATLIBDIR PYTHONINSPECT PYTHONEXECUTABLE __PYVENV_LAUNCHER__
+# Without bytecode each of the many processes of the tests would compile what it imports.
+unexport PYTHONDONTWRITEBYTECODE
 unexport PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_REQUIREMENT PIP_REQUIRE_VIRTUALENV PIP_NO_DEPS PIP_DRY_RUN
 unexport VERILATOR_ROOT MAKEFLAGS MFLAGS CDPATH
 
@@ -177,7 +179,7 @@ docs: $(VENV)/.stamp-docs ## build the pages into build/docs
 
 clean: ## delete what was built; keep .venv
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find py hdl sim tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+	find py hdl sim tests docs scripts -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## delete .venv too
 	rm -rf $(VENV)

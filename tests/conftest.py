@@ -43,17 +43,17 @@ def _closed_ports():
 
 
 LONGEST_FIRST = (
-    "test_cosim",
-    "test_bad_inputs",
     "test_formal",
-    "test_fit",
-    "test_adaptive",
+    "test_bad_inputs",
     "test_label_volume",
-    "test_demo",
+    "test_label",
+    "test_cosim",
+    "test_barycenter",
     "test_replay",
     "test_chart",
-    "test_barycenter",
-    "test_label",
+    "test_failures",
+    "test_terminal",
+    "test_demo",
 )
 """Files that take longest: begun first, so that at the end of a run no process works alone. The second and the fourth
 need no Yosys: on a new machine its first use takes a minute, which two processes would spend twice."""

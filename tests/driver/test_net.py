@@ -267,7 +267,7 @@ DEFECTS = {
 }
 
 
-RARE = {restart_by_the_sequence, packets_are_too_long}
+RARE = {restart_by_the_sequence, packets_are_too_long, reports_are_for_good}
 """Found in some thousand histories, or late; a test of the conversation has the first in each second of the wrap."""
 
 

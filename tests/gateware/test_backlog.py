@@ -47,7 +47,7 @@ def cases():
     for number, (name, fields) in enumerate(SHEETS.items()):
         labellers = list(LABELLERS) if fields.get("report") != "cells" else ["run"]
         for labeller in labellers:
-            long = name in ("24x40, 8", "24x40, 4", "9x9, divided", "16x16, divided")
+            long = name in ("24x40, 8", "24x40, 4", "9x9, divided", "16x16, divided", "12x30, few zones")
             long |= labeller != labellers[number % len(labellers)]
             yield pytest.param(name, labeller, marks=[pytest.mark.campaign] * long)
 

@@ -8,6 +8,7 @@ import pytest
 from amaranth.hdl import Cat, Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.report.backlog import Backlog
@@ -107,10 +108,16 @@ def check_items(wanted, taker):
 
 
 SHEETS = [(1, 1), (1, 2), (2, 2), (3, 3), (1, 7), (6, 1), (2, 5), (4, 3), (4, 4)]
+BITS = (0, 1, 4, 8)
 
 
-@pytest.mark.parametrize("bits", [0, 1, 4, 8])
-@pytest.mark.parametrize(("rows", "columns"), SHEETS)
+@pytest.mark.parametrize(
+    ("rows", "columns", "bits"),
+    sample(
+        [(*sheet, bits) for sheet in SHEETS for bits in BITS],
+        quick=[(*sheet, BITS[number % 4]) for number, sheet in enumerate(SHEETS)] + [(4, 4, 8)],
+    ),
+)
 def test_every_zone_of_a_small_sheet_is_rounded_exactly_and_takes_its_clocks(
     bench, rng, record_property, rows, columns, bits
 ):

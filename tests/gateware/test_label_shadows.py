@@ -14,7 +14,7 @@ LABELLERS = ("projection", "single")
 SIZES = ((4, 4), (1, 1), (1, 7), (7, 1), (9, 12), (16, 16), (3, 64))
 QUICK_SIZES = ((4, 4), (9, 12))
 BENCHES = [(labeller, size) for labeller in LABELLERS for size in SIZES]
-QUICK_BENCHES = [(labeller, size) for labeller in LABELLERS for size in QUICK_SIZES]  # each has to be compiled
+QUICK_BENCHES = [(labeller, QUICK_SIZES[1]) for labeller in LABELLERS]  # each has to be compiled
 
 
 def frames_of(rows, columns, count=400):

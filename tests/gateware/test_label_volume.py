@@ -31,7 +31,7 @@ RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a te
     (33, 33): 1_000,
     (64, 64): 300,
 }
-QUICK_RANDOM = [((8, 8), 8, "run"), ((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES)]
+QUICK_RANDOM = [((8, 8), 8, "run"), ((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES if "run" in rule)]
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +154,7 @@ def test_random_frames_are_enough():
 
 @BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
-@pytest.mark.parametrize(("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30), (10, 90)]))
+@pytest.mark.parametrize(("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30)]))
 def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivity, labeller):
     small = every_frame(4, 4)
     check_stalled(benches(4, 4, connectivity, labeller), small, gap, stall)

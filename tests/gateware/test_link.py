@@ -19,6 +19,7 @@ from link_bench import (
     sealed,
     varying_stalls,
 )
+from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.link import link as link_module
@@ -128,7 +129,7 @@ def hello_sent(skin, sink, begun, sent, number=lambda cycle: 0, stuck=lambda cyc
     return hello_of(skin, digits)
 
 
-@pytest.mark.parametrize("name", SKINS)
+@pytest.mark.parametrize("name", sample(SKINS, quick=["on change", "cells"]))
 def test_every_packet_is_whole_and_starts_in_its_cycle_whatever_the_wire_does(bench, rng, name):
     skin = skin_of(name)
     frames = random_frames(rng, skin, 90, spacing=2)

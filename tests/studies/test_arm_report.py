@@ -86,6 +86,7 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.campaign
 def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsys, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('like = "paper"\n[link]\nspeed_m_s = 0.1\n')

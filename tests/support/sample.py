@@ -1,6 +1,6 @@
 """Which parameters of a long test `make test` runs; the others are for `make campaign`."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 import pytest
 
@@ -13,6 +13,18 @@ def sample(values: Iterable, quick: Collection) -> list:
     if missing or not quick:
         raise ValueError(f"no parameters of this test: {missing}")
     return [value if value in quick else _campaign(value) for value in values]
+
+
+def each_choice(rows: Iterable[Mapping]) -> list[int]:
+    """Numbers of few rows of a table that together hold each value of each column."""
+    rows = list(rows)
+    missing = {(name, repr(value)) for row in rows for name, value in row.items()}
+    found = []
+    while missing:
+        new = [len(missing & {(name, repr(value)) for name, value in row.items()}) for row in rows]
+        found.append(new.index(max(new)))
+        missing -= {(name, repr(value)) for name, value in rows[found[-1]].items()}
+    return sorted(found)
 
 
 def _campaign(value: object):

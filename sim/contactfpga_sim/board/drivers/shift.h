@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 #include <type_traits>
 
 // A bit per line of the rows or of the columns: of 64, and a guard line.
@@ -18,12 +17,17 @@ inline unsigned count(Word word) {
     return __builtin_popcountll(static_cast<uint64_t>(word)) + __builtin_popcountll(high_half(word));
 }
 
-// What registers hold at power-up: random bits, the same in every run.
+// What registers hold at power-up: random bits, the same in every run. By xorshift64* (Vigna 2016), as <random> takes
+// longer to compile than all of the drivers.
 template <size_t COUNT>
 void power_up(Word (&registers)[COUNT], unsigned bits, unsigned seed) {
-    std::mt19937_64 random(seed);
-    for (auto &content : registers)
-        content = random() & mask(bits);
+    uint64_t state = seed * 0x9E3779B97F4A7C15ull;
+    for (auto &content : registers) {
+        state ^= state >> 12;
+        state ^= state << 25;
+        state ^= state >> 27;
+        content = state * 0x2545F4914F6CDD1Dull & mask(bits);
+    }
 }
 
 // CHAINS chains of 74HC595 for LINES lines: bits move up on a rising shift clock, and to the outputs on a rising latch.

@@ -1,0 +1,70 @@
+"""What can go wrong with a command: it says so in a sentence."""
+
+import pytest
+from python_alone import python
+from sample import sample
+
+# ---- what can go wrong
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["zones", "/dev/no_such_port"], "/dev/no_such_port cannot be opened: No such file or directory"),
+        (["zones", "sim://?scene=elbow"], "scene 'elbow' is not known"),
+        (["zones", "sim://", "--skin", "/no/skin.toml"], "contactfpga: /no/skin.toml: No such file or directory"),
+        (["zones", "replay:///no/such.bin"], "replay:///no/such.bin cannot be opened"),
+        (["replay", "/no/such.npy"], "/no/such.npy"),
+        (["board", "--skin", "/no/skin.toml"], "/no/skin.toml"),
+        (["board", "--scene", "elbow"], "scene 'elbow' is not known"),
+    ],
+)
+def test_errors_are_one_line_without_a_traceback(arguments, message, run):
+    status, out, errors = run(*arguments)
+    assert (status, out) == (1, "")
+    assert errors.startswith("contactfpga: ")
+    assert errors.count("\n") == 1
+    assert message in errors
+
+
+def test_bad_skin_file_is_named(tmp_path, run):
+    file = tmp_path / "skin.toml"
+    file.write_text("rows = 65\n")
+    status, _, errors = run("zones", f"sim://?skin={file}")
+    assert status == 1
+    assert errors == "contactfpga: rows is 65; it must lie between 1 and 64\n"
+
+
+EXTRAS = [
+    (["zones", "--once", "sim://"], "rich.console", "cli"),
+    (["board"], "contactfpga_sim.board.virtual", "sim"),
+    (["build", "icestick"], "amaranth.build", "boards"),
+    (["chart"], "scipy.optimize", "chart"),
+    (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+    (["wire", "sim://"], "rich.console", "cli"),
+    (["replay", "x.npy"], "contactfpga_sim.board.replay", "sim"),
+    (["zones", "--json", "sim://"], "contactfpga_sim.board.virtual", "sim"),
+    (["build", "icestick"], "amaranth_boards.icestick", "boards"),
+    (["fit", "bumper"], "rich.console", "chart"),
+    (["fit", "bumper"], "scipy.optimize", "chart"),
+    (["board"], "contactfpga_sim.board.pty_board", "sim"),
+    (["arm"], "matplotlib.figure", "sim"),
+    (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "module", "extra"), sample(EXTRAS, quick=EXTRAS[:3]))
+def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):
+    code = f"""
+import sys
+sys.modules[{module!r}] = None  # as if it were not installed
+from contactfpga import cli
+sys.exit(cli.main(sys.argv[1:]))
+"""
+    result = python(code, *arguments)
+    assert result.returncode == 1
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+    if "rich" in module:
+        assert "rich" in result.stderr
+    assert f"in the folder of contactfpga's sources, install it with: pip install '.[{extra}]'" in result.stderr

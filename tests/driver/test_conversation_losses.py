@@ -1,0 +1,221 @@
+"""What the conversation makes of losses, restarts and other Skins."""
+
+from types import SimpleNamespace
+
+import pytest
+from model_board import SCAN_US, ModelBoard
+from straight_line import SKIN, Line, arrived
+from wire import Wire, old_frame, old_hello
+
+import contactfpga
+from contactfpga.console.views import status
+from contactfpga.driver.stats import Stats
+
+
+def errors(events):
+    return [event for event in events if isinstance(event, Exception)]
+
+
+# ---- losses
+
+
+@pytest.mark.parametrize("missing", [1, 254, 255, 256, 257, 512, 70_000])
+def test_losses_are_exact_from_the_next_hello_on(missing):
+    line = Line()
+    line.board.sent = 1000
+    line.hello()
+    line.frame()
+    for _ in range(missing):
+        line.board.sent += 1
+        line.board.time_us += 10
+    line.frame()
+    assert line.stats.lost == missing % 256
+    line.hello()
+    assert line.stats.lost == missing
+    assert line.stats.restarts == 0
+
+
+def test_frames_lost_before_a_hello_are_counted_once():
+    line = Line()
+    line.hello()
+    line.frame()
+    for _ in range(5):
+        line.board.frame()
+    line.hello()
+    assert line.stats.lost == 5
+    line.board.frame()
+    line.frame()
+    assert line.stats.lost == 6
+
+
+def test_frames_sent_before_the_port_was_opened_are_no_loss():
+    line = Line()
+    line.board.sent = 12345
+    line.frame()
+    line.hello()
+    line.frame()
+    assert (line.stats.lost, line.stats.before_hello) == (0, 1)
+
+
+@pytest.mark.parametrize("second", range(0, 34, 1))
+def test_a_lost_frame_is_no_restart_at_any_time_of_the_wrap(second):
+    """In one second of every 16.8 the first frame of 256 was once taken for the first one since power-up."""
+    line = Line()
+    line.board.time_us, line.board.sent = second * 500_000 + SCAN_US, 250
+    line.board.heard = 5
+    line.hello()
+    line.frame()
+    for sequence in range(251, 256):
+        assert line.board.frame()
+        assert line.board.sent == sequence + 1
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+    assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (0, 5, 0)
+
+
+def test_frames_that_come_twice_are_passed_on_once(rng):
+    """Until the next hello nothing more is, as the board may have been restarted."""
+    for _ in range(30):
+        line, sent = Line(), []
+        line.board.heard = 3
+        line.hello()
+        for _ in range(rng.randrange(1, 300)):
+            sent.append(line.board.frame())
+        passed = line.give(*sent)
+        start = rng.randrange(len(sent))
+        assert line.give(*sent[start : start + rng.randrange(1, 100)]) == []
+        line.hello()
+        assert line.give(*sent[start : start + 3]) == []
+        line.hello()
+        passed += line.frame()
+        assert [zones.time_us for zones in passed] == [SCAN_US * (1 + index) for index in range(len(sent) + 1)]
+        assert (line.stats.lost, line.stats.restarts) == (0, 0)
+
+
+# ---- restarts
+
+
+def test_a_restart_is_told_by_its_hello():
+    line = Line()
+    line.board.sent, line.board.time_us, line.board.heard = 100, 5_000_000, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.hello()
+    assert [zones.time_us for zones in line.frame() + line.frame()] == [SCAN_US, 2 * SCAN_US]
+    assert (line.stats.restarts, line.stats.lost) == (1, 0)
+
+
+@pytest.mark.parametrize("up_us", [SCAN_US, 3_000_000, 2**24 - 1000, 2**24 - 1, 2**25 - 100_000])
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_restart_whose_hello_is_lost_gives_no_wrong_time(up_us, asked):
+    line = Line()
+    line.board.sent, line.board.time_us, line.board.heard = 1100, up_us, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.board.heard = 12 if asked else 0
+    for _ in range(7):
+        assert line.frame() == []
+    assert line.stats.unexplained == 7
+    line.hello()
+    assert line.stats.restarts == 1
+    assert line.stats.lost == 0
+    expected = line.board.time_us
+    assert line.frame()[0].time_us == expected
+
+
+def test_frames_lost_since_a_restart_are_counted():
+    line = Line()
+    line.board.sent, line.board.heard = 1000, 3
+    line.hello()
+    line.frame()
+    line.board.power_up()
+    line.board.frame()
+    line.board.frame()
+    line.frame()
+    line.hello()
+    assert (line.stats.restarts, line.stats.lost, line.stats.unexplained) == (1, 2, 1)
+
+
+def test_overwritten_frames_are_counted_from_the_differences():
+    line = Line()
+    line.hello()
+    line.frame(overwritten=14)
+    line.frame(overwritten=16 + 3)
+    line.frame(overwritten=16 + 3)
+    assert line.stats.overwritten == 5
+
+
+# ---- other Skins, old boards
+
+
+def test_frames_of_the_board_before_do_not_pass_after_another_bitstream_was_loaded():
+    """The old board stops inside a packet, and the new one's first hello follows without a pause."""
+    for cut in range(1, 16):
+        line = Line()
+        line.board.sent = 500
+        line.hello()
+        torn = line.board.frame()[:cut]
+        new = ModelBoard(SKIN.replace(pitch_x_mm=20.0))
+        events = line.host.receive(torn + new.hello() + new.frame(), 0.0)
+        assert [zones[0].x_mm for zones in arrived(events)] == [50.0]
+        assert "now has a 16x16 Skin" in str(errors(events)[0])
+
+
+def test_frames_of_a_new_board_whose_hello_is_lost_do_not_pass():
+    line = Line()
+    line.hello()
+    line.frame()
+    new = ModelBoard(SKIN.replace(pitch_x_mm=20.0))
+    assert line.give(*(new.frame() for _ in range(100))) == []
+    assert line.stats.damaged == {"crc": 100}
+
+
+@pytest.mark.parametrize("where", ["first", "later"])
+def test_a_board_of_protocol_1_is_named(where):
+    line = Line()
+    if where == "later":
+        line.hello()
+        line.frame()
+    events = line.host.receive(old_frame() + old_hello() + old_frame(), 0.0)
+    (error,) = errors(events)
+    assert isinstance(error, contactfpga.VersionMismatch)
+    assert "speaks protocol version 1, this host version 2" in str(error)
+    assert line.stats.foreign_version == 3
+    assert line.host.sheet is None
+
+
+def test_a_foreign_skin_is_refused_in_words_that_say_what_differs():
+    line = Line(SKIN.replace(rows=8), expected=SKIN)
+    (error,) = errors(line.hello())
+    assert "rows is 8, asked for was 16" in str(error)
+    assert "columns" not in str(error)
+    assert line.frame() == []
+    assert line.stats.foreign_skin == 1
+
+
+def test_skins_that_differ_in_what_no_hello_tells_are_said_to():
+    line = Line(SKIN, expected=SKIN.replace(settle_us=6.0))
+    (error,) = errors(line.hello())
+    assert "differ in fields that a hello does not tell" in str(error)
+    assert "settle_us = 6.0" in str(error)
+
+
+def test_a_new_name_is_no_new_skin():
+    line = Line(SKIN.replace(name="left"))
+    line.hello()
+    line.board.wire = Wire(SKIN.replace(name="right"))
+    assert not errors(line.hello())
+    assert line.host.hello.name == "right"
+    assert line.stats.skin_changes == 0
+
+
+def test_the_line_below_a_frame_says_what_was_lost():
+    line = Line()
+    line.hello()
+    (zones,) = line.frame(flags=["fault"])
+    board = SimpleNamespace(port="x", stats=Stats(lost=3))
+    told = str(status(board, zones, 200))
+    assert "stuck" in told
+    assert "frames, 3 lost, " in told

@@ -1,0 +1,35 @@
+"""What the tests of `contactfpga fit` share: scenes, and formulas in the place of synthesis."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from fits import Shortcuts
+
+from contactfpga_sim.studies import kept, pool
+from contactfpga_sim.studies.chart import speed
+from contactfpga_sim.studies.fit import cost
+
+
+@pytest.fixture
+def alone(tmp_path, monkeypatch):
+    """Results of this test only, in threads of this process."""
+    monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(pool, "executor", lambda jobs, dask: ThreadPoolExecutor(1))
+
+
+@pytest.fixture
+def shortcuts(monkeypatch):
+    """Sizes and times by formulas: seconds in the place of minutes. Some tests take the real ones."""
+    used = Shortcuts()
+    monkeypatch.setattr(cost, "luts_of", used.luts_of)
+    monkeypatch.setattr(speed, "measure", used.measure)
+    return used
+
+
+@pytest.fixture
+def file(tmp_path):
+    def file(text, name="scenes.toml"):
+        (tmp_path / name).write_text(text)
+        return str(tmp_path / name)
+
+    return file

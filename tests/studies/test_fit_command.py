@@ -1,0 +1,181 @@
+"""The command `contactfpga fit`, and its page."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from amaranth.back import rtlil
+from fits import APART, BUMPER, HANDS, SECOND, chosen
+
+from contactfpga import cli
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim.pages import figures, fit_page, writer
+from contactfpga_sim.studies import size
+from contactfpga_sim.studies.fit import cost, search
+from contactfpga_sim.studies.fit.goals import Goals
+from contactfpga_sim.studies.fit.sources import source
+from contactfpga_sim.studies.fit.trial import Task
+
+pytestmark = pytest.mark.usefixtures("alone")
+
+UNSOLVED = 3
+ROOT = Path(__file__).resolve().parents[2]
+
+
+# ---- the command
+
+
+def test_the_command_writes_a_skin_that_loads_and_builds(file, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
+    built = []
+    monkeypatch.setattr(size, "luts", lambda component, _: built.append(rtlil.convert(component())) or 423)
+    output = tmp_path / "my.toml"
+    options = ["--pitch-mm", "20", "--labeller", "single", "--scan", "raster", "--placements", "73"]
+    limits = ["--barycenter-mm", "none", "--miscounted", "10", "--missed", "10"]
+    path = file(BUMPER.replace("[12, 18]", "[16, 20]"))
+    assert cli.main(["fit", path, *options, *limits, "--json", "--output", str(output)]) == 0
+    said = json.loads(capsys.readouterr().out)
+    skin = Skin.load(output)
+    assert skin == Skin(rows=4, columns=4, pitch_x_mm=20.0, pitch_y_mm=20.0, labeller="single")
+    assert said["meets"]
+    assert said["answer"]["settings"]["labeller"] == "single"
+    assert said["answer"]["luts"] == 423
+    assert "# 423 LUT4 on iCE40UP5K, 8 wires" in output.read_text()
+    assert len(built) == 1
+    assert "top" in built[0]
+
+
+@pytest.mark.campaign
+def test_the_luts_are_those_of_place_and_route():
+    skin = Skin(rows=4, columns=4, labeller="single")
+    found = sizes.luts(lambda: Top(skin), sizes.UP5K)
+    assert 300 < found < 700
+    assert (
+        found == sizes.measure(lambda: Top(skin), sizes.UP5K, seeds=1).luts == size.luts(lambda: Top(skin), cost.DEVICE)
+    )
+
+
+def test_the_command_says_what_it_chose_and_why(file, shortcuts, capsys):
+    assert cli.main(["fit", file(HANDS), "--pitch-mm", "10", "--barycenter-mm", "4"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "miscounts 100 % of scenes (96.3 to 100), limit 5 %" in said
+    assert "the answer" in said
+    assert "runner-up" in said
+    assert "On scenes not used to choose the answer meets all limits." in said
+
+
+def test_the_command_fails_where_nothing_meets_the_limits(file, tmp_path, shortcuts, capsys):
+    output = tmp_path / "none.toml"
+    arguments = ["fit", file(BUMPER), "--pitch-mm", "20", "--barycenter-mm", "0.1", "--output", str(output)]
+    assert cli.main(arguments) == UNSOLVED
+    said = " ".join(capsys.readouterr().out.split())
+    assert "No Skin that was tried meets the limits. The nearest is" in said
+    assert "it misses: barycenter off by" in said
+    assert not output.exists()
+    assert cli.main([*arguments, "--json"]) == UNSOLVED
+    found = json.loads(capsys.readouterr().out)
+    assert (found["meets"], found["answer"]) == (False, None)
+    assert found["nearest"]["reported"]
+
+
+def test_the_command_fails_where_other_scenes_break_a_limit(tmp_path, shortcuts, capsys):
+    cells = np.zeros((200, 8, 8), bool)
+    cells[:, 1:3, 1:3] = True
+    cells[100:, 5:7, 5:7] = True
+    path = tmp_path / "recording.npy"
+    np.save(path, cells)
+    assert cli.main(["fit", str(path)]) == UNSOLVED
+    said = " ".join(capsys.readouterr().out.split())
+    assert "On scenes not used to choose the answer misses its limits: miscounts 100 % of scenes" in said
+    assert "Of a recording nobody knows what touched" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["guess"], "scene 'guess' is not known; take a .toml, .npz or .npy file, or one of bumper, fingers"),
+        (["none.toml"], "No such file"),
+        (["bumper", "--placements", "50"], "the limit of miscounted is 5 %; take 73 scenes or more"),
+        (["bumper", "--labeller", "x"], "labeller is 'x'; it must be one of 'run', 'serial', 'projection', 'single'"),
+        (["bumper", "--scan", "x"], "--scan 'x' is not known; take one of: raster; adaptive; reversal"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(arguments, message, capsys):
+    assert cli.main(["fit", *arguments]) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_a_recording_of_few_frames_is_refused(tmp_path, capsys):
+    np.save(tmp_path / "few.npy", np.ones((3, 4, 4), bool))
+    assert cli.main(["fit", str(tmp_path / "few.npy")]) == 1
+    assert "few.npy has 3 frames; two to choose with and two to report are the least" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", fit_page.EXAMPLES)
+def test_the_page_shows_what_the_examples_say(name):
+    command = f"contactfpga fit {fit_page.EXAMPLES[name]}"
+    assert command in (ROOT / fit_page.EXAMPLES[name].split()[0]).read_text()
+    section = (
+        (ROOT / "docs" / "fit.md").read_text().partition(f"<!-- figures: {name} -->")[2].partition("<!-- end -->")[0]
+    )
+    assert f"\n    {command}\n" in section
+    assert section.count("| the answer |") == section.count("| runner-up |") == 1
+
+
+def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
+    path = file(HANDS)
+    section = fit_page.section(f"{path} --pitch-mm 10 --scan raster")
+    lines = section.splitlines()
+    assert lines[0] == f"    contactfpga fit {path} --pitch-mm 10 --scan raster"
+    assert lines[2:4] == [
+        "| zones by | scan | sheet | pitch mm | LUT4 | wires | bytes | latency us | verdict |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    verdicts = [line.split(" | ")[-1].removesuffix(" |") for line in lines[4:] if line.count(" | ") == 8]
+    assert verdicts[-2:] == ["the answer", "runner-up"]
+    assert verdicts[1].startswith("miscounts 100 % of scenes")
+    assert section.endswith("cheaper ones are refused; 4 others cost more. Skin itself refuses 0 more settings.")
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize("name", fit_page.EXAMPLES)
+def test_the_page_is_up_to_date(name, monkeypatch):
+    monkeypatch.undo()  # what was synthesized before is kept
+    text = (ROOT / "docs" / "fit.md").read_text()
+    assert writer.update(text, {name: fit_page.TABLES[name]}) == text
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypatch):
+    """With real sizes and times."""
+    monkeypatch.undo()  # what was synthesized before is kept
+    text = (ROOT / "examples" / "scenes-bumper.toml").read_text()
+    limits = {"barycenter_mm": 3.0, "latency_us": 500.0, "pitches": None, "quick": True}
+    one, two = chosen(file(text), **limits), chosen(file(APART + text + SECOND), **limits)
+    assert one.answer.skin == Skin(labeller="single")
+    assert two.answer.skin == Skin(labeller="serial")
+    assert (one.broken, two.broken) == ((), ())
+
+
+@pytest.mark.recordings
+def test_real_contacts_need_an_exact_labeller(shortcuts):
+    path = figures.RECORDINGS / "dtmf16x16.dev.npz"
+    if not path.exists():
+        pytest.skip("the recordings are not there")
+    found = chosen(str(path), pitches=None, latency_us=None)
+    assert found.answer.skin.labeller == "serial"
+    assert found.answer.skin.connectivity == 8
+
+
+def test_dataclasses_of_a_task_can_be_sent_to_another_process(file):
+    import pickle
+
+    task = Task((source(file(HANDS)), source("moving")), ("a", "b"), Skin(), Goals(), 10)
+    assert pickle.loads(pickle.dumps(task)) == task
+    assert dataclasses.replace(task, count=11) != task

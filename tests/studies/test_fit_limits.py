@@ -1,0 +1,200 @@
+"""The limits of a fit, what a Skin costs, and which ones are tried."""
+
+import itertools
+import math
+
+import pytest
+from fits import BUMPER, HANDS, chosen, made_up
+from scipy.stats import binomtest
+
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.chart import speed
+from contactfpga_sim.studies.chart.errors import Interval, interval
+from contactfpga_sim.studies.chart.speed import Speed
+from contactfpga_sim.studies.fit import cost, search
+from contactfpga_sim.studies.fit.candidates import METHODS, candidates, pitches_for, size_for
+from contactfpga_sim.studies.fit.goals import Goals, Measured
+from contactfpga_sim.studies.fit.sources import source
+
+pytestmark = pytest.mark.usefixtures("alone")
+
+
+MEASURE = speed.measure
+
+
+# ---- limits
+
+
+def test_a_latency_that_is_too_long_is_refused_with_its_worst(file, shortcuts, monkeypatch):
+    monkeypatch.setattr(speed, "measure", MEASURE)
+    monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
+    path, given = file(BUMPER), source(file(BUMPER))
+    tried = candidates(Skin(), [(20.0, 20.0)], (80.0, 80.0), METHODS[:1], ["raster"])
+    frames = given.cells(tried[0].skin, Skin(), [index * 100 // 6 for index in range(6)], 100)
+    worst = MEASURE(tried[0].skin, frames, 0).worst_us
+    found = chosen(path, tried=tried, latency_us=worst, barycenter_mm=8.0)
+    assert found.answer.measured[0].speed.worst_us == worst
+    refused = chosen(path, tried=tried, latency_us=worst - 1, barycenter_mm=8.0)
+    assert refused.answer is None
+    assert refused.cheaper[0].refusals == (f"latency {worst:.0f} us at worst, limit {worst - 1:.0f} us",)
+
+
+def test_touches_of_the_answer_go_through_the_gateware_as_well(file, shortcuts):
+    found = chosen(file(BUMPER))
+    assert [one for one in shortcuts.checked if one[1]] == [(found.answer.skin, 2)]
+
+
+def test_bitmaps_need_a_host_that_says_its_time(file, shortcuts):
+    path = file(HANDS)
+    refused = next(one for one in chosen(path).cheaper if one.skin.report == "cells")
+    assert refused.refusals[0] == "reports no zones: say with --host-us how long the host takes to find them"
+    admitted = chosen(path, host_us=100.0)
+    assert admitted.answer.skin.report == "cells"
+    alike = next(one for one in chosen(path).cheaper if one.skin == admitted.answer.skin)
+    assert admitted.answer.measured[0].speed.worst_us == alike.measured[0].speed.worst_us + 100
+
+
+def test_nothing_that_meets_the_limits_gives_the_nearest(file, shortcuts):
+    found = chosen(file(BUMPER), barycenter_mm=0.1)
+    assert found.answer is None
+    assert shortcuts.sized == []
+    nearest = found.cheaper[0]
+    assert nearest.excess == min(one.excess for one in found.cheaper) > 1
+    assert nearest.skin.pitch_x_mm == 10
+    assert nearest.measured[0].errors["barycenter_mm"].high / 0.1 == pytest.approx(nearest.excess)
+
+
+def measured(**errors):
+    usual = {name: Interval(0.0, 0.0, 0.0, 100) for name in ("miscounted", "missed", "barycenter_mm", "area")}
+    return Measured(usual | errors, Speed(100.0, 200.0, 50.0, 17.0, 60.0, 1e4))
+
+
+def test_errors_are_judged_by_the_upper_end_and_what_is_reported_by_the_mean():
+    goals = Goals(miscounted=0.05, latency_us=200.0)
+    doubtful = measured(miscounted=Interval(0.04, 0.02, 0.08, 100))
+    message = "miscounts 4 % of scenes (2 to 8), limit 5 %: too few scenes to tell"
+    assert list(goals.misses(doubtful)) == [(pytest.approx(1.6), message)]
+    assert list(goals.misses(doubtful, sure=False)) == []
+    wrong = measured(miscounted=Interval(0.06, 0.05, 0.07, 100))
+    assert [words for _, words in goals.misses(wrong, sure=False)] == ["miscounts 6 % of scenes (5 to 7), limit 5 %"]
+    assert goals.excess(measured()) == 1
+
+
+def test_what_was_never_found_meets_no_limit():
+    nothing = Interval(math.nan, math.nan, math.nan, 0)
+    assert list(Goals().misses(measured(barycenter_mm=nothing))) == [(math.inf, "finds no contact")]
+    assert list(Goals(barycenter_mm=None).misses(measured(barycenter_mm=nothing))) == []
+
+
+def test_a_single_value_tells_nothing_of_the_mean():
+    one = interval([2.5])
+    assert (one.mean, one.low, one.high, one.count) == (2.5, -math.inf, math.inf, 1)
+    words = [words for _, words in Goals().misses(measured(barycenter_mm=one))]
+    assert words == ["barycenter off by 2.5 mm (0 to inf), limit 5 mm: too few scenes to tell"]
+
+
+def test_a_share_that_so_few_scenes_cannot_show_is_refused():
+    for limit in (0.5, 0.05, 0.003):
+        need = next(n for n in itertools.count(1) if binomtest(0, n).proportion_ci(method="wilson").high <= limit)
+        Goals(miscounted=limit, missed=None).check_count(need)
+        with pytest.raises(ValueError, match=f"take {need} scenes or more"):
+            Goals(miscounted=limit, missed=None).check_count(need - 1)
+
+
+# ---- what it costs
+
+
+def test_no_more_is_synthesized_than_the_order_of_the_cheapest_needs(file, shortcuts):
+    pitches = (5.0, 8.0, 10.0, 16.0, 20.0)
+    found = chosen(file(BUMPER), pitches=pitches)
+    asked = len(shortcuts.sized)
+    everything = candidates(Skin(), [(pitch, pitch) for pitch in pitches], (80.0, 80.0))
+    possible = [one for one in everything if one.skin is not None]
+    assert asked < 0.7 * len(possible)
+    assert len(set(shortcuts.sized)) == asked
+    below = [one for one in possible if made_up(one.skin) < found.answer.luts]
+    assert {one.skin for one in below} == {one.skin for one in found.cheaper if one.luts < found.answer.luts}
+    assert found.dearer == len(possible) - len(found.cheaper) - 1
+    rest = [made_up(one.skin) for one in possible if one.skin not in {trial.skin for trial in found.cheaper}]
+    assert sorted(rest)[:1] == [found.answer.luts]
+
+
+def test_quick_synthesizes_no_refused_ones(file, shortcuts):
+    path = file(HANDS)
+    slow = chosen(path)
+    every = len(shortcuts.sized)
+    shortcuts.sized.clear()
+    quick = chosen(path, quick=True)
+    assert (quick.answer, quick.runner_up, quick.cheaper) == (slow.answer, slow.runner_up, ())
+    assert len(shortcuts.sized) < every
+    assert {skin.labeller for skin in shortcuts.sized} == {"serial", "run"}
+
+
+def test_wires_then_bytes_decide_between_equal_luts(file, shortcuts, monkeypatch):
+    monkeypatch.setattr(cost, "luts_of", lambda skin: 500)
+    found = chosen(file(BUMPER), pitches=(10.0, 20.0), barycenter_mm=None, host_us=0.0)
+    assert found.answer.wires == 8
+    assert found.answer.bytes == min(one.bytes for one in (found.answer, found.runner_up))
+    assert found.answer.cost <= found.runner_up.cost
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: " ".join(map(str, method.values())))
+def test_no_method_needs_fewer_luts_on_a_finer_sheet(method, monkeypatch):
+    monkeypatch.undo()  # what was synthesized before is kept
+    for scan in ("raster", "adaptive"):
+        tried = candidates(
+            Skin(), [(p, p) for p in (32.0, 20.0, 16.0, 10.0, 8.0, 5.0)], (160.0, 160.0), [method], [scan]
+        )
+        luts = [cost.luts_of(one.skin) for one in tried if one.skin is not None]
+        assert luts == sorted(luts)
+        assert len(set(luts)) == len(luts)
+
+
+# ---- what is tried
+
+
+def test_candidates_are_what_was_asked_for(file):
+    base = Skin(
+        rows=12, columns=9, pitch_x_mm=10, pitch_y_mm=5, debounce="sym_defer_pk", mask=((1, 2),), settle_us=40.0
+    )
+    tried = candidates(base, pitches_for(base, [], None), size_for(base, []))
+    assert {(round(one.skin.columns * one.skin.pitch_x_mm, 6), round(one.skin.rows * one.skin.pitch_y_mm, 6))
+            for one in tried if one.skin} == {(90.0, 60.0)}  # fmt: skip
+    for one in tried:
+        if one.skin is None:
+            continue
+        assert one.skin.debounce == "sym_defer_pk"
+        assert one.skin.mask == (((1, 2),) if (one.skin.rows, one.skin.columns) == (12, 9) else ())
+    own = [one for one in tried if dict(one.settings)["rows"] == 12 and dict(one.settings)["columns"] == 9]
+    assert len(own) == 2 * len(METHODS)
+
+
+def test_a_skin_that_cannot_be_is_listed_with_its_reason(file, shortcuts):
+    found = chosen(file(BUMPER), pitches=(1.0, 20.0))
+    assert all(one.refusals[0].startswith("Skin refuses: rows is 80; it must lie between 1 and 64") for one in
+               found.impossible if dict(one.candidate.settings)["rows"] == 80)  # fmt: skip
+    assert len([one for one in found.impossible if dict(one.candidate.settings)["rows"] == 80]) == 14
+
+
+@pytest.mark.parametrize("pitch", [5.0, 10.0, 20.0])
+def test_a_built_in_scene_is_the_same_on_every_pitch(pitch):
+    base, lines = Skin(), round(160 / pitch)
+    skin = Skin(rows=lines, columns=lines, pitch_x_mm=pitch, pitch_y_mm=pitch, settle_us=20.0)
+    for number in range(5):
+        reference, seconds = source("two_fingers").at(base, base, number)
+        scene, same = source("two_fingers").at(skin, base, number)
+        assert seconds == same
+        for one, other in zip(reference.truth(seconds).contacts, scene.truth(seconds).contacts, strict=True):
+            assert one.x_mm + 5 == pytest.approx(other.x_mm + pitch / 2)
+            assert one.y_mm + 5 == pytest.approx(other.y_mm + pitch / 2)
+
+
+def test_sheets_that_differ_are_refused(file):
+    small = file(BUMPER, "a.toml")
+    large = file(BUMPER.replace("80", "90"), "b.toml")
+    with pytest.raises(ValueError, match="one sheet is 80 x 80 mm, another one 90 x 90 mm"):
+        size_for(None, [source(small), source(large)])
+    assert size_for(Skin(), [source(small), source(large)]) == (160.0, 160.0)
+    assert size_for(None, [source("bumper")]) == (160.0, 160.0)

@@ -1,0 +1,60 @@
+"""What the tests of `contactfpga fit` share: scenes, and formulas in the place of synthesis."""
+
+import math
+import random
+from concurrent.futures import ThreadPoolExecutor
+
+from contactfpga.skin import Skin
+from contactfpga_sim.studies.chart.speed import Speed
+from contactfpga_sim.studies.fit import sources
+from contactfpga_sim.studies.fit.candidates import candidates, pitches_for, size_for
+from contactfpga_sim.studies.fit.goals import Goals
+from contactfpga_sim.studies.fit.search import fit
+from contactfpga_sim.studies.fit.sources import source
+from contactfpga_sim.studies.fit.trial import Task
+
+BUMPER = 'width_mm = 80\nheight_mm = 80\ncount = 100\n[[contact]]\nshape = "disc"\nradius_mm = [12, 18]\n'
+SECOND = '[[contact]]\nshape = "disc"\nradius_mm = 12\n'
+APART = "gap_mm = 16\n"
+HANDS = APART + BUMPER.replace("[12, 18]", "12") + "number = [2, 3]\n"
+
+LUTS = {"cells": 300, "single": 500, "serial": 520, "projection": 560, "run": 800}
+
+
+def made_up(skin):
+    """LUT4 in the order that synthesis finds, without its minutes."""
+    by = "cells" if skin.report == "cells" else skin.labeller
+    more = 150 * (skin.scan == "adaptive") + 20 * (skin.connectivity == 4 and by in ("serial", "run"))
+    return LUTS[by] + more + 5 * (skin.rows + skin.columns)
+
+
+class Shortcuts:
+    """What was asked of them."""
+
+    def __init__(self):
+        self.sized = []
+        self.checked = []
+
+    def luts_of(self, skin):
+        self.sized.append(skin)
+        return made_up(skin)
+
+    def measure(self, skin, frames, checked):
+        self.checked.append((skin, checked))
+        size = 12 + skin.rows * math.ceil(skin.columns / 8) if skin.report == "cells" else 17
+        scan = 6.0 * skin.rows * (0.5 if skin.scan == "adaptive" else 1)
+        return Speed(1.5 * scan + 10 * size / 3, 2 * scan + 10 * size / 3, scan, size, scan, 1e6 / scan)
+
+
+def chosen(*names, pitches=(10.0, 20.0), shuffled=None, tried=None, **limits):
+    """The fit on these scenes, and the candidates in the order of ``shuffled``."""
+    given = tuple(map(source, names))
+    options = {name: limits.pop(name) for name in ("host_us", "quick", "base") if name in limits}
+    base = options.pop("base", None)
+    if tried is None:
+        tried = candidates(base or Skin(), pitches_for(base, given, pitches), size_for(base, given))
+    if shuffled is not None:
+        random.Random(shuffled).shuffle(tried)
+    task = Task(given, names, base or Skin(), Goals(**limits), sources.default_count(given), timed=6, **options)
+    with ThreadPoolExecutor(1) as executor:
+        return fit(task, tried, executor)
