@@ -148,6 +148,9 @@ ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
 closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
 	$(PY) -m contactfpga_sim.pages.closed_page docs/labelling.md
 
+several-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what several sheets at one FPGA cost, for docs/several.md (some minutes)
+	$(PY) -m contactfpga_sim.pages.several_page docs/several.md
+
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.proofs $(ARGS)
 

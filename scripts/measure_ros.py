@@ -41,7 +41,7 @@ NOT_PUBLISHED = {"wrench"}
 """Without pressure units."""
 
 
-HEAD = ("ROS 2", "published by", "topics read", "type hashes alike", "zones per second", "late, median", "late, 99 %")
+HEAD = ("ROS 2", "published by", "topics read", "same type hashes", "zones per second", "late, median", "late, 99 %")
 
 
 def shown_table() -> str:

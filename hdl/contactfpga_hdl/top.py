@@ -9,13 +9,14 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
+from contactfpga.wire.numbered import Place
 from contactfpga_hdl.dual import Dual
 from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
-from contactfpga_hdl.link.uart import Receiver, Transmitter
+from contactfpga_hdl.link.uart import LINE_BITS, Receiver, Transmitter
 from contactfpga_hdl.payloads import zone_layout
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.report.backlog import Backlog
@@ -26,6 +27,10 @@ from contactfpga_hdl.units.ports import unit_pins
 from contactfpga_hdl.units.units import Units
 
 _Stage = TypeVar("_Stage", bound=wiring.Component)
+
+_UART = {"tx": Out(1, init=1), "rx": In(1, init=1)}
+_SHARED = {"bits": In(LINE_BITS), "bytes": Out(stream.Signature(8)), "turn": In(1), "holds": Out(1)}
+"""In its place where several sheets share it."""
 
 
 class Top(wiring.Component):
@@ -48,10 +53,14 @@ class Top(wiring.Component):
     until a frame after that is packed.
 
     A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
+
+    With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
+    UART it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
     """
 
-    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False):
+    def __init__(self, skin: Skin, probes: bool = False, copy: bool = False, place: Place | None = None):
         self.skin = skin
+        self.place = place
         self.probes = probes
         self.copy = copy
         self._restarts = Signal(name="restarts")
@@ -60,8 +69,7 @@ class Top(wiring.Component):
             **row_pins(skin),
             **column_pins(skin),
             **unit_pins(skin),
-            "tx": Out(1, init=1),
-            "rx": In(1, init=1),
+            **(_UART if place is None else _SHARED),
             "contact": Out(1),
             **({"alive": Out(1)} if skin.alive else {}),
         }
@@ -85,21 +93,17 @@ class Top(wiring.Component):
         if self.skin.dual and not self.copy:
             return self._compared()
         m = Module()
-        bit_clocks = self.derived.bit_clocks
         scan = self._put(m, "scan", self.derived.scan.load_gateware()(self.skin))
         rows = self._debounced(m, scan)
         items, summary = self._zones(m, rows) if self.derived.report.zones else self._bitmap(m, rows)
-        packer = self._put(m, "packer", Packer(self.skin, offset_bits(self.skin)))
-        link = self._put(m, "link", Link(self.skin))
-        m.submodules.transmitter = transmitter = Transmitter(bit_clocks)
-        receiver = PulseReceiver(bit_clocks) if self.derived.pulsed else Receiver(bit_clocks)
-        self._put(m, "receiver", receiver)
-        request = self._put(m, "request", RequestReader(commands=bool(self.derived.commands)))
+        packer = self._put(m, "packer", Packer(self.skin, offset_bits(self.skin, self.place)))
+        link = self._put(m, "link", Link(self.skin, self.place))
+        number = None if self.place is None else self.place.number
+        request = RequestReader(bool(self.derived.commands), number)
+        self._connect_line(m, request, link)
         m.d.sync += self._restarts.eq(scan.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
-        wiring.connect(m, link.bytes, transmitter.bytes)
-        wiring.connect(m, receiver.bits, request.bits)
         connect_lines(m, self.skin, scan.pins, self)
         units = self._units(m, request, link) if self.skin.units else None
         self._watch_faults(m, scan, packer, units)
@@ -109,8 +113,6 @@ class Top(wiring.Component):
             wiring.connect(m, scan.slots, link.slots)
             m.d.comb += scan.command.eq(request.command & (request.what == SELF_TEST))
         m.d.comb += [
-            self.tx.eq(transmitter.pin),
-            receiver.pin.eq(self.rx),
             scan.request.eq(request.received),
             scan.heard.eq(request.heard),
             packer.tag.eq(scan.tag),
@@ -133,6 +135,21 @@ class Top(wiring.Component):
             self._probe(m, "row", rows, cells=rows.payload.cells, last=rows.payload.last)
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
+
+    def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
+        """Add what reads requests, and the UART, if it is this sheet's alone."""
+        if self.place is None:
+            m.submodules.transmitter = transmitter = Transmitter(self.derived.bit_clocks)
+            receiver = self._put(m, "receiver", receiver_of(self.derived))
+            self._put(m, "request", request)
+            wiring.connect(m, link.bytes, transmitter.bytes)
+            wiring.connect(m, receiver.bits, request.bits)
+            m.d.comb += [self.tx.eq(transmitter.pin), receiver.pin.eq(self.rx)]
+            return
+        self._put(m, "request", request)
+        wiring.connect(m, link.bytes, wiring.flipped(self.bytes))
+        wiring.connect(m, wiring.flipped(self.bits), request.bits)
+        m.d.comb += [link.turn.eq(self.turn), self.holds.eq(link.holds)]
 
     def _put(self, m: Module, name: str, stage: _Stage) -> _Stage:
         """Add a stage that begins again when a register is found wrong. The transmitter is none of them, so that the
@@ -237,6 +254,11 @@ class Top(wiring.Component):
         m.d.comb += getattr(self, f"{name}_transfer").eq(boundary.valid & boundary.ready)
         for field, value in fields.items():
             m.d.comb += getattr(self, f"{name}_{field}").eq(value)
+
+
+def receiver_of(derived: Derived) -> Receiver | PulseReceiver:
+    """What reads the receive pin."""
+    return PulseReceiver(derived.bit_clocks) if derived.pulsed else Receiver(derived.bit_clocks)
 
 
 def _packed(packer: Packer) -> Value:

@@ -85,5 +85,5 @@ def new(height_in: float) -> Figure:
 def save(figure: Figure, path: Path) -> Path:
     """Write a picture without the time at which it was drawn."""
     drawn_with = {".svg": {"Date": None}, ".png": {"Software": None}}
-    figure.savefig(path, dpi=2 * 96, metadata=drawn_with.get(path.suffix))
+    figure.savefig(path, dpi=2 * 96, metadata=drawn_with.get(path.suffix.lower()))
     return path

@@ -14,14 +14,14 @@ from rivals.exactness import READ_VERILOG
 from rivals.house import DESIGNS, FAMILIES, NO_COLLISIONS, Device, Netlists, Registered, Size, native, size, square
 from rivals.rival import Sheet
 
-PLAIN, TOLD = SETTINGS = ("plain", "told")
-"""``plain``: Yosys decides about memories and keeps every promise of the source. ``told``: what our builds tell it,
+PLAIN, OURS = SETTINGS = ("plain", "as in our builds")
+"""``plain``: Yosys decides about memories and keeps every promise of the source. ``as in our builds``: what they add,
 which is to put memories into block RAM on the UP5K, and, of designs of which it is true, that no word is read while it
 is written."""
 
 
 def before(device: Device, setting: str, collides: bool) -> tuple[str, ...]:
-    """What Yosys is told before synthesis; ``collides``: the design uses words that are read while they are written."""
+    """Commands of Yosys before synthesis; ``collides``: the design uses words that are read while they are written."""
     if setting == PLAIN:
         return ()
     family = next(family for name, family in FAMILIES.items() if device.fpga.startswith(name))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from rivals.exactness import Checked
 from rivals.house import DEVICES, Size, table_of
-from rivals.placement import SETTINGS, TOLD
+from rivals.placement import OURS, SETTINGS
 from rivals.rival import Rival
 
 
@@ -91,7 +91,7 @@ def summary_table(measured: Measured) -> str:
     worst = "last record after the last row is there, worst"
     rows = [("sheet", "labeller", worst, *(device.title for device in DEVICES))]
     for row in measured.rows:
-        cells = (_cell(row.sizes.get((device.title, TOLD))) for device in DEVICES)
+        cells = (_cell(row.sizes.get((device.title, OURS))) for device in DEVICES)
         rows.append((*_of(row), f"{row.checked.after_last_row} clocks", *cells))
     return table_of(rows)
 

@@ -55,6 +55,7 @@ RUNS = {
 class Outcome:
     """One scene through one engine."""
 
+    skin: Skin
     scene: str
     engine: str
     cells: np.ndarray
@@ -87,6 +88,7 @@ def run(name: str, engine: str, skin: Skin) -> Outcome:
     us = skin.clock_hz / 1e6
     touch = TOUCH_SCAN * scan
     return Outcome(
+        skin=skin,
         scene=name,
         engine=engine,
         cells=frames[TOUCH_SCAN],
@@ -111,6 +113,11 @@ def _readings(name: str, skin: Skin, scan: int) -> list[tuple[int, Sequence[int]
 def with_force() -> Skin:
     """The reference sheet on pressure units."""
     return Skin.load(examples() / "force.toml")
+
+
+def forearm() -> Skin:
+    """A sheet of the same size whose ends meet."""
+    return Skin.load(examples() / "forearm.toml")
 
 
 def load_cells() -> LoadCells:
@@ -153,7 +160,10 @@ LEGEND = (
 )
 """Which number of the table is which."""
 
-TITLE = "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud"
+TITLE = (
+    "Reference Skin: 16x16, 12 MHz, 5 us settle, 1 us release, 3 Mbaud; pushing: on three pressure units, 6 Mbaud; "
+    f"{', '.join(scenes.AROUND)}: on a closed sheet"
+)
 
 HEADS = (
     *("scene", "engine", "verdict", "zones", "last record after last row", "touch to first byte", "touch to last byte"),
@@ -200,7 +210,7 @@ def main() -> int:
         terminal.say(f"{len(wrong)} of {len(outcomes)} runs differ from the golden model")
     else:
         terminal.say(f"All {len(outcomes)} runs agree with the golden model in every clock.")
-    drawing.to_file(scenes_run, Skin(), picture)
+    drawing.to_file(scenes_run, picture)
     terminal.say(f"Scenes and their zones: {picture}")
     if not wrong:
         terminal.say("Next, a virtual sheet in your browser, which the mouse presses:\n.venv/bin/contactfpga view")
@@ -209,10 +219,11 @@ def main() -> int:
 
 def _run_all(skin: Skin) -> list[Outcome]:
     runs = [(name, engine) for name, engines in RUNS.items() for engine in engines if _available(engine)]
+    skins = {FORCED: with_force(), **dict.fromkeys(scenes.AROUND, forearm())}
     outcomes = []
     with pool.progress() as step:
         for name, engine in runs:
-            outcomes.append(run(name, engine, with_force() if name == FORCED else skin))
+            outcomes.append(run(name, engine, skins.get(name, skin)))
             step("scenes", len(runs))
     return outcomes
 

@@ -130,7 +130,10 @@ class History:
     def event(self, name):
         devices = self.world.devices
         self.event_s[name] = self.world.now
-        match self.random.choice(["plug", "plug", "other", "unplug", "mute", "restart", "flash"]):
+        match self.random.choice(["plug", "plug", "other", "unplug", "mute", "restart", "flash", "leap"]):
+            case "leap":  # the computer was suspended, or had other things to do; frames wait at the ports
+                self.world.now += self.random.choice([0.05, 0.6, 3.0])
+                self.event_s = dict.fromkeys(LINKS, self.world.now)
             case "plug":
                 devices[name] = Device(self.world, name, SKIN)
             case "other":
@@ -181,7 +184,7 @@ class History:
         return "ok" if device.wire.skin is SKIN else "mismatch"
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
+@pytest.mark.parametrize("seed", [4, 5, 7])
 def test_states_and_frames_are_those_of_the_world(body, seed):
     history = History(body, seed)
     for _ in range(600):

@@ -116,12 +116,31 @@ def test_command_learns_from_angles_on_standard_input(robot, capsys, monkeypatch
     assert cli.main(asked) == 0
     printed = capsys.readouterr().out
     assert "new.json: 3 frames from 0.00 to 0.40 rad, 12 cells pressed somewhere, at 3 of 3 steps" in printed
-    assert "1 steps between were not visited: there nothing will be marked" in printed
+    assert "no frame came at 1 of the 2 steps between: move more slowly, or folds there are not marked" in printed
     assert Folds.load(output).frames == {0: 1, 1: 1, 3: 1}
-    for text, says in (("x\n", "line 1 of standard input is 'x', no angle in rad"), ("", "no angle came on standard")):
+    for text, says in (
+        ("x\n", "line 1 of standard input is 'x'; it must be an angle in rad"),
+        ("", "no angle came on standard"),
+    ):
         monkeypatch.setattr("sys.stdin", io.StringIO(text))
         assert cli.main(asked) == 1
         assert says in capsys.readouterr().err.replace("\n  ", " ")
+
+
+@pytest.mark.parametrize(
+    ("joint", "says"),
+    [
+        ("L_ELBOW_P", 'its Skin has report = "moments"; folds are learned cell by cell'),
+        ("L_ELBOW", "joint 'L_ELBOW' is no joint of the URDF; it has R_HIP_P"),
+    ],
+)
+def test_what_cannot_be_learned_is_said_before_anybody_moves_the_robot(joint, says, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("jvrc_description")
+    monkeypatch.setattr("contactfpga.driver.driver.open", lambda *_, **__: pytest.fail("a board was opened"))
+    robot = contactfpga.examples() / "robot.toml"
+    assert cli.main(["body", "learn", str(robot), "left_forearm", joint, str(tmp_path / "new.json")]) == 1
+    assert says in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 class Sweeping(DirectPort):

@@ -153,6 +153,7 @@ CASES = [
     *([*command, "--skin", name] for command in WITH_SKIN for name in TOML),
     ["zones", "replay://RECORDED", "--record", "RECORDED"],
     ["zones", "sim://", "--record", "FOLDER"],
+    ["publish", "sim://", "--key", ""],
     ["zones", "sim://", "--record", "/no/folder/x"],
     *(["recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
     *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
@@ -216,7 +217,7 @@ def test_what_cannot_be_is_refused(arguments, run):
 def test_a_recording_is_not_emptied_by_its_own_replay(run, files):
     before = files["RECORDED"].read_bytes()
     status, errors = run("zones", "--json", "replay://RECORDED", "--record", "RECORDED")
-    assert "record to another file" in refused(status, errors)
+    assert "is there already; name a new file" in refused(status, errors)
     assert files["RECORDED"].read_bytes() == before
 
 

@@ -113,3 +113,15 @@ def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypat
     assert cli.main(["replay", str(tmp_path / "frames.npy")]) == 0
     speed = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("speed"))
     assert "500 frames per second" in speed
+
+
+def test_a_file_is_named_as_it_was_asked_for(tmp_path):
+    """And not as the folder that cannot be."""
+    (tmp_path / "file").touch()
+    with pytest.raises(outputs.OutputError) as caught:
+        outputs.file(tmp_path / "file" / "x.csv", "OUT")
+    assert str(caught.value) == f"OUT is '{tmp_path}/file/x.csv'; '{tmp_path}/file' is no folder"
+    with pytest.raises(
+        outputs.OutputError, match=r"OUT is '/dev/null/below/x.csv', which cannot be written: Not a dir"
+    ):
+        outputs.file("/dev/null/below/x.csv", "OUT")

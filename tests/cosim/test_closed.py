@@ -15,36 +15,45 @@ from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.board import replay
-from contactfpga_sim.cosim import bench_amaranth
+from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import stimulus
+from contactfpga_sim.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
 from contactfpga_sim.golden import Timeline, boundaries, cylinder, predict
 from contactfpga_sim.golden.facts import facts
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25.0, "closed": True}
 SKINS = {
     "run": Skin(rows=6, columns=7, settle_us=3.0, **CLOSED),
-    "run, 4": Skin(rows=5, columns=8, connectivity=4, settle_us=3.0, send="on_change", **CLOSED),
-    "serial": Skin(rows=5, columns=5, labeller="serial", settle_us=3.0, **CLOSED),
     "serial, 4": Skin(rows=4, columns=3, labeller="serial", connectivity=4, settle_us=4.0, **CLOSED),
     "cells": Skin(rows=4, columns=6, report="cells", labeller="single", **CLOSED),
-    "adaptive": Skin(rows=8, columns=6, scan="adaptive", settle_us=6.0, **CLOSED),
-    "reversal": Skin(rows=8, columns=9, scan="reversal", precharge_us=0.25, settle_us=0.5, **CLOSED),
-    "reversal, serial": Skin(
-        rows=8, columns=6, scan="reversal", labeller="serial", precharge_us=0.25, debounce="sym_defer_pk", **CLOSED
-    ),
-    "tight, 4": Skin(rows=9, columns=16, connectivity=4, labeller="serial", settle_us=4.5, zone_capacity=5, **CLOSED),
 }
 
 
-@pytest.mark.parametrize("name", sample(SKINS, quick=["run", "serial, 4", "reversal"]))
-def test_boards_are_the_golden_models_in_every_clock(name):
-    skin = SKINS[name]
-    cycles = 3_000
-    timeline = stimulus(skin, cycles, seed=len(name))
+COVERING = {
+    scan: pairwise(closed(choices))
+    for scan, choices in (("raster", CHOICES), ("adaptive", ADAPTIVE), ("reversal", REVERSAL))
+}
+EVERY = [(scan, number) for scan, chosen in COVERING.items() for number in range(len(chosen))]
+
+
+@pytest.mark.parametrize(("scan", "number"), sample(EVERY, quick=EVERY[::13]))
+def test_covering_set_in_amaranths_simulator(scan, number):
+    skin = skin_for(COVERING[scan][number])
+    cycles = 2_000
+    timeline = stimulus(skin, cycles, seed=number)
+    expected = predict(skin, timeline, cycles)
+    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+@pytest.mark.campaign  # compiles a board each
+@pytest.mark.parametrize(("scan", "number"), EVERY[::2])
+def test_covering_set_in_compiled_boards(scan, number, record_property):
+    skin = skin_for(COVERING[scan][number])
+    cycles = 200_000
+    timeline = stimulus(skin, cycles, seed=number)
     expected = predict(skin, timeline, cycles)
     assert all(expected.events(boundary) for boundary in boundaries(skin))
-    assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
+    record_property("cases", compare(expected, bench_native.run(skin, timeline, cycles)))
 
 
 def frames_of(skin, trace):

@@ -72,19 +72,21 @@ def test_only_files_are_replayed(tmp_path, kind):
 
 
 @pytest.mark.parametrize("link", ["same", "symlink", "hard link"])
-def test_a_recording_is_not_written_over_while_it_is_read(tmp_path, link):
+def test_a_recording_is_never_written_over(tmp_path, link):
+    """Neither the one that is replayed nor any other."""
     path, other = tmp_path / "frames.bin", tmp_path / "other.bin"
     path.write_bytes(b"precious")
     if link == "same":
         other = path
     else:
         (other.symlink_to if link == "symlink" else other.hardlink_to)(path)
-    with pytest.raises(ContactFPGAError, match="record to another file"):
-        recording.create(other, f"replay://{path}")
+    for port in (f"replay://{path}", "sim://"):
+        with pytest.raises(ContactFPGAError, match="is there already; name a new file, or remove it first"):
+            contactfpga.open(port, record=other)
     assert path.read_bytes() == b"precious"
-    recording.create(tmp_path / "new.bin", f"replay://{path}").close()
-    recording.create(other, "sim://").close()
-    assert path.read_bytes() == b""
+    (tmp_path / "empty.bin").touch()
+    for name in ("new.bin", "empty.bin"):
+        recording.create(tmp_path / name).close()
 
 
 # ---- the link of `contactfpga board`
@@ -151,3 +153,45 @@ def test_errors_cannot_command_the_terminal(capsys, monkeypatch):
     monkeypatch.setattr(native, "load", fail)
     assert cli.main(["zones", "--json", "sim://"]) == 1
     assert capsys.readouterr().err == "contactfpga: line 1 \\x1b[2J\nline 2\n"
+
+
+@pytest.mark.parametrize(
+    ("port", "said"),
+    [
+        ("", "the port has no name"),
+        ("xyz://there", "xyz:// is not known; there are sim://, replay://FILE and zenoh://KEY"),
+        ("my touches.mcap", "is a file; to play a recording name 'replay://my touches.mcap' as the port"),
+        ("robot.toml", "is a file; for the boards of a robot there is: contactfpga body robot.toml"),
+        ("replay://touches.mcap?speed=2", "; the options are ?pace=1, ?start=SECONDS and ?link=NAME"),
+        ("replay://what?.mcap", "is the path right?"),
+        ("none", "is the board plugged in? `contactfpga doctor --list` lists the ports"),
+    ],
+)
+def test_what_is_no_port_is_refused_with_the_next_step(port, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("my touches.mcap", "robot.toml"):
+        (tmp_path / name).touch()
+    with pytest.raises(PortNotFound) as caught:
+        contactfpga.open(port)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "said"),
+    [
+        ({"port": 5}, TypeError, "port is 5; it must be a port's name or a virtual board"),
+        ({"port": b"sim://"}, TypeError, "port is b'sim://'; it must be"),
+        ({"record": 5}, TypeError, "record is 5; it must be the name of a file or a Tap"),
+        ({"baud": "fast"}, ValueError, "baud is 'fast'; it must be a whole number from 1200 to 200000000"),
+        ({"baud": 0}, ValueError, "baud is 0; it must be"),
+    ],
+)
+def test_what_no_board_can_be_opened_with(options, kind, said):
+    with pytest.raises(kind) as caught:
+        contactfpga.open(**{"port": "sim://"} | options)
+    assert said in str(caught.value)
+
+
+def test_a_path_is_a_port(tmp_path):
+    with pytest.raises(PortNotFound, match="none cannot be opened"):
+        contactfpga.open(tmp_path / "none")

@@ -120,6 +120,16 @@ def test_a_name_tells_identical_boards_apart(three):
         contactfpga.open(skin=SKIN)
 
 
+def test_the_name_in_a_skin_tells_identical_boards_apart(three):
+    """And a board without that name is taken where it is the only one of its Skin: names are no part of it."""
+    with contactfpga.open(skin=SKIN.replace(name="RIGHT"), timeout=LONG) as opened:
+        assert opened.port == three[1].path
+    with pytest.raises(contactfpga.PortNotFound, match=r"several boards answer with fingerprint .*: name:LEFT or name"):
+        contactfpga.open(skin=SKIN.replace(name="HEAD"))
+    with contactfpga.open(skin=SKIN.replace(rows=8, name="HEAD"), timeout=LONG) as opened:
+        assert opened.port == three[2].path
+
+
 def test_a_serial_number_opens_its_port_without_a_search(three, monkeypatch):
     monkeypatch.setattr(finding, "survey", lambda *_: pytest.fail("it searched"))
     with contactfpga.open("usb:A2", timeout=LONG) as opened:
@@ -133,8 +143,10 @@ def test_what_is_not_there_is_named_with_what_is(three):
         contactfpga.open("name:HEAD")
     with pytest.raises(contactfpga.PortNotFound, match=r"no board with fingerprint .* is here"):
         contactfpga.open(skin=SKIN.replace(rows=9))
-    with pytest.raises(contactfpga.PortNotFound, match=r"no board named 'LEFT' with fingerprint .* is here"):
-        contactfpga.open("name:LEFT", SKIN.replace(rows=8))
+    with pytest.raises(contactfpga.PortNotFound, match=r"no board named 'HEAD' with fingerprint .* is here"):
+        contactfpga.open("name:HEAD", SKIN.replace(rows=8))
+    with pytest.raises(contactfpga.SkinMismatch, match=r"was built from .*rows"):
+        contactfpga.open("name:LEFT", SKIN.replace(rows=8), timeout=LONG)
 
 
 def test_a_search_writes_to_no_port(three):

@@ -115,11 +115,11 @@ def test_a_port_is_given_back_though_its_recording_cannot_be_closed():
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
 def test_a_full_disk_is_named():
     says = r"^/dev/full cannot be written: No space left on device; make room, then record again$"
-    tap = FileTap("/dev/full", "a")
+    tap = FileTap("/dev/full")
     with pytest.raises(contactfpga.ContactFPGAError, match=says):
         tap.take(bytes(1 << 20), 0.0)
     tap.close()
-    tap = FileTap("/dev/full", "a")
+    tap = FileTap("/dev/full")
     tap.take(b"what waits", 0.0)
     with pytest.raises(contactfpga.ContactFPGAError, match=says):
         tap.close()

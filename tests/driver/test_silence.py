@@ -1,6 +1,7 @@
 """No data: silence is an error or an event, and never an empty sheet."""
 
 import asyncio
+import contextlib
 
 import pytest
 from model_board import ModelBoard
@@ -166,6 +167,37 @@ def test_a_frame_that_waits_too_long_is_not_the_latest(board, port):
     port.seconds += 1.0
     with pytest.raises(contactfpga.NoData):
         board.latest(max_age_s=0.05)
+
+
+def test_a_frame_that_waited_on_its_way_is_not_the_latest(board, port):
+    """As after a network, or this program, stood still: it came just now, and was scanned long ago."""
+    for _ in range(10):
+        board.next()
+    late, port.dead = port.frame(), True
+    port.seconds += 0.6
+    port.out += late
+    with pytest.raises(
+        contactfpga.NoData, match=r"frame \d+ waited on its way, 0\.\d+ s or more \(allowed are 0\.05 s\)"
+    ):
+        board.latest(max_age_s=0.05)
+    port.dead = False
+    port.time_us += round(0.6 * 1e6)
+    assert board.latest(max_age_s=0.05).sequence
+    port.out += port.frame()
+    assert board.latest(), "without a limit"
+
+
+def test_where_the_clock_jumped_and_no_frame_waited_the_answer_to_a_request_shows_it(board, port):
+    for _ in range(10):
+        board.next()
+    port.seconds += 2.0
+    port._next += 2.0
+    found, frames = [], board.subscribe()
+    for _ in range(50):
+        frames.next()
+        with contextlib.suppress(contactfpga.NoData):
+            found.append(board.latest(max_age_s=0.05))
+    assert len(found) > 30
 
 
 def test_the_timeout_may_be_shorter_than_the_deadline(board, port):

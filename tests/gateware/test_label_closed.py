@@ -1,94 +1,40 @@
 """Labellers of sheets whose ends meet: zones around a cylinder, their turns, and the clocks of docs/timing.md."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from sample import sample
-from scipy import ndimage
+import unrolled
+from unrolled import RING, RULES, WOUND, every_frame, recorded, skin_of
 
-from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.labeller import LabelBench
-from contactfpga_sim.golden import all_departures, cylinder, label, row_clocks
-
-CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
-RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
+from contactfpga_sim.golden import all_departures, cylinder, label
 
 SHAPES = {
     # name: rows, zones with 8-connectivity as (area, sum x counted on past the seam or ring or wound, sum y)
     "over the seam": ("#..#", [(2, 7, 0)]),
-    "row": ("####", [(4, "ring", 0)]),
+    "row": ("####", [(4, RING, 0)]),
     "corners over the seam": ("#... ...#", [(2, 7, 1)]),
     "helix two wide": ("##.. .##. ..## #..#", [(8, 16, 12)]),
     "helix of a turn": ("#... .#.. ..#. ...#", [(4, 6, 6)]),
     "helix of one turn and a cell": ("#... .#.. ..#. ...# #...", [(5, 10, 10)]),
     "helix of three turns": ("##...... ..##.... ....##.. ......## ##...... ..##.... ....##.. ......## ##......",
-                             [(18, "wound", 72)]),
-    "arms that meet behind": ("#..# #..# ####", [(8, "ring", 10)]),
+                             [(18, WOUND, 72)]),
+    "arms that meet behind": ("#..# #..# ####", [(8, RING, 10)]),
     "U, open behind": ("#...# #...# ##..#", [(7, 33, 8)]),
     "arch over the seam": ("###.# #.#.# .....", [(7, 3, 3)]),
     "bar over the seam and a dot": ("#...# #.#.# #...#", [(6, 27, 6), (1, 2, 1)]),
     "nested arches over the seam": ("####.#### #.......# #.##.##.# #.#...#.# #.#...#.#",
                                     [(16, 136, 20), (4, 9, 11), (4, 23, 11)]),
-    "two rings": ("#### .... ####", [(4, "ring", 0), (4, "ring", 8)]),
-    "ring and a dot below it": ("#### .... #..#", [(4, "ring", 0), (2, 7, 4)]),
+    "two rings": ("#### .... ####", [(4, RING, 0), (4, RING, 8)]),
+    "ring and a dot below it": ("#### .... #..#", [(4, RING, 0), (2, 7, 4)]),
     "nearly a ring": ("#.#. #.#. #.##", [(7, 21, 8)]),
-    "ring in the last row": ("#.#. #.#. #.## ####", [(11, "ring", 20)]),
-    "two arms, either side of the seam": (".#..#.# .####.# #.....# #######", [(17, "ring", 30)]),
+    "ring in the last row": ("#.#. #.#. #.## ####", [(11, RING, 20)]),
+    "two arms, either side of the seam": (".#..#.# .####.# #.....# #######", [(17, RING, 30)]),
 }  # fmt: skip
 
 
 def cells_of(picture):
     return np.array([[mark == "#" for mark in line] for line in picture.split()])
-
-
-def skin_of(rows, columns, connectivity, labeller):
-    return Skin(
-        rows=rows,
-        columns=columns,
-        connectivity=connectivity,
-        labeller=labeller,
-        surface="cylinder",
-        radius_mm=20.0,
-        closed=True,
-        settle_us=100,
-        zone_capacity=1,
-    )
-
-
-def unrolled(cells, connectivity):
-    """Zones by scipy on many turns side by side: [(area, x, sum y)], x as in SHAPES."""
-    columns = cells.shape[1]
-    turns = 2 * (cells.size // columns) + 3
-    structure = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
-    labels, _ = ndimage.label(np.tile(cells, turns), structure)
-    middle, seen, found = turns // 2 * columns, set(), []
-    for y, x in zip(*np.nonzero(cells), strict=True):
-        if (y, x) in seen:
-            continue
-        ys, xs = np.nonzero(labels == labels[y, middle + x])
-        places = set(zip(ys.tolist(), (xs % columns).tolist(), strict=True))
-        seen |= places
-        turn = xs // columns - (xs // columns).min()
-        past = int((turn > 0).sum())
-        place = "ring" if len(places) < len(ys) else "wound" if turn.max() > 1 else None
-        if place is None:
-            place = (int((xs % columns).sum()) + columns * past) % (columns * len(ys))
-        found.append((len(places), place, sum(y for y, _ in places)))
-    return sorted(found, key=str)
-
-
-def named(records, columns):
-    """The same of (area, sum x, sum y, turned) records."""
-    found = []
-    for area, sum_x, sum_y, turned in records:
-        place = "ring" if turned == area else "wound" if turned > area else None
-        found.append((area, (sum_x + columns * turned) % (columns * area) if place is None else place, sum_y))
-    return sorted(found, key=str)
 
 
 def simulated(bench, frames, connectivity, labeller, rng=None, gap=0.0, stall=0.0):
@@ -139,15 +85,15 @@ def check_simulated(bench, frames, connectivity, labeller):
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_golden_model_knows_shapes_by_hand_and_agrees_with_an_unrolled_sheet(name):
     cells, zones = cells_of(SHAPES[name][0]), SHAPES[name][1]
+    columns = cells.shape[1]
     for connectivity in (8, 4):
         work = label.labelling(cells, connectivity, "run", closed=True)
-        found = named([(zone.area, zone.sum_x, zone.sum_y, zone.turned) for zone in work.departures], cells.shape[1])
-        assert found == unrolled(cells, connectivity)
+        records = [(zone.area, zone.sum_x, zone.sum_y, zone.turned) for zone in work.departures]
+        found = unrolled.of_records(0, records, columns)
+        assert np.array_equal(found, unrolled.zones(cells[None], connectivity))
         if connectivity == 8:
-            columns = cells.shape[1]
-            assert found == sorted(
-                ((a, x if isinstance(x, str) else x % (columns * a), y) for a, x, y in zones), key=str
-            )
+            by_hand = [(0, a, x if x in (RING, WOUND) else x % (columns * a), y) for a, x, y in zones]
+            assert found.tolist() == sorted(map(list, by_hand))
 
 
 @pytest.mark.parametrize("connectivity", [8, 4])
@@ -156,13 +102,14 @@ def test_the_golden_model_floods_a_cylinder(connectivity, columns):
     rng = np.random.default_rng(columns)
     frames = rng.random((100, 5, columns)) < rng.uniform(0.3, 0.9, (100, 1, 1))
     departures = all_departures(frames, connectivity, closed=True)
+    found = unrolled.of_records(departures.frame, departures.moments, columns)
+    assert np.array_equal(found, unrolled.zones(frames, connectivity))
     for index, cells in enumerate(frames):
         labels, turned = cylinder.flood(cells, connectivity)
         records = []
         for zone, past in enumerate(turned, 1):
             y, x = np.nonzero(labels == zone)
             records.append((len(x), int(x.sum()), int(y.sum()), past))
-        assert named(records, columns) == unrolled(cells, connectivity)
         of_many = departures.moments[departures.offsets[index] : departures.offsets[index + 1]].tolist()
         assert sorted(map(tuple, of_many)) == sorted(records)
 
@@ -191,88 +138,3 @@ def test_stalls_on_either_port_change_no_zone(bench, rng, connectivity, labeller
 @pytest.mark.parametrize(("connectivity", "labeller"), RULES)
 def test_a_recording_wrapped_around_comes_out_in_its_cycles(bench, connectivity, labeller):
     check_simulated(bench, recorded("sdh13x6")[::40][:12], connectivity, labeller)
-
-
-def every_frame(rows, columns, first=0, count=None):
-    cells = rows * columns
-    numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
-    return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
-
-
-def mazes(rows, columns, count, seed):
-    """Dots joined at random, and sheared, so that ways wind around the cylinder."""
-    rng = np.random.default_rng(seed)
-    frames = np.zeros((count, rows, columns), bool)
-    for frame in frames:
-        across, down, dots = rng.uniform(0.2, 0.6), rng.uniform(0.5, 0.95), rng.uniform(0.8, 1.0)
-        chance = np.zeros((rows, columns))
-        chance[::2, ::2], chance[::2, 1::2], chance[1::2, ::2] = dots, across, down
-        frame[:] = rng.random((rows, columns)) < chance
-        lean = rng.choice([-2, -1, 0, 1, 2])
-        for y in range(rows):
-            frame[y] = np.roll(frame[y], y * lean // 2)
-        frame |= rng.random((rows, columns)) < rng.choice([0.0, 0.05])
-    return frames
-
-
-def recorded(name):
-    path = DATA / f"{name}.dev.npz"
-    if not path.exists():
-        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
-    with np.load(path, allow_pickle=False) as file:
-        return file["pressed"]
-
-
-def check_compiled(frames, connectivity, labeller, stalled=False):
-    """Every record, its place in the order and its clock; and the bound on the last one."""
-    _, rows, columns = frames.shape
-    rule = connectivity, labeller, True
-    with LabelBench(skin_of(rows, columns, connectivity, labeller)) as bench:
-        got = bench.run(frames)
-        expected = all_departures(frames, *rule)
-        if stalled:
-            assert np.array_equal(bench.run(frames, gap=20, stall=60).sorted_moments(), expected.sorted_moments())
-    assert np.array_equal(got.frame, expected.frame)
-    assert np.array_equal(got.moments, expected.moments)
-    busy, end = row_clocks(frames, *rule)
-    handed = got.first_row[0] + (np.cumsum(busy) - busy.ravel()).reshape(busy.shape)
-    assert np.array_equal(got.cycle, handed[expected.frame, expected.row] + expected.clock)
-    assert np.array_equal(got.end, handed[:, -1] + end[:, -1])
-    assert busy.max() <= Derived(skin_of(rows, columns, connectivity, labeller)).label_row_clocks
-    if labeller == "run" and connectivity == 8:
-        assert got.last_record_clocks.max() <= columns / 2 + 5
-
-
-@pytest.mark.parametrize(
-    ("rows", "columns", "connectivity", "labeller"),
-    sample(
-        [(*size, *rule) for size in ((4, 4), (5, 4), (4, 5), (3, 3), (6, 3)) for rule in RULES],
-        quick=[(4, 4, 8, "run")],
-    ),
-)
-def test_every_small_frame(record_property, rows, columns, connectivity, labeller):
-    total, part = 1 << rows * columns, 1 << 16
-    for first in range(0, total, part):
-        check_compiled(every_frame(rows, columns, first, min(part, total)), connectivity, labeller)
-    record_property("cases", total)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(("connectivity", "labeller"), RULES)
-@pytest.mark.parametrize("size", [(9, 7), (12, 12), (16, 16), (20, 33), (64, 64)])
-def test_random_frames_and_mazes(record_property, size, connectivity, labeller):
-    rng = np.random.default_rng(size[0])
-    count = 200_000 // (size[0] * size[1])
-    noise = rng.random((count, *size)) < rng.uniform(0.02, 0.98, (count, 1, 1))
-    check_compiled(np.concatenate([noise, mazes(*size, count, seed=size[1])]), connectivity, labeller, stalled=True)
-    record_property("cases", 2 * count)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(("connectivity", "labeller"), RULES)
-@pytest.mark.parametrize("name", RECORDINGS)
-def test_recordings_wrapped_around(record_property, name, connectivity, labeller):
-    frames = recorded(name)
-    for first in range(0, len(frames), 2000):
-        check_compiled(frames[first : first + 2000], connectivity, labeller)
-    record_property("cases", len(frames))

@@ -206,7 +206,7 @@ def test_ours_are_right_on_the_same_frames(labeller):
 def test_plain_tells_nothing_and_told_only_what_is_true():
     for device in DEVICES:
         assert placement.before(device, placement.PLAIN, collides=False) == ()
-        ours, theirs = (placement.before(device, placement.TOLD, collides) for collides in (False, True))
+        ours, theirs = (placement.before(device, placement.OURS, collides) for collides in (False, True))
         assert NO_COLLISIONS in ours
         assert theirs == tuple(command for command in ours if command != NO_COLLISIONS)
 

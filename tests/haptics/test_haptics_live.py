@@ -8,7 +8,19 @@ from bumpers import flat
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.haptics import Cylinder, HapticsError, LoadCells, Plane, WithReadings, felt
+from contactfpga.console.forces import Forces
+from contactfpga.haptics import (
+    AloneWatch,
+    Cylinder,
+    Drift,
+    HapticsError,
+    LoadCells,
+    Plane,
+    WithReadings,
+    Wrench,
+    contacts,
+    felt,
+)
 from contactfpga.haptics.table import write
 from contactfpga.tracking.tracker import Tracker
 from contactfpga_sim.board.virtual import VirtualBoard
@@ -62,6 +74,25 @@ def test_forces_of_two_contacts_come_through_gateware_and_driver():
     assert first.track != second.track
     assert first.time_us is not None
     assert first.covariance_m2 == pytest.approx(np.diag([1e-4 / 12, 1e-4 / 12, 0]))
+
+
+@pytest.mark.parametrize(("second_s", "off_n"), [(0.03, 0.1), (0.01, 1.3)])
+def test_a_contact_that_was_alone_for_20_ms_is_where_its_center_of_pressure_was(second_s, off_n):
+    """The sheet puts it at a switch, 4.2 mm off, of 38 mm: 12 N are split wrongly by 1.3 N."""
+    cells = bumper()
+    later = Track((second_s - 1e-6, second_s), (0.0, 12.0))
+    scene = Scene((finger(3.0, 3.0, 12.0), finger(30, 30, later)))
+    with contactfpga.open(VirtualBoard(SKIN, scene, units=cells), SKIN) as board:
+        frames, watch, found = WithReadings(board), AloneWatch(cells), []
+        while len(found) < 40:
+            zones = frames.next()
+            watch.take(zones)
+            if len(zones) == 2 and zones.units is not None and zones.time_us > 1e6 * second_s + 500:
+                found.append(felt(cells, zones, alone=watch))
+    pushes = np.mean([[one.normal_n for one in each] for each in found], axis=0)
+    assert np.abs(pushes - 12.0).max() == pytest.approx(off_n, abs=0.15)
+    assert (found[-1][0].touch.point_sigma_m < 3e-4) == (off_n < 1)
+    assert found[-1][1].touch.point_sigma_m == pytest.approx(1e-2 / 12**0.5)
 
 
 def test_readings_of_a_frame_are_those_of_its_moment():
@@ -118,6 +149,14 @@ def test_units_of_a_scene_lift_and_clip():
     wrench = cells.wrench(read)
     assert wrench.lifted
     assert wrench.saturated
+
+
+def test_a_drifted_unit_is_named_with_its_drift():
+    forces = Forces(bumper(), 0.5)
+    forces.contacts = contacts(Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), [])
+    forces.drift = Drift(np.array([0.0, -0.4123, 0.01]), (1,), 12.0)
+    assert forces.sentences() == ["unit 1 drifted by -0.41 N"]
+    assert forces.to_dict()["drifted"] == [1]
 
 
 def test_a_sheet_without_surface_is_refused():

@@ -7,7 +7,7 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.net.address import is_loopback, key_of, parse
+from contactfpga.net.address import ENDPOINT, is_loopback, key_of, parse
 from contactfpga.net.message import MOST_BYTES, Counters, Message, Stream
 from contactfpga.wire.asked import Asked, asked_in
 from contactfpga.wire.command import Command, encode_command
@@ -45,7 +45,7 @@ class Receiver:
         self.frames += [event.zones for event in self.host.receive(data, now_s) if isinstance(event, Arrival)]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_whatever_is_lost_nothing_wrong_is_delivered(seed):
     """Holes of up to 40 s, in which a frame's time wraps; jams, after which all comes at once; messages twice and late;
     publishers that start again."""
@@ -94,7 +94,7 @@ def test_whatever_is_lost_nothing_wrong_is_delivered(seed):
 def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
     rng, counters = random.Random(1), Counters()
     sender, stream = Sender(rng), Stream(counters)
-    assert stream.take(sender.send(b"abc", 0.0)) == (b"\0abc", False)
+    assert stream.take(sender.send(b"abc", 0.0)) == (b"abc", False)
     assert stream.take(sender.send(b"def", 0.1)) == (b"def", False)
     sender.send(b"12345", 0.2)
     sender.send(b"67", 0.3)
@@ -199,7 +199,7 @@ def test_which_endpoints_are_this_machine_alone():
         "tls/robot.local:7447",
         "tcp/127.0.0.1.nip.io:1",
     ]
-    assert all(map(is_loopback, here))
+    assert all(map(is_loopback, [*here, ENDPOINT]))
     assert not any(map(is_loopback, there))
 
 

@@ -98,6 +98,16 @@ def test_one_word_for_a_thing(page):
     assert re.findall(r"centroid|\bbehind\b|\banew\b", words(page), flags=re.IGNORECASE) == []
 
 
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)
+def test_tables_say_reported_and_the_same(page):
+    """In headers, and in cells of a word or two: a fault is reported, not told."""
+    text = page.read_text(encoding="utf-8")
+    heads = re.findall(r"^(\|.*\|)\n\|-", text, flags=re.MULTILINE)
+    cells = re.findall(r"\|\s*\W*((?:not )?told|silent|alike)\W*\s*(?=\|)", text)
+    assert [head for head in heads if re.search(r"\b(told|silent|alike|says so)\b", head)] == []
+    assert [cell for cell in cells if f"`{cell}`" not in text] == []
+
+
 SPELLED = (".py", ".md", ".toml", ".cff", ".h", ".cpp", ".svg")
 # The change log tells old names.
 UNSPELLED = (ROOT / "CHANGELOG.md", Path(__file__).resolve())

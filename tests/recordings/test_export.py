@@ -70,8 +70,8 @@ def test_npz(file, tmp_path):
 
 
 def test_csv(file, tmp_path):
-    assert cli.main(["export", str(file), str(tmp_path / "x.csv")]) == 0
-    with open(tmp_path / "x.csv", newline="", encoding="utf-8") as opened:
+    assert cli.main(["export", str(file), str(tmp_path / "x.CSV")]) == 0
+    with open(tmp_path / "x.CSV", newline="", encoding="utf-8") as opened:
         head, *rows = csv.reader(opened)
     assert head == list(table.COLUMNS)
     same([(float(r[0]), r[1], *map(int, r[2:6]), *map(float, r[6:9])) for r in rows], file)

@@ -4,37 +4,23 @@ import numpy as np
 import pytest
 from fake_board import FakeBoard, wait_until
 from model_board import ModelBoard
-from recorded_stream import StreamPort
+from recorded_stream import NAMES, StreamPort, recorded_both
 from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.body import Body
 from contactfpga.recordings import Recording, Session
-from contactfpga.recordings.recorder import Split
 from contactfpga.wire.hellos import Cutter
 
 SKIN = Skin()
 LONG = 60.0
-NAMES = ("left arm", "chest")
-
-
-def recorded(file, **options):
-    """The ports of two boards that differ in what they send."""
-    ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200, hello_every=30, gap_us=1404)]
-    session = Session(file, **options)
-    with session:
-        for name, port in zip(NAMES, ports):
-            session.add(port, name=name)
-        session.start()
-        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
-    return ports, session
 
 
 def test_each_link_is_there_to_the_byte(tmp_path):
-    ports, _ = recorded(tmp_path / "x.mcap")
+    ports, _ = recorded_both(tmp_path / "x.mcap")
     recording = Recording(tmp_path / "x.mcap")
-    assert set(recording.links) == set(NAMES)
+    assert list(recording.links) == list(NAMES)
     assert [recording.links[name].sheet.rows for name in NAMES] == [16, 8]
     for name, port in zip(NAMES, ports):
         assert b"".join(data for _, data in recording.raw_bytes(name)) == port.sent
@@ -48,20 +34,11 @@ def test_each_link_is_there_to_the_byte(tmp_path):
 
 
 def test_a_link_must_be_named_where_there_are_several(tmp_path):
-    recorded(tmp_path / "x.mcap", bytes_only=True)
+    recorded_both(tmp_path / "x.mcap", bytes_only=True)
     with pytest.raises(contactfpga.ContactFPGAError, match="several links; name one of them: left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}")
     with pytest.raises(contactfpga.ContactFPGAError, match="has no link 'leg'; it has left arm, chest"):
         contactfpga.open(f"replay://{tmp_path / 'x.mcap'}?link=leg")
-
-
-def test_split_files_begin_with_a_hello_of_each_link(tmp_path):
-    ports, session = recorded(tmp_path / "x.mcap", split=Split(bytes=3_000), bytes_only=True)
-    assert len(session.files) > 1
-    for name, port in zip(NAMES, ports):
-        pieces = [Recording(file) for file in session.files]
-        kept = [b"".join(data for _, data in one.raw_bytes(name)) for one in pieces if name in one.links]
-        assert b"".join(kept) == port.sent
 
 
 @pytest.mark.parametrize("before", [b"", b"\0", b"frame\0", b"frame\0\0"])
@@ -94,6 +71,21 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
     assert list(recording.links) == ["arm"]
     assert [link for _, link, _ in recording.frames()] == ["arm"]
     assert [data for _, data in recording.raw_bytes("leg")] == [b"\0\0noise\0"]
+
+
+def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
+    """And not in that in which their boards spoke."""
+    from contactfpga.recordings import messages
+    from contactfpga.recordings.mcap_file import McapFile
+
+    file = McapFile(tmp_path / "x.mcap")
+    for link in ("arm", "leg", "chest"):
+        file.metadata("contactfpga", {"link": link})
+    data = ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()
+    for link in ("chest", "arm", "leg"):
+        file.write(f"/{link}/bytes", messages.BYTES, link, 5, messages.of_bytes(data, 5, link), 0.0)
+    file.close()
+    assert list(Recording(tmp_path / "x.mcap").links) == ["arm", "leg", "chest"]
 
 
 def test_two_links_of_one_name(tmp_path):
@@ -136,7 +128,8 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
     assert cli.main(["record", str(file), str(path), "--seconds", "0.05", "--timeout", str(LONG)]) == 0
     recording = Recording(file)
     assert set(recording.links) == {"arm", "shin"}
-    assert recording.texts("robot") == [{"toml": path.read_text()}]
+    (texts,) = recording.texts("robot")
+    assert texts["toml"] == path.read_text()
     body = Body.load(path)
     with AnyReader([file]) as reader:
         found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
@@ -148,6 +141,35 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
         point, normal = plan.place(1000 * zone.x, 1000 * zone.y)
         np.testing.assert_allclose((zone.position.x, zone.position.y, zone.position.z), point)
         np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
+
+
+def test_four_links_are_those_that_a_program_reads(tmp_path):
+    """A virtual board says the same whenever it is started: once recorded, once read."""
+    pytest.importorskip("amaranth")
+    example = (contactfpga.examples() / "robot.toml").read_text()
+    text = example.replace('urdf = "package', '# urdf = "package').replace(
+        'skin = "', f'skin = "{contactfpga.examples()}/'
+    )
+    (tmp_path / "robot.toml").write_text(text)
+    file = tmp_path / "x.mcap"
+    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.01", "--timeout", "60"]) == 0
+    recording = Recording(file)
+    body = Body.load(tmp_path / "robot.toml")
+    assert set(recording.links) == set(body.links)
+    assert len(body.links) == 4
+    for name, plan in body.links.items():
+        kept = [zones.to_dict() for _, _, zones in recording.frames(link=name)]
+        assert len(kept) > 50
+        with contactfpga.open(plan.port, plan.skin, timeout=60.0) as board:
+            live = [board.next(60.0).to_dict()]  # the answer to the first hello; frames before it are recorded, too
+            while live[-1]["time_us"] < kept[-1]["time_us"]:
+                live.append(board.next(60.0).to_dict())
+        for zones in live:  # a recording has no times of arrival
+            zones |= dict.fromkeys(("arrived_s", "host_time_s", "host_sigma_s"))
+        assert len(live) > 50
+        assert kept[-len(live) :] == live
+        with contactfpga.open(f"replay://{file}?link={name}", plan.skin) as board:
+            assert [zones.to_dict() for zones in board] == kept
 
 
 def test_a_link_that_is_lost_leaves_the_others(robot, tmp_path, capsys):
@@ -174,6 +196,23 @@ def test_what_a_robot_file_says_itself(robot, tmp_path, capsys, option):
     value = "1000000" if option == "--baud" else "x.toml"
     assert cli.main(["record", str(tmp_path / "x.mcap"), str(robot[0]), option, value]) == 1
     assert "sets it for each link" in capsys.readouterr().err
+
+
+@pytest.mark.campaign  # a board with units takes a while to compile
+def test_links_of_a_robot_with_units_have_forces(tmp_path):
+    pytest.importorskip("amaranth")
+    examples = contactfpga.examples()
+    units = f"{examples}/units-flat.toml"
+    link = f"""[[links]]\nname = "arm"\nskin = "{examples}/force.toml"\nunits = "{units}"
+        port = "sim://?scene=two_fingers&units={units}"\npoint_m = [0.0, 0.0, 1.0]"""
+    (tmp_path / "robot.toml").write_text(link)
+    file = tmp_path / "x.mcap"
+    assert cli.main(["record", str(file), str(tmp_path / "robot.toml"), "--seconds", "0.05", "--timeout", "60"]) == 0
+    with AnyReader([file]) as reader:
+        found = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+    pushes = [one.wrench.force.z for topic, message in found if topic == "/arm/contacts" for one in message.contacts]
+    assert min(pushes) < -1
+    assert any(topic == "/arm/wrench" for topic, _ in found)
 
 
 def test_forces_of_units_are_messages(tmp_path):

@@ -10,7 +10,6 @@ from recorded_stream import StreamPort, recorded
 import contactfpga
 from contactfpga import Skin, cli
 from contactfpga.recordings import Recording
-from contactfpga.recordings.recorder import Split
 from contactfpga.recordings.session import Session
 
 SKIN = Skin()
@@ -131,32 +130,6 @@ def test_units_and_faults_are_messages(tmp_path):
             reader.deserialize(raw, c.msgtype).names for c, _, raw in reader.messages() if c.topic == "/skin/faults"
         ]
     assert [name for names in told for name in names]
-
-
-# ---- files one after the other
-
-
-def test_split_files_each_begin_with_a_hello_and_lose_nothing(tmp_path):
-    port = StreamPort(frames=2000)
-    session = recorded(tmp_path, port, split=Split(bytes=3_000), bytes_only=True)
-    assert len(session.files) > 2
-    assert [file.name for file in session.files[:2]] == ["touches_0001.mcap", "touches_0002.mcap"]
-    pieces = [b"".join(data for _, data in Recording(file).raw_bytes()) for file in session.files]
-    assert b"".join(pieces) == port.sent
-    counts = [len(frames(file)) for file in session.files]
-    (tmp_path / "all.bin").write_bytes(port.sent)
-    assert sum(counts) == len(frames(tmp_path / "all.bin"))
-    assert all(counts)
-
-
-def test_a_link_that_says_no_hello_delays_no_file_for_long(tmp_path, monkeypatch):
-    from contactfpga.recordings import recorder
-
-    monkeypatch.setattr(recorder, "PATIENCE_S", 0.0)
-    port = StreamPort(frames=1000, hello_every=1 << 30)
-    session = recorded(tmp_path, port, split=Split(bytes=3_000), bytes_only=True)
-    assert len(session.files) > 1
-    assert b"".join(data for file in session.files for _, data in Recording(file).raw_bytes()) == port.sent
 
 
 # ---- the command

@@ -240,14 +240,16 @@ def test_a_file_that_ends_anywhere_gives_all_whole_pieces(closed, tmp_path, shar
     assert len(kept) in (2 * whole, 2 * whole + 2)  # what is cut off may be an index alone
 
 
-def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys):
+@pytest.mark.parametrize("number", range(4))
+def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys, number):
+    """Also the first one, which holds the definitions of all messages."""
     path, messages, ends = closed
     data = bytearray(path.read_bytes())
-    data[ends[0] + 600] ^= 1
+    data[ends[number] - 400] ^= 1
     path.write_bytes(data)
     assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
-    assert "1 damaged pieces" in capsys.readouterr().out
-    assert read(tmp_path / "new.mcap")[0] == messages[:2] + messages[4:]
+    assert "Left out in between: 1 damaged piece;" in capsys.readouterr().out
+    assert read(tmp_path / "new.mcap")[0] == messages[: 2 * number] + messages[2 * number + 2 :]
 
 
 @pytest.mark.parametrize(
@@ -266,6 +268,11 @@ def test_what_is_no_recording(tmp_path, content, said, capsys):
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(contactfpga.ContactFPGAError):
         Recording(path)
+
+
+def test_a_folder_is_no_recording(capsys):
+    assert cli.main(["recover", "."]) == 1
+    assert capsys.readouterr().err == "contactfpga: . cannot be opened: not a regular file\n"
 
 
 def test_no_file_is_written_over(closed, capsys):

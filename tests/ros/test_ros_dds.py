@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from ros_messages import HEAD, samples
 
+import contactfpga
 from contactfpga.ros import dds
 from contactfpga.ros.cdr import encode
 from contactfpga.ros.settings import TOPICS
@@ -86,3 +87,16 @@ def test_no_socket_takes_packets_from_outside(publisher):
 def test_a_namespace_that_ros_would_refuse_is_refused(namespace):
     with pytest.raises(ValueError, match=r"namespace is .*; it has letters, digits and _"):
         dds.Publisher(namespace, DOMAIN)
+
+
+@pytest.mark.parametrize("domain", [-1, 233, 1.5, "0"])
+def test_a_domain_that_dds_lacks_is_refused(domain):
+    with pytest.raises(ValueError, match=r"domain is .*; it must be a whole number from 0 to 232"):
+        dds.Publisher("skin", domain)
+
+
+def test_a_closed_publisher_says_so(publisher):
+    publisher.close()
+    publisher.close()
+    with pytest.raises(contactfpga.BoardClosed, match="this publisher was closed"):
+        publisher.send("zones", b"")

@@ -267,7 +267,10 @@ def test_tables_count_what_came_out():
     )
     assert memory == "|  |  | 14,000 of memory | 1 | **0.0 %**, 0.0 to 79.3 % |  | 100.0 % |"
     assert tables["modules"]().splitlines()[2:] == ["| scan | 4 | 1 | 0 | 3 | `scan.time` 1 |"]
-    assert tables["ways"]().splitlines()[2:] == ["| `run` | silent | time | 1 |", "| `run` | told | lost | 1 |"]
+    assert tables["ways"]().splitlines()[2:] == [
+        "| `run` | silently wrong | time | 1 |",
+        "| `run` | reported | lost | 1 |",
+    ]
 
 
 @pytest.mark.campaign

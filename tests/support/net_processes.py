@@ -1,14 +1,19 @@
 """Publishers and routers in processes of their own, on free ports of this machine."""
 
 import contextlib
+import json
 import os
 import socket
 import subprocess
 import sys
 import threading
 import time
+from typing import NamedTuple
 
 from fake_board import FakeBoard
+
+CHUNK = 4096
+"""Bytes that a cable takes at once."""
 
 ROUTER = """
 import sys, time
@@ -19,11 +24,38 @@ with session.listening(sys.argv[1]):
 """
 
 
+READER = """
+import dataclasses, json, sys, time
+import contactfpga
+board = contactfpga.open(sys.argv[1], timeout=60)
+while True:
+    found = None
+    try:
+        found = board.latest(60, max_age_s=float(sys.argv[2]))
+    except contactfpga.NoData:
+        pass
+    now_s, stats = time.monotonic(), board.stats
+    seen = stats.frames + stats.lost + stats.unexplained
+    line = [found and found.time_us, now_s, seen, stats.hellos, stats.restarts, dataclasses.asdict(stats.net)]
+    print(json.dumps(line), flush=True)
+    time.sleep(0.005)
+"""
+
+
 def free_endpoint(protocol="tcp"):
     """A port that nobody listens on."""
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return f"{protocol}/127.0.0.1:{one.getsockname()[1]}"
+
+
+def assert_loopback_alone(pid):
+    """It listens, and nobody outside this machine can reach it."""
+    import psutil  # which not every computer has
+
+    found = psutil.Process(pid).net_connections("inet")
+    assert [one for one in found if one.status == "LISTEN"], "the test sees where it listens"
+    assert {one.laddr.ip for one in found} == {"127.0.0.1"}
 
 
 class Child:
@@ -58,25 +90,51 @@ def publish(board, *options, wait=True):
     return Child("-m", "contactfpga", "publish", board.path, "--timeout", 60, *options, wait=wait)
 
 
+class Sight(NamedTuple):
+    """What a :class:`Reader` says again and again."""
+
+    time_us: int | None
+    """Of the latest frame; None: there was no data."""
+    at_s: float
+    seen: int
+    """Frames that came or are known not to have come."""
+    hellos: int
+    restarts: int
+    net: dict
+
+
+class Reader(Child):
+    """A program that takes the latest frame of a port, none older than ``max_age_s``."""
+
+    def __init__(self, port, max_age_s):
+        super().__init__("-c", READER, port, max_age_s)
+        self.sights = [Sight(*json.loads(self.line))]
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self):
+        self.sights += (Sight(*json.loads(line)) for line in self.process.stdout)
+
+
 class Streaming(FakeBoard):
     """Some hundred frames per second, and hellos; its clock is that of the host, and ``sent`` holds their times."""
 
-    def __init__(self, skin):
+    def __init__(self, skin, every_s=0.005):
         super().__init__(skin)
+        self._every_s = every_s
         self.sent_us = set()
-        self._begun_s = time.monotonic()
+        self.begun_s = time.monotonic()
         self._hello_due_s = 0.0
         self.lock = threading.Lock()
         self.stream = self._more
 
     def frame(self, *args, **options):
-        now_us = round((time.monotonic() - self._begun_s) * 1e6)
+        now_us = round((time.monotonic() - self.begun_s) * 1e6)
         self.time_us = max(self.time_us, now_us)
         self.sent_us.add(self.time_us)
         return super().frame(*args, **options)
 
     def _more(self):
-        time.sleep(0.002)
+        time.sleep(self._every_s)
         data = b""
         if time.monotonic() > self._hello_due_s:
             data, self._hello_due_s = self.hello(), time.monotonic() + 0.25
@@ -89,9 +147,11 @@ class Streaming(FakeBoard):
 
 
 class Relay:
-    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first."""
+    """A cable between a program and an endpoint, which can be cut and mended; both ends notice nothing at first.
+    ``bytes_s``: what it carries per second, with little memory; None: all there is."""
 
-    def __init__(self, endpoint):
+    def __init__(self, endpoint, bytes_s=None):
+        self.bytes_s = bytes_s
         host, _, number = endpoint.partition("/")[2].rpartition(":")
         self._target = host, int(number)
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -117,16 +177,25 @@ class Relay:
                 if not self._whole.is_set():
                     near.close()
                     continue
-                far = socket.create_connection(self._target)
+                far = socket.socket()
+                if self.bytes_s is not None:
+                    far.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
+                try:
+                    far.connect(self._target)
+                except OSError:  # nobody listens there now
+                    near.close()
+                    far.close()
+                    continue
                 self._sockets += [near, far]
                 for source, sink in ((near, far), (far, near)):
                     threading.Thread(target=self._carry, args=(source, sink), daemon=True).start()
 
-    @staticmethod
-    def _carry(source, sink):
+    def _carry(self, source, sink):
         with contextlib.suppress(OSError):
-            while data := source.recv(65536):
+            while data := source.recv(CHUNK):
                 sink.sendall(data)
+                if self.bytes_s is not None:
+                    time.sleep(len(data) / self.bytes_s)
             sink.shutdown(socket.SHUT_RDWR)
 
     def __enter__(self):

@@ -7,6 +7,7 @@ from contactfpga import Skin
 from contactfpga.recordings.session import Session
 
 SKIN = Skin()
+NAMES = ("left arm", "chest")
 
 
 class StreamPort:
@@ -52,3 +53,15 @@ def recorded(tmp_path, port=None, seconds=None, name="touches.mcap", **options):
         session.start(seconds)
         wait_until(lambda: session.wait(0.005) or not session.running or not port.left)
     return session
+
+
+def recorded_both(file, **options):
+    """The ports of two boards that differ in what they send."""
+    ports = [StreamPort(frames=300), StreamPort(SKIN.replace(rows=8), frames=200, hello_every=30, gap_us=1404)]
+    session = Session(file, **options)
+    with session:
+        for name, port in zip(NAMES, ports):
+            session.add(port, name=name)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports))
+    return ports, session

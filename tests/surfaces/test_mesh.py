@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -146,3 +149,21 @@ def test_files_that_are_no_tables_or_meshes_are_refused_in_one_line(tmp_path, ca
     np.savez(tmp_path / "object.npz", points_mm=np.array([{}], object))
     with pytest.raises(SurfaceError, match=r"not a table of `contactfpga surface`"):
         Mesh.load(tmp_path / "object.npz")
+
+
+def test_meshes_that_are_damaged_are_refused_without_a_traceback_of_their_reader(tube, tmp_path):
+    """trimesh logs one where a mesh has triangles without an area."""
+    data = bytearray(tube.read_bytes())
+    data[84 + 12 : 84 + 16] = np.float32(np.nan).tobytes()
+    (tmp_path / "nan.stl").write_bytes(data)
+    with pytest.raises(SurfaceError, match=r"nan.stl: 1 of its \d+ triangles have a corner that is no point"):
+        Triangles.load(tmp_path / "nan.stl")
+    code = f"from contactfpga.surfaces.laying import Triangles; Triangles.load({str(tmp_path / 'flat.stl')!r})"
+    data = bytearray(tube.read_bytes())
+    data[84 + 24 : 84 + 36] = data[84 + 12 : 84 + 24]
+    (tmp_path / "flat.stl").write_bytes(data)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr == ""
+    os.mkfifo(tmp_path / "pipe.stl")
+    with pytest.raises(OSError, match="not a regular file"):
+        Triangles.load(tmp_path / "pipe.stl")

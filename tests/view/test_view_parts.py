@@ -271,12 +271,12 @@ def test_silence_is_said(board):
 @pytest.mark.parametrize(
     ("port", "given", "says"),
     [
-        ("robot.toml", {"units": "units.toml"}, "--units is of a board; robot.toml says it of each link"),
-        ("robot.toml", {"baud": 9600}, "--baud is of a board; robot.toml says it of each link"),
-        ("replay://a.bin", {"skin": "skin.toml"}, "--skin is of a board; replay://a.bin is a recording"),
-        ("replay://a.bin", {"units": "units.toml"}, "--units is of a board; replay://a.bin is a recording"),
-        ("sim://", {"link": "arm"}, "--link is of a recording; sim:// is none"),
-        (None, {"link": "arm"}, "--link is of a recording; name one"),
+        ("robot.toml", {"units": "units.toml"}, "--units is for a board; robot.toml sets it for each link"),
+        ("robot.toml", {"baud": 9600}, "--baud is for a board; robot.toml sets it for each link"),
+        ("replay://a.bin", {"skin": "skin.toml"}, "--skin is for a board; replay://a.bin is a recording"),
+        ("replay://a.bin", {"units": "units.toml"}, "--units is for a board; replay://a.bin is a recording"),
+        ("sim://", {"link": "arm"}, "--link is for a recording; sim:// is not one"),
+        (None, {"link": "arm"}, "--link is for a recording; name one"),
     ],
 )
 def test_what_would_be_left_out_is_refused(port, given, says):

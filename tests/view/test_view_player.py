@@ -4,8 +4,8 @@ import pytest
 
 import contactfpga
 from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.view import opening, replayed
 from contactfpga.view import player as playing
-from contactfpga.view import replayed
 from contactfpga.view.player import Player
 from contactfpga.view.replayed import ByteRecording, Clock
 
@@ -110,9 +110,17 @@ def test_what_cannot_be_played_is_named(tmp_path):
         ByteRecording(f"replay://{tmp_path}/noise.bin")
 
 
+def test_a_recording_that_is_not_there_is_no_port(tmp_path):
+    pytest.importorskip("mcap")
+    with pytest.raises(
+        ContactFPGAError, match=r"none\.mcap cannot be opened: No such file or directory; is the path right"
+    ):
+        opening._source(opening.Named(f"{tmp_path}/none.mcap"))
+
+
 @pytest.mark.parametrize(("name", "link"), [("{}", "arm"), ("replay://{}?link=arm", None)])
 def test_a_link_of_bytes_alone_is_refused(tmp_path, name, link):
     path = tmp_path / "touches.bin"
     path.write_bytes(b"nothing")
-    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is of what `contactfpga record` makes$"):
+    with pytest.raises(ContactFPGAError, match=r"holds one board; --link is for files of `contactfpga record`$"):
         replayed.load(name.format(path), link)

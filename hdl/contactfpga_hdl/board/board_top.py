@@ -10,8 +10,10 @@ from amaranth.lib.wiring import Out
 
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 from contactfpga_hdl.board.clock import PllClock
 from contactfpga_hdl.scan.pins import column_pins, drives_columns_both_ways, row_pins
+from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
 from contactfpga_hdl.units.ports import unit_pins
 
@@ -40,7 +42,7 @@ class BoardTop(Elaboratable):
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.core = core = Top(self.skin)
+        m.submodules.core = core = self._core()
         if self.skin.clock_hz != self.board.clock_hz:
             m.domains.sync = ClockDomain()
             m.submodules.clock = PllClock(self.board, self.skin.clock_hz)
@@ -61,8 +63,14 @@ class BoardTop(Elaboratable):
             m.d.comb += held_high.o.eq(~0)
         return m
 
-    def _connect_sheet(self, m: Module, platform: Platform, core: Top) -> None:
-        for name in self.board.pins(self.skin):
+    def _core(self) -> Top | SeveralTop:
+        return Top(self.skin)
+
+    def _pins(self) -> dict[str, tuple[str, ...]]:
+        return self.board.pins(self.skin)
+
+    def _connect_sheet(self, m: Module, platform: Platform, core: Top | SeveralTop) -> None:
+        for name in self._pins():
             port, direction = platform.request(name, 0, dir="-"), self._direction(name)
             if name == "rows" and self.skin.ghosts:
                 self._connect_floating(m, port, core.rows)
@@ -104,10 +112,10 @@ class BoardTop(Elaboratable):
         return self.board.pulls["col2row" if up else "row2col"] if needs else {}
 
     def _resources(self) -> list[Resource]:
-        board, skin = self.board, self.skin
+        board = self.board
         attrs = Attrs(**board.standard)
         resources = [Resource("contact", 0, Pins(board.contact, dir="o"), attrs)]
-        for name, pins in board.pins(skin).items():
+        for name, pins in self._pins().items():
             direction = self._direction(name)
             resources.append(
                 Resource(name, 0, Pins(" ".join(pins), dir=direction), Attrs(**board.standard, **self._pulls(name)))
@@ -120,3 +128,22 @@ class BoardTop(Elaboratable):
         if board.held_high:
             resources.append(Resource("held_high", 0, Pins(" ".join(board.held_high), dir="o"), attrs))
         return resources
+
+
+class SheetsTop(BoardTop):
+    """The same for several sheets. All of their lines are on shift registers, which drive what they lead to."""
+
+    def __init__(self, board: BoardSpec, several: Several):
+        super().__init__(board, several.skins[0])
+        self.several = several
+        self._sheet = {
+            f"{name}_{number}": member
+            for number, skin in enumerate(several.skins)
+            for name, member in (row_pins(skin) | column_pins(skin)).items()
+        }
+
+    def _core(self) -> SeveralTop:
+        return SeveralTop(self.several)
+
+    def _pins(self) -> dict[str, tuple[str, ...]]:
+        return self.board.pins(self.several)

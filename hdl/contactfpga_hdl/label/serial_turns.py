@@ -39,7 +39,7 @@ class SerialTurns:
 
     def __init__(self, derived: Derived):
         self.derived = derived
-        self.begins = Signal()  # a row is taken whose last cluster goes on in the first one
+        self.begins = Signal(name="seam_begins")  # a row is taken whose last cluster goes on in the first one
         self.meets = Signal()  # the row that is walked is such a one
         self.at_seam = Signal()  # the two clocks after the last column in which that is done
         self.turn = Signal()

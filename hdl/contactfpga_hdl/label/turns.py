@@ -28,7 +28,7 @@ class Turns:
     """
 
     def __init__(self, derived: Derived):
-        self.seam = Signal(name="at_seam")  # the last cluster is joined with the first one
+        self.seam = Signal(name="joins_seam")  # the last cluster is joined with the first one
         self.turn = Signal(name="turn_now")
         self.down = Signal()  # what the group had before is now known to lie a turn back
         self.ring = Signal()

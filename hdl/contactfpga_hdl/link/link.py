@@ -6,7 +6,8 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS, Derived
-from contactfpga.wire import protocol
+from contactfpga.wire import numbered, protocol
+from contactfpga.wire.numbered import Place
 from contactfpga.wire.units import plain_bytes
 from contactfpga_hdl.link.due import hello_period, keep_alive
 from contactfpga_hdl.link.faults import Reporter
@@ -27,7 +28,7 @@ STATE_PLACE_BITS = (protocol.STATE_DIGITS - 1).bit_length()
 class _Wire:
     """The packet on the wire, and the choice of the next one."""
 
-    def __init__(self, skin: Skin):
+    def __init__(self, offset_bits: int):
         self.idle = Signal()  # there is none
         self.take_frame = Signal()  # the frame that waits is next
         self.take_hello = Signal()
@@ -36,19 +37,19 @@ class _Wire:
         self.is_report = Signal()
         self.take_units = Signal()
         self.is_units = Signal()
-        self.offset = Signal(offset_bits(skin))  # of the byte on offer, in its region
+        self.offset = Signal(offset_bits)  # of the byte on offer, in its region
         self.fetches = Signal()  # that byte is read
 
 
 class _Regions:
     """Which region of the memory belongs to the frame that is written, that waits, that is on the wire."""
 
-    def __init__(self, skin: Skin):
+    def __init__(self, offset_bits: int):
         self.filling = Signal(2, init=0)
         self.waiting = Signal(2, init=1)
         self.sending = Signal(2, init=2)
         self.waits = Signal()  # a complete frame does
-        self.waiting_end = Signal(offset_bits(skin))
+        self.waiting_end = Signal(offset_bits)
 
 
 class Link(wiring.Component):
@@ -74,15 +75,20 @@ class Link(wiring.Component):
     faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
     units (in): of a Skin with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
+    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.link.turns.Turns`;
+    packets then say the sheet's number.
     """
 
-    def __init__(self, skin: Skin):
+    def __init__(self, skin: Skin, place: Place | None = None):
         self.skin = skin
+        self.place = place
         self.derived = Derived(skin)
+        self._hello = stored_hello(skin, place)
+        self._offset_bits = offset_bits(skin, place)
         faults = faults_layout(self.derived)
         super().__init__(
             {
-                "frames": In(frames_signature(self.derived, offset_bits(skin))),
+                "frames": In(frames_signature(self.derived, self._offset_bits)),
                 "tag": In(tag_layout(self.derived)),
                 "summary": In(summary_layout(self.derived)),
                 "asked": In(1),
@@ -93,13 +99,14 @@ class Link(wiring.Component):
                 **({"faults": In(faults)} if faults.size else {}),
                 **({"slots": In(stream.Signature(slots_layout(self.derived)))} if skin.self_test else {}),
                 **({"units": In(packet_signature())} if skin.units else {}),
+                **({} if place is None else {"turn": In(1), "holds": Out(1)}),
                 "bytes": Out(stream.Signature(8)),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        wire, regions = _Wire(self.skin), _Regions(self.skin)
+        wire, regions = _Wire(self._offset_bits), _Regions(self._offset_bits)
         hello_due = Signal(init=1)
         self._place_frames(m, wire, regions)
         frames_sent = self._decide(m, wire, regions)
@@ -194,7 +201,7 @@ class Link(wiring.Component):
 
     def _read_byte(self, m: Module, wire: _Wire, regions: _Regions, digit: Value) -> Value:
         """The byte on offer, from the memory or in a hello's state from the counters."""
-        init = [0] * hello_words(self.skin).start + list(stored_hello(self.skin))
+        init = [0] * (HELLO_REGION << self._offset_bits) + list(self._hello)
         m.submodules.store = store = memory.Memory(shape=8, depth=len(init), init=init)
         read, write = store.read_port(), store.write_port()
         m.d.comb += [
@@ -214,7 +221,13 @@ class Link(wiring.Component):
         seeds = Signal()  # one clock after anything but a hello was taken
         m.submodules.check = check = crc.catalog.CRC16_MCRF4XX(data_width=8).create()
         first, second = protocol.check_prefix(self.skin)
-        tail = Signal(range(CHECK_BYTES + 1))
+        closing = self._closing(check.crc)
+        last = len(closing) - 1
+        tail = Signal(range(len(closing)))
+        ends = Signal()  # the packet, with this byte
+        goes = hello, frame, either = hello_due, regions.waits & ~hello_due, hello_due | regions.waits
+        if self.place is not None:
+            hello, frame, either = (one & self.turn for one in goes)
         m.d.sync += seeds.eq(seeded)
         m.d.comb += [check.data.eq(byte), check.start.eq(wire.take_hello | seeded)]
         with m.If(seeded):
@@ -225,15 +238,15 @@ class Link(wiring.Component):
             with m.State("IDLE"):
                 m.d.comb += [
                     wire.idle.eq(1),
-                    wire.take_hello.eq(hello_due),
-                    wire.take_frame.eq(regions.waits & ~hello_due),
+                    wire.take_hello.eq(hello),
+                    wire.take_frame.eq(frame),
                 ]
                 m.d.sync += [
                     wire.is_hello.eq(hello_due),
-                    end.eq(Mux(hello_due, len(stored_hello(self.skin)), regions.waiting_end)),
+                    end.eq(Mux(hello_due, len(self._hello), regions.waiting_end)),
                     wire.offset.eq(0),
                 ]
-                with m.If(hello_due | regions.waits):
+                with m.If(either):
                     m.next = "FETCH"
                 if reporter is not None:
                     self._take_report(m, wire, regions, hello_due, end, reporter)
@@ -252,14 +265,27 @@ class Link(wiring.Component):
                     m.d.sync += [wire.offset.eq(wire.offset + 1), tail.eq(0)]
                     m.next = "FETCH"
             with m.State("TAIL"):
-                # The CRC in pieces of seven bits, so that none of its bytes is zero.
-                closing = [Cat(check.crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)]
-                closing += [Cat(check.crc[14:], Const(0x20, 6)), Const(protocol.DELIMITER, 8)]
                 m.d.comb += [self.bytes.valid.eq(1), self.bytes.payload.eq(Array(closing)[tail])]
+                if self.place is not None:
+                    m.d.comb += [check.data.eq(self.bytes.payload), check.valid.eq(self.bytes.ready & (tail < 2))]
                 with m.If(self.bytes.ready):
                     m.d.sync += tail.eq(tail + 1)
-                    with m.If(tail == CHECK_BYTES):
+                    with m.If(tail == last):
+                        m.d.comb += ends.eq(1)
                         m.next = "IDLE"
+        if self.place is not None:
+            m.d.comb += self.holds.eq(~ends & (~wire.idle | either))
+
+    def _closing(self, crc: Value) -> list[Value]:
+        """What comes after the stuffed bytes: the sheet's number where there is one, then the CRC in pieces of seven
+        bits, so that none of its bytes is zero."""
+        number = b"" if self.place is None else numbered.closing(self.place.number)
+        return [
+            *(Const(byte, 8) for byte in number),
+            *(Cat(crc[7 * i : 7 * i + 7], Const(1, 1)) for i in range(2)),
+            Cat(crc[14:], Const(0x20, 6)),
+            Const(protocol.DELIMITER, 8),
+        ]
 
     def _state_digit(self, m: Module, wire: _Wire, frames_sent: Value) -> Value:
         """The digit at each place of a hello's state. The counters' high digits stand while a hello is sent."""
@@ -294,11 +320,11 @@ def hello_words(skin: Skin) -> range:
     return range(first, first + len(stored_hello(skin)))
 
 
-def stored_hello(skin: Skin) -> bytes:
+def stored_hello(skin: Skin, place: Place | None = None) -> bytes:
     """The hello from its leading delimiter on, without its check."""
-    return protocol.encode_hello(skin)[: -CHECK_BYTES - 1]
+    return protocol.encode_hello(skin, place=place)[: -CHECK_BYTES - 1]
 
 
-def offset_bits(skin: Skin) -> int:
+def offset_bits(skin: Skin, place: Place | None = None) -> int:
     """Of a place in a region of the memory, which holds any frame or the hello."""
-    return max(Derived(skin).max_stored_bytes, len(stored_hello(skin))).bit_length()
+    return max(Derived(skin).max_stored_bytes, len(stored_hello(skin, place))).bit_length()

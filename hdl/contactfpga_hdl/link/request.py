@@ -7,7 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import CHECK_BYTES, HEARD_BITS
-from contactfpga.wire import protocol
+from contactfpga.wire import numbered, protocol
 from contactfpga.wire.command import KIND_COMMAND, VALUE_DIGITS, WHAT_DIGITS
 from contactfpga_hdl.link.uart import LINE_BITS
 
@@ -21,7 +21,8 @@ _LONG_BIT = 3
 
 class RequestReader(wiring.Component):
     """Finds requests bit by bit; nothing but the number and what the check needs is kept. With ``commands`` it finds
-    these as well, in which what to do and a value come after the number; in requests their places are left out.
+    these as well, in which what to do and a value come after the number; in requests their places are left out. With
+    ``sheet`` it finds only those that say this number of a sheet.
 
     ``received`` is high with ``good`` of a request's closing delimiter, which has no bits where it comes as a pulse;
     ``hello`` then says if the request asks for one. From the next clock on ``heard`` holds the lowest bits of its
@@ -30,10 +31,12 @@ class RequestReader(wiring.Component):
     ``command`` is high with ``received``, and ``what`` and ``value`` are its own until the next packet's come.
     """
 
-    def __init__(self, commands: bool = False):
+    def __init__(self, commands: bool = False, sheet: int | None = None):
         self.commands = commands
+        self._closing = b"" if sheet is None else numbered.closing(sheet)
         self._kind = _WHAT + _ARGUMENTS * commands  # the last byte's place
-        self._whole = self._kind + CHECK_BYTES + 1  # bytes up to the delimiter
+        self._first_check = self._kind + len(self._closing) + 1
+        self._whole = self._first_check + CHECK_BYTES  # bytes up to the delimiter
         digit = protocol.DIGIT_BITS
         orders = {"command": Out(1), "what": Out(digit * WHAT_DIGITS), "value": Out(digit * VALUE_DIGITS)}
         super().__init__(
@@ -92,7 +95,7 @@ class RequestReader(wiring.Component):
     def _check(self, m: Module, place: Value, bit: Value, restart: Value) -> Value:
         """CRC-16/MCRF4XX of all before the check bytes, then of its own bits in these, which leaves all zeros."""
         crc = Signal(16, init=0xFFFF)
-        first = self._kind + 1
+        first = self._first_check
         own = (place == first) | (place == first + 1)
         last = place == first + CHECK_BYTES - 1
         counts = (place < first) | own & (bit != 7) | last & (bit < 2)
@@ -113,6 +116,9 @@ class RequestReader(wiring.Component):
                 m.d.sync += [self.hello.eq(self.bits.level), fits.eq(1)]
             with m.If(bit >= protocol.FLAG_BITS):
                 m.d.sync += fits.eq(fits & (self.bits.level == wanted))
+        for at, byte in enumerate(self._closing, self._kind + 1):
+            with m.If(self.bits.bit & (place == at)):
+                m.d.sync += fits.eq(fits & (self.bits.level == Const(byte, 8).bit_select(bit, 1)))
         return fits
 
     def _keep_number(self, m: Module, place: Value, bit: Value) -> None:

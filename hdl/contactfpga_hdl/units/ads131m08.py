@@ -14,15 +14,18 @@ frame must be read."""
 CLOCKS = BITS * WORDS
 LEVELS = 2 * CLOCKS + 2
 """High and low levels that a frame takes; in the last one the converter is not selected."""
+SKIPPED = 3
+"""Frames after power-up that are left out."""
 
 
 class Ads131m08(wiring.Component):
     """Reads a frame each time a conversion is ready, SPI mode 0,1; see
     :func:`~contactfpga_hdl.units.ports.converter_ports`.
 
-    The converter stays as it is at power-up: 1024 samples of its modulator for each result, all channels enabled. Zeros
-    are sent, which asks for nothing. It keeps two results that were not read, so after power-up two frames are read one
-    after the other and left out.
+    The converter stays as it is at power-up: 1024 samples of its modulator for each result, all channels enabled, gain
+    1. Zeros are sent, which asks for nothing. It keeps two results that were not read (8.5.1.9.1), and its first two
+    results after power-up come from a filter with another delay (8.3.7.1.1). So two frames are read one after the other
+    and left out, and one more.
 
     The converter gives a bit at a rising edge and it is taken at the next falling one. A channel is there three clocks
     after that of its last bit.
@@ -42,7 +45,8 @@ class Ads131m08(wiring.Component):
         m.submodules.sync_ready = FFSynchronizer(self.pins.spi_ready_n, ready_n, init=1)
         m.d.sync += before.eq(ready_n)
         busy = Signal()
-        skipped = Signal(2)  # frames that were left out: 2 once all is right
+        skipped = Signal(range(SKIPPED + 1))  # frames that were left out
+        counts = skipped == SKIPPED
         clock = Signal(range(self.level_clocks))  # of the level
         level = Signal(range(LEVELS))  # odd ones are high, but for the last one
         begins, ends = clock == 0, clock == self.level_clocks - 1
@@ -52,16 +56,16 @@ class Ads131m08(wiring.Component):
             with m.If(ends):
                 m.d.sync += level.eq(Mux(level == LEVELS - 1, 0, level + 1))
                 with m.If(level == LEVELS - 1):
-                    m.d.sync += [busy.eq(skipped == 0), skipped.eq(Mux(skipped == 2, 2, skipped + 1))]
+                    m.d.sync += [busy.eq(skipped == 0), skipped.eq(Mux(counts, SKIPPED, skipped + 1))]
         with m.If(starts):
             m.d.sync += busy.eq(1)
         m.d.sync += [
-            self.sampled.eq(starts & (skipped == 2)),
+            self.sampled.eq(starts & counts),
             self.pins.spi_select_n.eq(~busy | (level == LEVELS - 1)),  # the pins follow a clock later
             self.pins.spi_clock.eq(busy & level[0] & (level < 2 * CLOCKS)),
         ]
         falls = busy & begins & ~level[0] & (level != 0)
-        self._take(m, falls, skipped == 2)
+        self._take(m, falls, counts)
         return m
 
     def _pace(self, m: Module) -> None:

@@ -67,7 +67,7 @@ class UnitPacker(wiring.Component):
         return m
 
     def _write(self, m: Module, write: wiring.PureInterface, filling: Signal) -> Signal:
-        """Returns when a sweep is complete."""
+        """Writes digits; returns the signal that is high in the clock in which a sweep is complete."""
         time, begun = self._clock(m), Signal(TIME_BITS)
         sequence = Signal(SEQUENCE_BITS)
         word = Signal(DIGIT_BITS * max(self._digits, TRAILER_DIGITS))
@@ -97,7 +97,7 @@ class UnitPacker(wiring.Component):
         return closes
 
     def _clock(self, m: Module) -> Signal:
-        """In us since power-up, as the frames' times are."""
+        """A clock in us since power-up, the same that frames' times come from."""
         per_us = self.derived.clocks_per_us
         prescaler, time = Signal(range(max(2, per_us))), Signal(TIME_BITS)
         m.d.sync += prescaler.eq(prescaler + 1)

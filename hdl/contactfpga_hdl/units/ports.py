@@ -25,7 +25,7 @@ def reading_layout(skin: Skin) -> data.StructLayout:
 
 
 def converter_ports(skin: Skin) -> dict[str, wiring.Member]:
-    """Of every converter.
+    """The ports of every converter.
 
     pins: those at the converter, from registers.
     sampled (out): high in the clock in which a sweep's first unit is sampled.

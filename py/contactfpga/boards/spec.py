@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from contactfpga.boards import pll
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.several import Several
 
 NAME = "contactfpga"
 """Of the files that a build leaves."""
@@ -111,9 +112,13 @@ class BoardSpec:
         """The pins of :data:`UNIT_PORTS`, as far as a Skin's converter has them; else they are the sheet's."""
         return self.row_side[-len(UNIT_PORTS) :]
 
-    def pins(self, skin: Skin) -> dict[str, tuple[str, ...]]:
+    def pins(self, skin: Skin | Several) -> dict[str, tuple[str, ...]]:
         """Pins of each port that the gateware has at the sheet and at the units' converter, lowest bit first, and of
-        ``alive``."""
+        ``alive``; of several sheets those of each port with the sheet's number after its name."""
+        if isinstance(skin, Several):
+            rows_first, columns_first = self.row_side + self.column_side[::-1], self.column_side + self.row_side[::-1]
+            sheets = self._dealt(_of_sheets(skin, row_wires), rows_first)
+            return sheets | self._dealt(_of_sheets(skin, column_wires), columns_first)
         columns = self.column_side[:-1] if skin.alive else self.column_side
         ports = unit_ports(skin)
         rows = self.row_side[: len(self.row_side) - len(ports)]
@@ -133,11 +138,14 @@ class BoardSpec:
         connector, _, number = pin.partition(":")
         return f"{self.connectors[connector]} {number}"
 
-    def check(self, skin: Skin) -> None:
-        """Raise SkinError where ``skin`` cannot be built for this board."""
+    def check(self, skin: Skin | Several) -> None:
+        """Raise SkinError where ``skin``, or several sheets, cannot be built for this board."""
         if skin.clock_hz != self.clock_hz:
             pll.dividers(self.pll, self.clock_hz, skin.clock_hz)
-        self._check_wires(skin)
+        if isinstance(skin, Several):
+            self._check_sheets(skin)
+        else:
+            self._check_wires(skin)
         if skin.baud > self.bridge.max_baud:
             raise SkinError(
                 f"baud is {skin.baud}, the {self.bridge.chip} of {self.title} reaches {self.bridge.max_baud} at most"
@@ -148,6 +156,15 @@ class BoardSpec:
             raise SkinError(
                 f"baud is {skin.baud}: {self.title} sends {sent:.0f} and its {self.bridge.chip} reads at "
                 f"{self.bridge.nearest(skin.baud):.0f}, {100 * error:+.1f} %; the limit is {100 * MAX_BRIDGE_ERROR:g} %"
+            )
+
+    def _check_sheets(self, several: Several) -> None:
+        wires = [sum({**row_wires(skin), **column_wires(skin)}.values()) for skin in several.skins]
+        if sum(wires) > self.lines:
+            taken = " + ".join(map(str, wires))
+            raise SkinError(
+                f"{len(wires)} sheets take {taken} wires, {self.title} has {self.lines} free pins beside `contact`; "
+                "use fewer chains or fewer sheets"
             )
 
     def _check_wires(self, skin: Skin) -> None:
@@ -183,6 +200,11 @@ def column_wires(skin: Skin) -> dict[str, int]:
     if skin.column_read == "direct":
         return {"columns": skin.column_lines}
     return {"column_clock": 1, "column_load_n": 1, "column_data": skin.column_chains}
+
+
+def _of_sheets(several: Several, wires: Callable[[Skin], Mapping[str, int]]) -> dict[str, int]:
+    """Bits of each port of several sheets."""
+    return {f"{name}_{number}": bits for number, skin in enumerate(several.skins) for name, bits in wires(skin).items()}
 
 
 def pins_of(connector: str, numbers: str) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.choices import converters
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 OWN = "(on the board)"
 """Where a wire leads that nobody has to solder."""
@@ -35,12 +36,12 @@ _CONVERTER_PINS = {
         "spi_miso": "DOUT 12 of the MCP3208",
     },
     "ads131m08": {
-        "spi_clock": "SCLK of the ADS131M08",
-        "spi_select_n": "CS of the ADS131M08, 10 kΩ to its supply",
-        "spi_mosi": "DIN of the ADS131M08",
-        "spi_miso": "DOUT of the ADS131M08",
-        "spi_ready_n": "DRDY of the ADS131M08",
-        "spi_pace": "XTAL1/CLKIN of the ADS131M08",
+        "spi_clock": "SCLK 19 of the ADS131M08",
+        "spi_select_n": "CS 17 of the ADS131M08, 10 kΩ to its supply",
+        "spi_mosi": "DIN 21 of the ADS131M08",
+        "spi_miso": "DOUT 20 of the ADS131M08",
+        "spi_ready_n": "DRDY 18 of the ADS131M08",
+        "spi_pace": "XTAL1/CLKIN 23 of the ADS131M08",
     },
 }
 """By the name of the converter; of one of your own the port itself is said."""
@@ -87,11 +88,11 @@ class Output:
         return self.chip, str(self.chain), str(self.number), f"{self.name} {self.pin}"
 
 
-def wires(board: BoardSpec, skin: Skin) -> list[Wire]:
-    """Every pin of the FPGA that the gateware of ``skin`` uses, in the order of its ports."""
+def wires(board: BoardSpec, skin: Skin | Several) -> list[Wire]:
+    """Every pin of the FPGA that the gateware of ``skin``, or of several sheets, uses, in the order of its ports."""
     found = []
     for port, pins in board.pins(skin).items():
-        lines = _lines(skin, port, len(pins))
+        lines = _lines_of_sheet(skin, port, len(pins)) if isinstance(skin, Several) else _lines(skin, port, len(pins))
         names = [port] if len(pins) == 1 else [f"{port}[{bit}]" for bit in range(len(pins))]
         found += [Wire(name, pin, line) for name, pin, line in zip(names, pins, lines, strict=True)]
     found.append(Wire("contact", board.contact, Line("stop input of the robot: high while touched")))
@@ -142,6 +143,12 @@ def _lines(skin: Skin, port: str, count: int) -> Sequence[Line]:
     if port.startswith("spi_"):
         return [Line(_CONVERTER_PINS.get(converters.find(skin.converter).name, {}).get(port, port))]
     return [Line(_CHIP_PINS[port].format(chain)) for chain in range(count)]
+
+
+def _lines_of_sheet(several: Several, port: str, count: int) -> Sequence[Line]:
+    name, _, number = port.rpartition("_")
+    lines = _lines(several.skins[int(number)], name, count)
+    return [Line(f"sheet {number}: {line.leads_to}") for line in lines]
 
 
 def _chained(chip: str, names: Sequence[tuple[str, int]], chains: int, lines: Sequence[Line]) -> Iterator[Output]:

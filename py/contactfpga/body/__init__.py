@@ -4,12 +4,15 @@ from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
 from contactfpga.body.body import Body
 from contactfpga.body.contact import Contact
 from contactfpga.body.joints import JointHistory
-from contactfpga.body.open_body import OpenBody, SnapshotQueue
+from contactfpga.body.open_body import OpenBody
+from contactfpga.body.queue import SnapshotQueue
 from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.body.totals import BodyStats, SnapshotBatch
 
 __all__ = [
     "Body",
     "BodyError",
+    "BodyStats",
     "Contact",
     "JointHistory",
     "LinkState",
@@ -17,5 +20,6 @@ __all__ = [
     "NoLinkData",
     "OpenBody",
     "Snapshot",
+    "SnapshotBatch",
     "SnapshotQueue",
 ]

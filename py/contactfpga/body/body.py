@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from contactfpga.body import plan
 from contactfpga.body import urdf as urdf_file
@@ -37,17 +38,22 @@ class Body:
         path = Path(path)
         values = tomlfile.load(path, BodyError)
         try:
-            for key in values:
-                if key not in KEYS:
-                    raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
-            tables = values.get("links")
-            if not isinstance(tables, list) or not tables:
-                raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")
-            urdf = urdf_file.located(plan.text(values, "urdf"), path.parent) if "urdf" in values else None
-            kinematics = None if urdf is None else Kinematics(urdf_file.load(urdf))
-            return cls(_by_name([plan.read(one, path.parent) for one in tables], kinematics), kinematics, urdf)
+            return cls.of(values, path.parent)
         except BodyError as error:
             raise BodyError(f"{path}: {error}") from None
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], folder: Path) -> Body:
+        """What such a file says; paths in it count from ``folder``. Raises :class:`BodyError`, OSError."""
+        for key in values:
+            if key not in KEYS:
+                raise BodyError(f"unknown key {shown(key)}; known are {', '.join(KEYS)}")
+        tables = values.get("links")
+        if not isinstance(tables, list) or not tables:
+            raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")
+        urdf = urdf_file.located(plan.text(values, "urdf"), folder) if "urdf" in values else None
+        kinematics = None if urdf is None else Kinematics(urdf_file.load(urdf))
+        return cls(_by_name([plan.read(one, folder) for one in tables], kinematics), kinematics, urdf)
 
     def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
         """Open every link's board, each in a thread of its own, and return once each was tried; what does not answer is
@@ -61,6 +67,8 @@ class Body:
         """
         from contactfpga.body.open_body import OpenBody
 
+        if joints is not None and not callable(joints):
+            raise TypeError(f"joints is {shown(joints)}; it must be a function of a time, such as a JointHistory")
         return OpenBody(self, joints, timeout=timeout, period_s=period_s)
 
 

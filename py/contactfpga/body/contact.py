@@ -12,6 +12,7 @@ from contactfpga import haptics
 from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
 from contactfpga.surfaces.shapes import Floats, Vector, vector
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
@@ -31,13 +32,16 @@ class Contact:
     """Device time of its frame."""
     host_time_s: float
     """The same on the body's clock."""
+    time_sigma_s: float | None
+    """Standard deviation of it; None where it is not known."""
     point_m: Vector | None
     """None for a zone that has no place: one that goes all the way round a closed sheet, or that has no cells, which
     only a frame flagged ``mismatch`` can hold."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) of the point: chance within a cell, along the surface; None as ``point_m``."""
+    """(3, 3) of the point: chance within a cell, along the surface; in the base frame also how far the joints moved the
+    point within ``time_sigma_s``. None as ``point_m``, and where the angles next to the frame's time are not known."""
     zone: Zone
     flags: frozenset[str]
     """Of its frame."""
@@ -51,6 +55,14 @@ class Contact:
     """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
     None: nothing was learned for this link, or at this angle, or the angle is not known."""
 
+    _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
+
+    @property
+    def interval_n(self) -> tuple[float, float | None] | None:
+        """Least and largest push that the same readings allow; the second is None where there is no largest one. None
+        as ``force_n``. With three contacts or more it raises :class:`~contactfpga.MissingExtra` without ``haptics``."""
+        return None if self._felt is None else self._felt.interval_n
+
     def moved(self, pose: Pose, frame: str) -> Contact:
         """The same in a frame in which its own one lies at ``pose``."""
         return dataclasses.replace(
@@ -62,9 +74,19 @@ class Contact:
             force_n=None if self.force_n is None else vector(pose.turn(np.array(self.force_n))),
         )
 
+    def less_certain(self, other: Pose | None, pose: Pose) -> Contact:
+        """The same with the spread of a point that is at ``pose``, or as far from there as ``other`` puts it; None:
+        nobody knows how far."""
+        if other is None or self.point_m is None or self.covariance_m2 is None:
+            return dataclasses.replace(self, covariance_m2=None)
+        own = (np.array(self.point_m) - pose.point_m) @ pose.rotation
+        way = other.apply(own) - np.array(self.point_m)
+        return dataclasses.replace(self, covariance_m2=self.covariance_m2 + np.outer(way, way))
+
     def to_dict(self) -> dict[str, object]:
         """All of it in plain Python values, ready for JSON."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        names = [field.name for field in dataclasses.fields(self) if field.name != "_felt"]
+        values = {name: getattr(self, name) for name in (*names, "interval_n")}
         spread = None if self.covariance_m2 is None else self.covariance_m2.tolist()
         values |= {"covariance_m2": spread, "flags": sorted(self.flags)}
         return values | {"zone": dataclasses.asdict(self.zone)}
@@ -84,24 +106,39 @@ def on_link(plan: Plan, state: LinkState, angles: Mapping[str, float] | None = N
         if zone.x_mm is not None and zone.y_mm is not None:
             point, normal = plan.place(zone.x_mm, zone.y_mm)
             spread = sigma_m**2 * (np.eye(3) - np.outer(normal, normal))
-        when, fold = (zones.time_us, state.frame_s), _fold(plan, zones, zone, angles)
+        when = zones.time_us, state.frame_s, zones.host_sigma_s
+        fold = _fold(plan, zones, zone, angles)
         made = Contact(plan.name, plan.frame, *when, point, normal, spread, zone, zones.flags)
         found.append(dataclasses.replace(made, track=ids.get(id(zone)), fold=fold))
-    return _felt(plan, zones, found, sigma_m)
+    return _felt(plan, zones, found)
 
 
-def _felt(plan: Plan, zones: Zones, found: list[Contact], sigma_m: float) -> list[Contact]:
+def _felt(plan: Plan, zones: Zones, found: list[Contact]) -> list[Contact]:
     """The same with forces, where the units' readings have come, and each contact has a place."""
-    if plan.units is None or zones.units is None or not found:
+    forces = forces_of(plan, zones) if found else None
+    if forces is None:
         return found
-    places = [(one.point_m, one.normal) for one in found if one.point_m is not None and one.normal is not None]
-    if len(places) < len(found):
-        return found
-    touches = [haptics.Touch(point, normal, plan.friction, sigma_m) for point, normal in places]
-    forces = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
     return [
-        dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n) for one, force in zip(found, forces)
+        dataclasses.replace(one, force_n=force.force_n, normal_n=force.normal_n, _felt=force)
+        for one, force in zip(found, forces)
     ]
+
+
+def forces_of(plan: Plan, zones: Zones, tracks: Tracks | None = None) -> haptics.Contacts | None:
+    """The forces at the zones of a frame, in the link's frame; None where there are no readings of units, or a zone has
+    no place."""
+    if plan.units is None or zones.units is None:
+        return None
+    touches = []
+    for zone in zones:
+        if zone.x_mm is None or zone.y_mm is None:
+            return None
+        touches.append(haptics.Touch(*plan.place(zone.x_mm, zone.y_mm), plan.friction, 1e-3 * plan.sigma_mm))
+    found = haptics.contacts(plan.units.wrench(zones.units.readings), touches)
+    ids = {} if tracks is None else {id(track.zone): track.id for track in tracks.active}
+    for one, zone in zip(found, zones):
+        one.track = ids.get(id(zone))
+    return found
 
 
 def _fold(plan: Plan, zones: Zones, zone: Zone, angles: Mapping[str, float] | None) -> float | None:

@@ -87,7 +87,7 @@ def learn(joint: str, frames: Iterable[tuple[float, Zones]], step_rad: float = S
         if zones.cells is None:
             raise BodyError(
                 f"the board reports {zones.sheet.report!r}; folds are learned cell by cell: build its Skin with "
-                "report = 'cells'"
+                'report = "cells"'
             )
         step = math.floor(angle / step_rad)
         lines = (zones.sheet.rows, zones.sheet.columns)

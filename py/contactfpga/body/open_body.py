@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-import collections
-import contextlib
+import asyncio
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from contactfpga.body.joints import Joints
+from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
+from contactfpga.body.queue import SnapshotQueue
 from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
-from contactfpga.driver import driver, finding
-from contactfpga.driver.board import Board
-from contactfpga.driver.subscription import checked
+from contactfpga.body.together import Together
+from contactfpga.body.totals import BodyStats, SnapshotBatch
+from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
-
-
-_SEARCHING = threading.Lock()  # two searches would hold each other's ports
-
-
-def open_board(plan: Plan, timeout: float = 1.0) -> Board:
-    """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
-    with _SEARCHING if finding.searched(plan.port) else contextlib.nullcontext():
-        return driver.open(plan.port, plan.skin, timeout=timeout)
 
 
 class OpenBody:
@@ -55,9 +47,8 @@ class OpenBody:
         self._changes = self._given = 0
         self._closing = False
         self._queues: list[SnapshotQueue] = []
-        self._readers = {
-            name: LinkReader(plan, opened or self._open_board, self.clock) for name, plan in body.links.items()
-        }
+        opener, together = opened or self._open_board, Together(self.clock)
+        self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
         self._threads = [
             threading.Thread(target=self._read, args=(reader,), name=f"reader of link {name}", daemon=True)
             for name, reader in self._readers.items()
@@ -136,8 +127,10 @@ class OpenBody:
             self._given = self._changes
         return self.latest()
 
-    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> list[Snapshot]:
-        """All snapshots of the next ``max_s`` seconds; the first one is waited for, for ``timeout`` seconds."""
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
+        """All snapshots of the next ``max_s`` seconds, with their frames as arrays; the first one is waited for, for
+        ``timeout`` seconds."""
+        max_s = checked_span(max_s)
         with self.subscribe() as queue:
             found = [queue.next(timeout)]
             end_s = self.clock() + max_s
@@ -146,7 +139,7 @@ class OpenBody:
                     found.append(queue.next(left_s))
                 except ReadTimeout:
                     break
-        return found
+        return SnapshotBatch(found)
 
     def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
         """A queue of its own for the snapshot at each change from now on."""
@@ -159,10 +152,23 @@ class OpenBody:
     def __iter__(self) -> Iterator[Snapshot]:
         """The newest snapshot again and again, forever, at every change or once per second."""
         while True:
-            try:
-                yield self.next()
-            except ReadTimeout:
-                yield self.latest()
+            yield self._newest()
+
+    async def __aiter__(self) -> AsyncIterator[Snapshot]:
+        """The same in ``async for``."""
+        while True:
+            yield await asyncio.to_thread(self._newest)
+
+    def _newest(self) -> Snapshot:
+        try:
+            return self.next()
+        except ReadTimeout:
+            return self.latest()
+
+    @property
+    def stats(self) -> BodyStats:
+        """Counters since the body was opened."""
+        return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
 
     def _check_open(self) -> None:
         if self._closing:
@@ -187,46 +193,3 @@ class OpenBody:
             thread.join()
         for reader in self._readers.values():
             reader.close()
-
-
-class SnapshotQueue:
-    """Snapshots from a moment on; at most ``maxsize`` wait, beyond, the oldest are dropped and counted."""
-
-    def __init__(self, body: OpenBody, maxsize: int):
-        if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
-            raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of snapshots, 1 or more")
-        self._body = body
-        self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
-        self.dropped = 0
-        """Snapshots that were not taken in time."""
-
-    def put(self, snapshot: Snapshot) -> None:
-        """Add one; the body's lock is held."""
-        self.dropped += len(self._waiting) == self._waiting.maxlen
-        self._waiting.append(snapshot)
-
-    def next(self, timeout: float = 1.0) -> Snapshot:
-        """The next one, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
-        timeout = checked(timeout)
-        with self._body._changed:
-            self._body._changed.wait_for(lambda: self._waiting or self._body._closing, timeout)
-            self._body._check_open()
-            if not self._waiting:
-                raise ReadTimeout(f"no link has changed within {timeout:g} s")
-            return self._waiting.popleft()
-
-    def close(self) -> None:
-        """Take no more."""
-        with self._body._changed:
-            if self in self._body._queues:
-                self._body._queues.remove(self)
-
-    def __enter__(self) -> SnapshotQueue:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def __iter__(self) -> Iterator[Snapshot]:
-        while True:
-            yield self.next()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -14,7 +15,7 @@ from contactfpga import surfaces
 from contactfpga.body.answer import BodyError
 from contactfpga.body.folds import Folds
 from contactfpga.body.pose import Pose
-from contactfpga.driver import sim_address
+from contactfpga.driver import sheets, sim_address
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics.units import LoadCells
@@ -68,6 +69,11 @@ class Plan:
         return vector(self.pose.apply(1e-3 * np.array(point_mm))), vector(self.pose.turn(np.array(normal)))
 
     @property
+    def virtual(self) -> bool:
+        """Whether its board runs in simulated time."""
+        return self.port is not None and self.port.startswith("sim:")
+
+    @property
     def sigma_mm(self) -> float:
         """Standard deviation of a place within a cell, along the surface."""
         return math.hypot(self.skin.pitch_x_mm, self.skin.pitch_y_mm) / math.sqrt(24)
@@ -109,6 +115,9 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         raise BodyError(f"folds are of {folds.lines} cells; the Skin has {(skin.rows, skin.columns)}")
     if folds is not None and skin.report != "cells":
         raise BodyError(f"report is {shown(skin.report)}; folds are marked cell by cell, with report = 'cells'")
+    units = LoadCells.load(folder / text(values, "units")) if "units" in values else None
+    if units is not None and len(units.units) != skin.units:
+        raise BodyError(f"its file of units has {len(units.units)}; the Skin has units = {skin.units}")
     return Plan(
         name=name,
         frame=text(values, "frame", name),
@@ -117,7 +126,7 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         pose=Pose.of(_vector(values, "point_m"), _vector(values, "rpy_rad")),
         mirrored=mirrored,
         surface=_surface(values.get("surface"), skin, folder),
-        units=LoadCells.load(folder / text(values, "units")) if "units" in values else None,
+        units=units,
         friction=_number(values, "friction", 0.5),
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
@@ -130,7 +139,7 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     if "port" not in values:
         return None
     port = text(values, "port")
-    if port.startswith("sim:") and sim_address.parse(port).skin is None:
+    if port.startswith("sim:") and sheets.split(port) is None and sim_address.parse(port).skin is None:
         return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
     return port
 
@@ -155,7 +164,7 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone |
     return table
 
 
-def text(values: dict[str, Any], key: str, usual: str | None = None) -> str:
+def text(values: Mapping[str, Any], key: str, usual: str | None = None) -> str:
     """The text of this key; raises :class:`BodyError` where it is none, or is missing without a usual one."""
     found = values.get(key, usual)
     if found is None:

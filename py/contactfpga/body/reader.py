@@ -10,6 +10,8 @@ from typing import Protocol
 
 from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
+from contactfpga.body.together import Together
+from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import (
     BoardClosed,
     BoardSilent,
@@ -18,6 +20,7 @@ from contactfpga.errors import (
     SkinMismatch,
     VersionMismatch,
 )
+from contactfpga.inputs.values import shown
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
@@ -41,6 +44,14 @@ class OpenBoard(Protocol):
     def clock(self) -> float:
         """Seconds on the clock of ``Zones.host_time_s``."""
 
+    @property
+    def name(self) -> str:
+        """What it was named by the Skin that it was built from; "" where it was not."""
+
+    @property
+    def stats(self) -> Stats:
+        """Counters since it was opened."""
+
     def close(self) -> None:
         """Give the port back."""
 
@@ -48,8 +59,16 @@ class OpenBoard(Protocol):
 class LinkReader:
     """What is known of one link. One thread calls :meth:`step`, any thread :meth:`state`."""
 
-    def __init__(self, plan: Plan, opened: Callable[[Plan], OpenBoard], clock: Callable[[], float]):
+    def __init__(
+        self,
+        plan: Plan,
+        opened: Callable[[Plan], OpenBoard],
+        clock: Callable[[], float],
+        together: Together | None = None,
+    ):
+        """``together``: has virtual boards run on one clock."""
         self.plan = plan
+        self._together = together if plan.virtual else None
         self.tried = False
         """It was tried to open the board, with or without success."""
         self.answered = 0
@@ -63,7 +82,9 @@ class LinkReader:
         self._zones: Zones | None = None
         self._tracker, self._tracks = Tracker(), NO_TRACKS
         self._frame_s = self._open_s = -math.inf
+        self._came_s = -math.inf  # its sample on the board's own clock
         self._ever = False
+        self._before = Stats()  # of all boards that were closed
 
     def ask(self) -> int:
         """Have the next frame be one that is scanned after this call; its number."""
@@ -79,11 +100,17 @@ class LinkReader:
                 return wait_s
             self._open()
             return 0.0
+        due_s = WAIT_S if self._together is None else self._together.due_s(self.plan.name, self._board.clock())
         asked = self._asked
+        if asked == self.answered and due_s <= 0:
+            return 0.0
         try:
-            zones = self._board.read(WAIT_S) if asked > self.answered else self._board.latest(WAIT_S)
-            tracks = self._tracker.update(zones)
-            age_s = 0.0 if zones.host_time_s is None else max(0.0, self._board.clock() - zones.host_time_s)
+            if asked > self.answered:
+                self._take(self._board.read(WAIT_S))
+            elif self._together is None:
+                self._take(self._board.latest(due_s))
+            else:
+                self._let_pass(due_s)
         except (SkinMismatch, VersionMismatch) as error:
             self._drop("mismatch", error)
         except ReadTimeout:
@@ -91,11 +118,27 @@ class LinkReader:
         except Exception as error:  # of whatever kind: the other links go on, and this one says why it does not
             self._drop("lost", error)
         else:
-            with self._lock:
-                self._zones, self._tracks = zones, tracks
-                self._frame_s, self._ever = self._clock() - age_s, True
             self.answered = max(self.answered, asked)
         return 0.0
+
+    def _let_pass(self, seconds: float) -> None:
+        """Simulated time, and take every frame of it."""
+        assert self._board is not None
+        until_s = self._board.clock() + seconds
+        while (left_s := until_s - self._board.clock()) > 0 and self._asked == self.answered:
+            self._take(self._board.latest(left_s))
+
+    def _take(self, zones: Zones) -> None:
+        assert self._board is not None
+        own, theirs = self.plan.skin.name, self._board.name
+        if own and theirs and own != theirs:
+            raise SkinMismatch(f"the board is named {shown(theirs)}; this link's Skin is named {shown(own)}")
+        tracks = self._tracker.update(zones)
+        now_s = self._board.clock()
+        sampled_s = now_s if zones.host_time_s is None else min(zones.host_time_s, now_s)
+        with self._lock:
+            self._zones, self._tracks = zones, tracks
+            self._came_s, self._frame_s, self._ever = sampled_s, self._clock() - (now_s - sampled_s), True
 
     def _open(self) -> None:
         try:
@@ -109,16 +152,32 @@ class LinkReader:
         else:
             with self._lock:
                 self._board, self._zones, self._open_s = board, None, self._clock()
+                if self._together is not None:
+                    self._came_s = board.clock()
+                    self._together.join(self.plan.name, self._came_s)
         self.tried = True
 
     def _drop(self, status: str, error: Exception) -> None:
-        with contextlib.suppress(Exception):
-            if self._board is not None:
-                self._board.close()
+        board = self._board
         self._fail(status, error)
+        with contextlib.suppress(Exception):
+            if board is not None:
+                board.close()
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of its boards, of those before as well."""
+        with self._lock:
+            return self._total()
+
+    def _total(self) -> Stats:
+        return total([self._before] if self._board is None else [self._before, self._board.stats])
 
     def _fail(self, status: str, error: Exception) -> None:
+        if self._together is not None:
+            self._together.leave(self.plan.name)
         with self._lock:
+            self._before = self._total()
             self._board = self._zones = None
             self._down, self._reason = status, str(error) or type(error).__name__
             self._retry_at = self._clock() + RETRY_S
@@ -135,6 +194,9 @@ class LinkReader:
             if self._board is None:
                 return LinkState(None, age_s, self._down, self._reason)
             waited_s = now - max(self._frame_s, self._open_s)
+            if self._together is not None:  # nothing happens on the sheet while its time does not pass
+                waited_s = self._board.clock() - self._came_s
+                age_s = None if self._zones is None else waited_s
             if waited_s > self.plan.silent_s:
                 return LinkState(None, age_s, "silent", f"no frame for {waited_s:.3f} s")
             if self._zones is None or age_s is None:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 BASE, LINK = "base", "link"
 LINK_PX = 200
+Known = Mapping[str, float] | ContactFPGAError
+"""Joint angles, or why there are none."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +39,8 @@ class LinkState:
     """How long ago, on the body's clock, the newest frame was scanned that ever came; None: none ever did."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
-    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin or version is there."""
+    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
+    there."""
     reason: str = ""
     """Why it is not ok."""
     frame_s: float | None = None
@@ -58,10 +61,22 @@ class Snapshot:
         """When it was taken, on the body's clock."""
         self.links = dict(links)
         self._body = body
-        self._angles: dict[str, Mapping[str, float] | ContactFPGAError] = {}
+        self._angles: dict[str, Known] = {}
+        self._beside: dict[str, Known] = {}  # a standard deviation of the frame's time earlier or later
         if joints is not None:  # looked up now, as a history is short
             for name in self.answering:
-                self._angles[name] = _angles(joints, self.links[name])
+                self._look_up(name, joints)
+
+    def _look_up(self, name: str, joints: Joints) -> None:
+        state = self.links[name]
+        assert state.frame_s is not None
+        assert state.zones is not None
+        self._angles[name] = _angles(joints, state.frame_s)
+        sigma_s = state.zones.host_sigma_s
+        if sigma_s and not isinstance(self._angles[name], ContactFPGAError):
+            before = _angles(joints, state.frame_s - sigma_s)
+            found = _angles(joints, state.frame_s + sigma_s) if isinstance(before, ContactFPGAError) else before
+            self._beside[name] = found
 
     @property
     def answering(self) -> tuple[str, ...]:
@@ -93,10 +108,18 @@ class Snapshot:
             angles = None if isinstance(known, ContactFPGAError) else known
             mine = contact.on_link(self._body.links[name], self.links[name], angles)
             if frame == BASE and mine:
-                pose = self._kinematics.pose(self._body.links[name].frame, self._angles_of(name))
-                mine = [one.moved(pose, BASE) for one in mine]
+                mine = self._in_base(name, mine)
             found += mine
         return found
+
+    def _in_base(self, name: str, contacts: list[Contact]) -> list[Contact]:
+        frame, beside = self._body.links[name].frame, self._beside.get(name)
+        pose = self._kinematics.pose(frame, self._angles_of(name))
+        moved = [one.moved(pose, BASE) for one in contacts]
+        if beside is None or not self._kinematics.needed(frame):
+            return moved
+        other = None if isinstance(beside, ContactFPGAError) else self._kinematics.pose(frame, beside)
+        return [one.less_certain(other, pose) for one in moved]
 
     def jacobian(self, one: Contact) -> Floats:
         """(6, n): how the contact's point, as part of its link, moves with each of :attr:`joint_names`, in the base
@@ -139,10 +162,9 @@ class Snapshot:
         return f"<Snapshot at {self.host_time_s:.3f} s: {states}>"
 
 
-def _angles(joints: Joints, state: LinkState) -> Mapping[str, float] | ContactFPGAError:
-    assert state.frame_s is not None
+def _angles(joints: Joints, host_time_s: float) -> Known:
     try:
-        return joints(state.frame_s)
+        return joints(host_time_s)
     except ContactFPGAError as error:  # said to whoever asks for what needs them
         return error
     except Exception as error:  # of a program's own code: the threads that read the links go on

@@ -71,9 +71,10 @@ CONVERTERS: dict[str, Converter] = {
             sweep_levels=40,
             spacing_levels=40,
         ),
-        # SBAS950B 6.6 and 6.7, 2.7 V and above: levels of 20 ns, and 20 ns until a bit is there; twice that leaves time
-        # for pins and wires. Its own clock up to 8.2 MHz with levels of 49 ns; 8.3.7: OSR 1024 at power-up, two
-        # of its periods per modulator sample, and a filter as long as three results.
+        # Texas Instruments SBAS950B, 6.6 and 6.7, 2.7 V and above: levels of 20 ns, and 20 ns until a bit is there;
+        # twice that leaves time for pins and wires. 6.3 and 6.6: its own clock from 0.3 to 8.2 MHz with levels of
+        # 49 ns. Table 8-12 and 8.3.5: 1024 modulator samples per result at power-up, two periods each. 8.3.7.1: a
+        # sinc3 filter, which is as long as three results.
         Converter(
             name="ads131m08",
             title="ADS131M08",

@@ -15,6 +15,7 @@ from contactfpga.console import numbers, outputs
 from contactfpga.console.wiring import Table
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several, sheets_of
 
 HELP = "Build a bitstream for a board; print its wiring."
 EXTRA = "boards"
@@ -26,6 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", help=BOARD)
     parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board).")
+    parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
     parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
@@ -38,19 +40,28 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_hdl.board import sites
 
     board = find(args.board)
-    skin = Skin.load(args.skin) if args.skin else board.skin
-    circuit = load_checked(args.skin, skin) if args.skin else None
-    board.check(skin)
-    table = Table(board, skin, circuit, sites.wire_sites(board, wiring.wires(board, skin)))
-    built = {} if args.wiring else _built(args, board, skin)
+    if args.skin and args.sheets:
+        raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
+    design: Skin | Several = board.skin
+    if args.skin or args.sheets:
+        design = Skin.load(args.skin) if args.skin else Several.load(args.sheets)
+    circuit = load_checked(args.skin, design) if isinstance(design, Skin) and args.skin else None
+    board.check(design)
+    table = Table(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))
+    built = {} if args.wiring else _built(args, board, design)
     if args.json:
-        print(json.dumps({"board": board.name, "skin": skin.changed, **built, **table.to_dict()}))
+        described = {"skin": design.changed} if isinstance(design, Skin) else {"sheets": _changed(design)}
+        print(json.dumps({"board": board.name, **described, **built, **table.to_dict()}))
     else:
         table.show()
     return 0
 
 
-def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin) -> dict[str, Any]:
+def _changed(several: Several) -> list[dict[str, Any]]:
+    return [skin.changed for skin in several.skins]
+
+
+def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin | Several) -> dict[str, Any]:
     """Build the bitstream and print what it takes; the same for JSON."""
     from contactfpga_hdl.board import build
 
@@ -61,9 +72,15 @@ def _built(args: argparse.Namespace, board: BoardSpec, skin: Skin) -> dict[str, 
         raise ContactFPGAError(str(error)) from None
     bitstream = str(bitstream_path(board, folder).resolve())
     if not args.json:
-        print(f"{board.title}, {skin.rows}x{skin.columns}, report {skin.report!r}", *report.lines(), sep="\n")
+        print(f"{board.title}, {_described(skin)}", *report.lines(), sep="\n")
         print(f"{'bitstream':12} {bitstream}")
     return {"bitstream": bitstream, "report": dataclasses.asdict(report)}
+
+
+def _described(skin: Skin | Several) -> str:
+    if isinstance(skin, Several):
+        return f"sheets of {sheets_of(skin.skins)}"
+    return f"{skin.rows}x{skin.columns}, report {skin.report!r}"
 
 
 def default_folder(board: BoardSpec) -> Path:

@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable
 
 from contactfpga.console import flags, numbers, self_testing, terminal, watching
-from contactfpga.driver import driver, finding, health, ports
+from contactfpga.driver import driver, finding, health, ports, sheets
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
@@ -23,13 +23,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
     long = "Seconds over which frames are counted (default: 1), or watched or tested (default: until Ctrl-C)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, help=long)
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
     watch = "Follow the board while you touch every switch; name those that are stuck, loose or dead."
     parser.add_argument("--watch", action="store_true", help=watch)
     tested = "Have the board drive each line alone, again and again while you press every place; name joined lines."
     parser.add_argument("--self-test", action="store_true", help=tested)
-    stuck = "Seconds without a change after which a watch tells a pressed switch (default: 10)."
-    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="T", help=stuck)
+    stuck = "Seconds without a change after which --watch reports a pressed switch (default: 10)."
+    parser.add_argument("--stuck-s", type=numbers.SECONDS, metavar="S", help=stuck)
     parser.add_argument("--list", action="store_true", help="Listen to all ports; list the boards and their names.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object: findings and counters.")
 
@@ -122,8 +122,9 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
             skin = Skin.load(args.skin) if args.skin else None
             port = finding.find(port, skin, args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
         if port is not None and "://" not in port:
-            report.add(health.rights(port))
-            report.add(health.ftdi(port))
+            device, _ = sheets.split(port) or (port, None)
+            report.add(health.rights(device))
+            report.add(health.ftdi(device))
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             report.stats = board.stats
             report.add(health.hello(board))

@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
             if not some:
                 print(f"{name}: {what}: none was followed")
                 continue
-            print(f"{name}: {what}: {summary.share(some)} silently wrong, {summary.share(some, 'told')} told")
+            print(f"{name}: {what}: {summary.share(some)} silently wrong, {summary.share(some, 'told')} reported")
     if page:
         found = summary.measured(names)
         summary.write(found, folder / "designs.csv")

@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
 
     recording = replayed.load(args.recording, args.link)
     path = Path(args.output or f"{Path(args.recording).stem}.png")
-    if path.suffix not in ENDINGS:
+    if path.suffix.lower() not in ENDINGS:
         raise ValueError(f"--output is {str(path)!r}; it must end in {' or '.join(ENDINGS)}")
     plot.draw(recording, outputs.file(path))
     terminal.say(str(path))

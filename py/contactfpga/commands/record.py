@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 
 if TYPE_CHECKING:
     from contactfpga.body import Body
+    from contactfpga.body.plan import Plan
     from contactfpga.recordings.session import Session
     from contactfpga.ros.feed import Felt
 
-HELP = "Record a board, or all boards of a robot (ROBOT.toml instead of PORT), into an MCAP file."
+HELP = "Record a board, or all boards of a robot, into an MCAP file."
 EXTRA = "record"
 
 SHOWN_S = 0.5
@@ -32,8 +29,8 @@ SHOWN_S = 0.5
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("file", metavar="FILE.mcap", help="File to write; it must not exist yet.")
-    flags.connection(parser)
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
+    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, or ROBOT.toml for all boards of a robot (docs/body.md).")
+    flags.seconds(parser)
     megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
     seconds = "The same, each this many seconds long."
@@ -45,6 +42,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from contactfpga.body import packed
     from contactfpga.recordings.recorder import Split
     from contactfpga.recordings.session import Session
 
@@ -53,13 +51,13 @@ def run(args: argparse.Namespace) -> int:
     split = None
     if args.split_mb is not None or args.split_s is not None:
         split = Split(None if args.split_mb is None else args.split_mb * 1e6, args.split_s)
-    about = {} if body is None else {"robot": {"toml": Path(args.port).read_text(encoding="utf-8")}}
+    about = {} if body is None else {packed.ROBOT: packed.pack(args.port)}
     session = Session(args.file, split, args.bytes_only, about=about)
     progress = _Progress(session)
     try:
-        with _ended_by_term(), session:
+        with session:
             _add(session, args, body)
-            with contextlib.suppress(KeyboardInterrupt):  # the usual end
+            with interrupt.usual_end():
                 session.start(args.seconds)
                 while session.running:
                     session.wait(0.05)
@@ -67,19 +65,6 @@ def run(args: argparse.Namespace) -> int:
     finally:
         progress.end()
     return 0
-
-
-@contextlib.contextmanager
-def _ended_by_term() -> Iterator[None]:
-    """A service is stopped with TERM, which closes the file as Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # signals are the main thread's
-        return
-    before = signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _body(args: argparse.Namespace) -> Body | None:
@@ -107,7 +92,15 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
         return
     for plan in body.links.values():
         mount = Mount(plan.frame, plan.place)
-        session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount)
+        forces = None if plan.units is None else _felt_on(plan)
+        session.add(plan.port, plan.skin, name=plan.name, timeout=args.timeout, mount=mount, felt=forces)
+
+
+def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
+    """What says the forces at contacts of a link with pressure units."""
+    from contactfpga.body.contact import forces_of
+
+    return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
 
 
 class _Progress:

@@ -24,9 +24,13 @@ def run(args: argparse.Namespace) -> int:
     found = recover(args.file, args.into)
     terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
     if found.closed and not found.damaged:
-        terminal.say(f"Nothing was missing: {args.file} was closed as it should be.")
+        terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
     if found.cut:
         terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
     if found.damaged:
-        terminal.say(f"Left out in between: {found.damaged} damaged pieces; frames are missing there.")
+        terminal.say(f"Left out in between: {_pieces(found.damaged)}; frames are missing there.")
     return 0
+
+
+def _pieces(count: int) -> str:
+    return "1 damaged piece" if count == 1 else f"{count} damaged pieces"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.console.forces import Forces
 from contactfpga.haptics import WithReadings
 
-HELP = "Publish the skin as ROS 2 topics, with no ROS installed."
+HELP = "Publish contacts as ROS 2 topics, with no ROS installed."
 EXTRA = "ros"
 
 
@@ -43,8 +43,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--domain", type=numbers.DOMAIN, metavar="ID", default=0, help=domain)
     network = "Reach nodes on other computers too; without it only those on this one."
     parser.add_argument("--network", action="store_true", help=network)
-    seconds = "Publish for this long, then end (default: until interrupted)."
-    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
+    flags.seconds(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -61,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
         forces = Forces.of(board, args.units, args.friction)
         feed = Feed(board, publisher.send, settings, None if forces is None else forces.of_frame)
         reach = "all computers of the network" if args.network else "this computer"
-        terminal.say(f"publishing {publisher.topic('zones')} and the other topics to {reach}; Ctrl-C ends it")
         until = None if args.seconds is None else board.clock() + args.seconds
-        feed.run(WithReadings(board) if forces else board, lambda: until is not None and board.clock() >= until)
+        with interrupt.usual_end():
+            terminal.say(f"publishing {publisher.topic('zones')} and the other topics to {reach}; Ctrl-C ends it")
+            feed.run(WithReadings(board) if forces else board, lambda: until is not None and board.clock() >= until)
     return 0

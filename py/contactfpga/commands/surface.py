@@ -22,7 +22,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
     parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
     parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
-    by = "Around the frame's z axis and not stretched (unrolling, the default), or down along z (projection)."
+    by = (
+        "Unrolling winds the sheet around the frame's z axis without stretching it; projection goes straight down "
+        "along z (default: unrolling)."
+    )
     parser.add_argument("--by", choices=("unrolling", "projection"), default="unrolling", help=by)
     origin = "Origin of the sheet's frame in the mesh's, in mm (default: 0 0 0)."
     parser.add_argument("--origin", nargs=3, type=_LENGTH, default=(0, 0, 0), metavar=("X", "Y", "Z"), help=origin)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import sys
 
-from contactfpga.console import flags, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, terminal
 
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
 
-WHAT = "Port, sim://, a recording, or a robot.toml (default: a virtual sheet to press)."
+WHAT = (
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board, sim://, a recording's file, or ROBOT.toml (default: "
+    "a virtual sheet to press)."
+)
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    flags.connection(parser, WHAT)
-    parser.add_argument("--link", metavar="NAME", help="Board to show, of a recording of several (default: the first).")
+    skin = "Skin of the virtual sheet; of a board: require one that was built from it, and use its baud rate."
+    flags.connection(parser, WHAT, skin)
+    parser.add_argument(
+        "--link",
+        metavar="NAME",
+        help="Board to show, of a recording of several (default: all of a robot, or the first).",
+    )
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
     parser.add_argument("--units", metavar="FILE", help=units)
     host = "Address to listen on (default: 127.0.0.1, which this computer alone can reach)."
@@ -26,17 +33,19 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
     parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)
     parser.add_argument("--no-browser", action="store_true", help="Print the address only.")
-    parser.add_argument("--seconds", type=numbers.SECONDS, help="End after this many seconds (default: at Ctrl-C).")
+    flags.seconds(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.view import opening
+    from contactfpga.view.player import Player
 
     named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units)
-    with contextlib.suppress(KeyboardInterrupt), opening.opened(named, args.host, args.http_port) as shown:
+    with opening.opened(named, args.host, args.http_port) as shown, interrupt.usual_end():
         terminal.say(f"Open {shown.url}")
-        terminal.say("Whoever has this address can read and press. Ctrl-C ends it.", hang=2)
+        can = "see the recording" if isinstance(shown.source, Player) else "read and press"
+        terminal.say(f"Whoever has this address can {can}. Ctrl-C ends it.", hang=2)
         if not args.no_browser and _has_display():
             opening.browse(shown.url)
         opening.run(shown, args.seconds)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 
-from contactfpga.console import flags
+from contactfpga.console import flags, interrupt
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.haptics import WithReadings
@@ -26,7 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
     )
     flags.forces(parser, "Show the force at each zone too")
-    record = "Write every byte received to this file; replay://FILE plays it back."
+    record = "Write every byte received to this new file; replay://FILE plays it back."
     parser.add_argument("--record", metavar="FILE", help=record)
 
 
@@ -70,12 +71,13 @@ class _Follow:
 def _json(args: argparse.Namespace) -> int:
     with flags.opened(args, args.record) as board:
         follow = _Follow(args, Forces.of(board, args.units, args.friction))
-        for zones in follow.frames(board):
-            follow.take(zones)
-            more = {} if follow.tracks is None else follow.tracks.to_dict()
-            if follow.forces is not None:
-                more |= follow.forces.to_dict()
-            print(json.dumps(zones.to_dict() | more), flush=True)
-            if args.once:
-                break
+        with contextlib.nullcontext() if args.once else interrupt.usual_end():
+            for zones in follow.frames(board):
+                follow.take(zones)
+                more = {} if follow.tracks is None else follow.tracks.to_dict()
+                if follow.forces is not None:
+                    more |= follow.forces.to_dict()
+                print(json.dumps(zones.to_dict() | more), flush=True)
+                if args.once:
+                    break
     return 0

@@ -10,19 +10,27 @@ from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
 
 PORT = (
-    "Device path, name:NAME or usb:SERIAL of a board, sim:// or replay://FILE (default: the one supported board that "
-    "is plugged in, with --skin the one of that Skin)."
+    "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "
+    "replay://FILE (default: the one supported board that is plugged in, with --skin the one of that Skin)."
 )
+SKIN = "Require a board built from this Skin, and use its baud rate."
 
 
-def connection(parser: argparse.ArgumentParser, port: str = PORT) -> None:
-    """What :func:`opened` takes; ``port``: the help of its first argument."""
+def connection(parser: argparse.ArgumentParser, port: str = PORT, skin: str = SKIN) -> None:
+    """What :func:`opened` takes; ``port``, ``skin``: the help of these."""
     parser.add_argument("port", nargs="?", metavar="PORT", help=port)
-    skin = "Require a board built from this Skin, and use its baud rate."
     parser.add_argument("--skin", metavar="FILE", help=skin)
-    parser.add_argument("--baud", type=numbers.BAUD, help="Bits per second (default: the Skin's, or 3000000).")
+    parser.add_argument(
+        "--baud", type=numbers.BAUD, metavar="N", help="Bits per second (default: the Skin's, or 3000000)."
+    )
     wait = "Seconds to wait for the board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+
+
+def seconds(parser: argparse.ArgumentParser) -> None:
+    """Of commands that run until Ctrl-C."""
+    long = "End after this many seconds (default: at Ctrl-C)."
+    parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=long)
 
 
 def forces(parser: argparse.ArgumentParser, what: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics import Contacts, DriftWatch, HapticsError, LoadCells, felt
+from contactfpga.haptics import AloneWatch, Contacts, Drift, DriftWatch, HapticsError, LoadCells, felt
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
@@ -25,8 +25,10 @@ class Forces:
 
     def __init__(self, cells: LoadCells, friction: float):
         self._cells, self._friction = cells, friction
-        self._drift = DriftWatch(cells)
-        self.drifted: tuple[int, ...] = ()
+        self._watch = DriftWatch(cells)
+        self._alone = AloneWatch(cells)
+        self.drift: Drift | None = None
+        """None: no readings yet."""
         self.contacts: Contacts | None = None
         """None: no readings belong to the frame."""
 
@@ -37,10 +39,10 @@ class Forces:
 
     def take(self, zones: Zones, tracks: Tracks | None) -> None:
         """The next frame."""
-        self.contacts = felt(self._cells, zones, self._friction, tracks=tracks)
+        self._alone.take(zones)
+        self.contacts = felt(self._cells, zones, self._friction, tracks=tracks, alone=self._alone)
         if zones.units is not None:
-            drift = self._drift.update(zones.time_us / 1e6, zones.units.readings, len(zones))
-            self.drifted = drift.drifted
+            self.drift = self._watch.update(zones.time_us / 1e6, zones.units.readings, len(zones))
 
     def of_frame(self, zones: Zones, tracks: Tracks | None) -> Contacts | None:
         """The same, and what it found."""
@@ -62,7 +64,7 @@ class Forces:
             "unexplained": rest and {"force_n": list(rest.force_n), "moment_nm": list(rest.moment_nm)},
             "saturated": list(found.wrench.saturated),
             "lifted": list(found.wrench.lifted),
-            "drifted": list(self.drifted),
+            "drifted": [] if self.drift is None else list(self.drift.drifted),
         }
 
     def sentences(self) -> list[str]:
@@ -70,8 +72,10 @@ class Forces:
         found = self.contacts
         if found is None:
             return ["no readings of the units yet"]
-        of_units = {"saturated": found.wrench.saturated, "lifted": found.wrench.lifted, "drifted": self.drifted}
+        of_units = {"saturated": found.wrench.saturated, "lifted": found.wrench.lifted}
         said = [f"unit {unit} {what}" for what, units in of_units.items() for unit in units]
+        if self.drift is not None:
+            said += [f"unit {unit} drifted by {self.drift.deviations_n[unit]:.2g} N" for unit in self.drift.drifted]
         if found.beyond_friction:
             said.append("more friction than given")
         if found.alarm:

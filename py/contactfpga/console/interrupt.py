@@ -1,8 +1,12 @@
-"""How a command ends that fails or is interrupted: at once, with its status, and without a word that is no use."""
+"""How a command ends that fails or is interrupted: at once, with its status, and without a word that is no use.
+
+The signal TERM, which stops services, does what Ctrl-C does.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import signal
 import sys
 import threading
@@ -15,7 +19,10 @@ from contactfpga.inputs.files import told
 from contactfpga.inputs.values import visible_lines
 
 STATUS = 130
-"""Of a command that Ctrl-C ended: 128 and the number of the signal."""
+"""Of a command that Ctrl-C cut short: 128 and the number of the signal."""
+
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -39,7 +46,20 @@ def guarded(body: Callable[[], int | None]) -> int:
         except ContactFPGAError as error:
             return failed(error)
         except OSError as error:
-            return failed(told(error))
+            return failed(_told(error))
+
+
+@contextlib.contextmanager
+def usual_end() -> Iterator[None]:
+    """Around what runs until Ctrl-C: that is no failure."""
+    with contextlib.suppress(KeyboardInterrupt):
+        yield
+
+
+def _told(error: OSError) -> str:
+    if error.errno == errno.ENOSPC and error.filename is None:  # of what is printed, the system names no file
+        return f"there is no room where the output goes: {told(error)}"
+    return told(error)
 
 
 def failed(reason: object) -> int:
@@ -55,12 +75,12 @@ def _listening() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are the main thread's
         return
-    before = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, _interrupt)
+    before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _interrupt(*_: object) -> None:

@@ -12,7 +12,7 @@ from typing import Protocol
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from contactfpga.console import terminal
+from contactfpga.console import interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.silence import Silence, longest_pause_s
 from contactfpga.errors import ReadTimeout, ReplayEnded
@@ -58,7 +58,7 @@ class Frames(Protocol):
 def show(
     board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: Frames | None = None
 ) -> int:
-    """Show one frame with ``--once``, otherwise fifteen per second until interrupted or the recording ends; ``frames``:
+    """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends; ``frames``:
     what gives the board's, by default it does."""
     console = terminal.console()
     frames = frames or board
@@ -67,16 +67,25 @@ def show(
         take(zones)
         console.print(render(zones, room(console, endless=True)))
         return 0
+    with interrupt.usual_end():
+        _follow(board, args, render, take, frames, console)
+    return 0
+
+
+def _follow(
+    board: Board, args: argparse.Namespace, render: Render, take: Take, frames: Frames, console: Console
+) -> None:
+    """Show frames until there are no more."""
     if not terminal.of().live:
         if sys.stdout.isatty():
             what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
             terminal.say(what, sys.stderr, hang=2)
-        return _last(board, frames, args, console, render, take)
+        _last(board, frames, args, console, render, take)
+        return
     with Live(console=console, auto_refresh=False) as live:
         for found in _paced(board, frames, args.timeout, take, tell_silence=True):
             shown = str(found) if isinstance(found, Silence) else render(found, room(console))
             live.update(shown, refresh=True)
-    return 0
 
 
 def room(console: Console, endless: bool = False) -> Room:
@@ -85,7 +94,7 @@ def room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _last(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> int:
+def _last(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> None:
     """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
     zones = None
     try:
@@ -94,7 +103,6 @@ def _last(board: Board, frames: Frames, args: argparse.Namespace, console: Conso
     finally:
         if isinstance(zones, Zones):
             console.print(render(zones, room(console, endless=True)))
-    return 0
 
 
 def _paced(

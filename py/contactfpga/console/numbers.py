@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from contactfpga.cover.answer import MAX_LENGTH_M
+from contactfpga.ros import MAX_DOMAIN
 from contactfpga.skin import limits
 
 _Number = TypeVar("_Number", int, float)
@@ -76,5 +77,4 @@ CELL = number(-1e300, 1e300)
 SEED = whole(0, 2**63 - 1)
 JOBS = whole(1, 1024, "processes")
 TURN = number(-7, 7, "rad", hint="angles are in rad, 90 degrees are 1.5708")
-DOMAIN = whole(0, 232)
-"""The domains of DDS: beyond, its port numbers end."""
+DOMAIN = whole(0, MAX_DOMAIN)

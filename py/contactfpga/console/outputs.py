@@ -17,21 +17,27 @@ class OutputError(ContactFPGAError):
 def folder(path: str | Path, option: str = "--output") -> Path:
     """The folder, made where there is none; raises :class:`OutputError` where nothing can be written into it."""
     place = Path(path)
+    _made(place, place, option)
+    return place
+
+
+def _made(place: Path, asked: Path, option: str) -> None:
+    """``asked``: what the user named."""
     try:
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place):
             pass
     except FileExistsError:
-        raise OutputError(f"{option} is {str(place)!r}; that is no folder") from None
+        what = "that" if place == asked else repr(str(place))
+        raise OutputError(f"{option} is {str(asked)!r}; {what} is no folder") from None
     except (OSError, ValueError) as error:
-        raise OutputError(_refused(option, place, error)) from None
-    return place
+        raise OutputError(_refused(option, asked, error)) from None
 
 
 def file(path: str | Path, option: str = "--output") -> Path:
     """A file that can be written, with its folder; nothing of it is changed yet."""
     place = Path(path)
-    folder(place.parent, option)
+    _made(place.parent, place, option)
     if place.is_dir():
         raise OutputError(f"{option} is {str(place)!r}; that is a folder, and a file is needed")
     new = not os.path.lexists(place)

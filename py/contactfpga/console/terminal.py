@@ -98,9 +98,17 @@ def _columns_asked() -> int | None:
 def prepare() -> None:
     """From now on no character ends a command because the encoding of its output lacks it."""
     codecs.register_error(_ERRORS, _nearest)
+    if sys.stdout is None:  # closed by a shell's >&-
+        sys.stdout = _nowhere()
+    if sys.stderr is None:
+        sys.stderr = _nowhere()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors=_ERRORS)
+
+
+def _nowhere() -> TextIO:
+    return open(os.devnull, "w", encoding="utf-8")
 
 
 def _nearest(error: UnicodeError) -> tuple[str | bytes, int]:

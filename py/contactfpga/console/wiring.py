@@ -12,6 +12,7 @@ from contactfpga.boards.wiring import Line, Output, Wire
 from contactfpga.circuit import Circuit
 from contactfpga.console import terminal
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 DIODES = {
     "col2row": "each diode's cathode toward the row",
@@ -22,10 +23,10 @@ DIODES = {
 
 @dataclasses.dataclass(frozen=True)
 class Table:
-    """All wires of a sheet, with what its circuit states."""
+    """All wires of a sheet, or of several ones, with what its circuit states."""
 
     board: BoardSpec
-    skin: Skin
+    skin: Skin | Several
     circuit: Circuit | None
     """None: the Skin's file has no table ``[circuit]``, so resistors have no values here."""
     sites: Sequence[str]
@@ -33,19 +34,19 @@ class Table:
 
     def show(self) -> None:
         """Print it."""
-        skin = self.skin
-        terminal.say(
-            f"{self.board.title}, {skin.rows}x{skin.columns}, rows {skin.row_drive}, columns {skin.column_read}, "
-            f"{skin.diodes}: {DIODES[skin.diodes]}"
-        )
+        for sheet, skin in self._sheets:
+            terminal.say(
+                f"{self.board.title}, {sheet and f'sheet {sheet}: '}{skin.rows}x{skin.columns}, rows {skin.row_drive}, "
+                f"columns {skin.column_read}, {skin.diodes}: {DIODES[skin.diodes]}"
+            )
         head = ("wire", "pin", "FPGA", "leads to", "series", "pull")
         rows = [
             (wire.port, self.board.label(wire.pin) if wire.pin else "", site, *self._end(wire.line))
-            for wire, site in zip(wiring.wires(self.board, skin), self.sites, strict=True)
+            for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
         ]
         _show([head, *rows])
-        chips = ("chip", "chain", "number", "output", "leads to", "series", "pull")
-        _show([chips, *((*one.place, *self._end(one.line)) for one in wiring.outputs(skin))])
+        chips = ("sheet", "chip", "chain", "number", "output", "leads to", "series", "pull")
+        _show([chips, *((sheet, *one.place, *self._end(one.line)) for sheet, one in self._outputs())])
         if self.circuit is None:
             terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
         terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
@@ -59,11 +60,22 @@ class Table:
                 for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
             ],
             "outputs": [
-                {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
+                ({"sheet": int(sheet)} if sheet else {})
+                | {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
                 | self._dict(one)
-                for one in wiring.outputs(self.skin)
+                for sheet, one in self._outputs()
             ],
         }
+
+    @property
+    def _sheets(self) -> list[tuple[str, Skin]]:
+        """Each Skin with the number of its sheet; "" where there is one."""
+        if isinstance(self.skin, Several):
+            return [(str(number), skin) for number, skin in enumerate(self.skin.skins)]
+        return [("", self.skin)]
+
+    def _outputs(self) -> list[tuple[str, Output]]:
+        return [(sheet, one) for sheet, skin in self._sheets for one in wiring.outputs(skin)]
 
     def _dict(self, one: Wire | Output) -> dict[str, Any]:
         line = one.line

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
+from typing import NoReturn
 
 from contactfpga.driver import self_test
 from contactfpga.driver.link import Link
@@ -33,7 +34,8 @@ class Board:
     """An open port with a board at its other end: a context manager that iterates every frame.
 
     Made by :func:`open`. Safe for several threads; :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
-    thread that wants every frame for itself takes a :meth:`subscribe`. Every method raises :class:`BoardClosed` after
+    thread that wants every frame for itself takes a :meth:`subscribe`. It can be neither copied nor sent to another
+    process. Every method raises :class:`BoardClosed` after
     :meth:`close`, also where it was waiting.
     """
 
@@ -43,6 +45,17 @@ class Board:
         self._threaded = transport.threaded
         self._link = Link(transport, skin)
         self._frames = Subscription(self._link, QUEUE)
+
+    def __repr__(self) -> str:
+        try:
+            sheet = self.sheet
+        except ContactFPGAError as error:
+            return f"<Board {error}>"
+        return f"<Board {self.port}: {sheet.rows}x{sheet.columns} cells>"
+
+    def __reduce__(self) -> NoReturn:
+        """Not even a copy: the end of one would close the port of the other."""
+        raise TypeError(f"{self.port}: an open board cannot be copied or sent to another process; open its port there")
 
     def __del__(self) -> None:
         if hasattr(self, "_link"):
@@ -166,8 +179,9 @@ class Board:
     def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
         """The newest frame: the last of all that wait, or the next one when none does. Older ones are dropped.
 
-        With ``max_age_s`` no frame that came longer ago, in seconds; as soon as there can be none it raises
-        :class:`NoData`. Of a recording, the next frame. ``timeout`` and errors as for :meth:`next`.
+        With ``max_age_s`` no frame that came longer ago, in seconds, or that was scanned longer ago and waited on its
+        way, as far as clocks tell; as soon as there can be none it raises :class:`NoData`. Of a recording, the next
+        frame. ``timeout`` and errors as for :meth:`next`.
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)

@@ -27,6 +27,7 @@ from contactfpga.wire.command import Command
 from contactfpga.wire.faults import KIND_FAULTS, Faults, SelfTestSlot, decode_slot, is_slot
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe, difference
+from contactfpga.wire.numbered import sheet_of
 from contactfpga.wire.protocol import Frame, OldPacket, PacketError
 from contactfpga.wire.units import KIND_UNITS
 from contactfpga.zones.host_line import HostLine
@@ -68,6 +69,8 @@ class Conversation:
         """The last hello."""
         self.sheet: Sheet | None = None
         """What frames are read with; None until a hello has come, or where it is of another Skin than expected."""
+        self.numbers: set[int] = set()
+        """Of sheets that packets said while no hello had come."""
         self.lines = Lines(expected.mask if expected is not None else ())
         """What the board says of its lines."""
         self.units = UnitLine(self.stats)
@@ -241,6 +244,8 @@ class Conversation:
     def _decode(self, packet: bytes, now: float) -> Event | None:
         if self.hello is None and framing.unreadable(packet):
             self.stats.before_hello += 1
+            if (sheet := sheet_of(packet)) is not None:
+                self.numbers.add(sheet)
             return None
         plain = framing.unseal(packet, self._before())
         kind = framing.kind_of(plain)

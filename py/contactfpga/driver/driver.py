@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import os
 import threading
 from pathlib import Path
 
@@ -13,14 +14,15 @@ from contactfpga.driver.recording import FileTap, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortLost
-from contactfpga.skin import Skin
+from contactfpga.inputs.values import shown
+from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
 
 DEFAULT_BAUD = Skin().baud
 
 
 def open(
-    port: str | SimulatedPort | None = None,
+    port: str | os.PathLike[str] | SimulatedPort | None = None,
     skin: Skin | str | Path | None = None,
     *,
     baud: int | None = None,
@@ -32,11 +34,12 @@ def open(
     ``port``: a device path, ``name:LEFT`` for the board with that name, ``usb:SERIAL`` for the one with that USB
     serial number, ``sim://`` (``?scene=NAME&skin=FILE``), ``replay://FILE`` (``?pace=1``: in its own time, else as
     fast as it is read), a virtual board (:class:`~contactfpga_sim.board.virtual.VirtualBoard`, which is closed with
-    the board), or None for the one supported board that is plugged in; with ``skin``, for the one of that Skin.
+    the board), or None for the one supported board that is plugged in; with ``skin``, for the one of that Skin, and
+    where there are several, for the one with its name.
     ``skin``: the Skin (or its file) the board must be built from; None takes what the board says. ``baud``: bits per
     second; by default that of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
     ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
-    ``timeout`` in seconds, for the hello.
+    ``timeout`` in seconds, for the hello. Paths may be text or :class:`~pathlib.Path`.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
     :class:`SkinMismatch`, :class:`VersionMismatch`.
@@ -46,14 +49,21 @@ def open(
         skin = Skin.load(skin)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
+    elif not isinstance(baud, int) or not limits.MIN_BAUD <= baud <= limits.MAX_CLOCK_HZ // 2:
+        most = limits.MAX_CLOCK_HZ // 2
+        raise ValueError(f"baud is {shown(baud)}; it must be a whole number from {limits.MIN_BAUD} to {most}")
     if isinstance(record, str | Path):
         recording.check(record)
+    elif record is not None and not hasattr(record, "take"):
+        raise TypeError(f"record is {shown(record)}; it must be the name of a file or a Tap")
+    if isinstance(port, os.PathLike):
+        port = os.fspath(port)
     if port is None or (isinstance(port, str) and finding.searched(port)):
         port = finding.find(port, skin, baud)
     transport = connect(port, baud)
     try:
         if record is not None:
-            tap = FileTap(record, transport.name) if isinstance(record, (str, Path)) else record
+            tap = FileTap(record) if isinstance(record, (str, Path)) else record
             transport = RecordingTransport(transport, tap)
         board = Board(transport, skin)
     except BaseException:

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from contactfpga.driver import ports
+from contactfpga.driver import ports, sheets
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.ports import Candidate
 from contactfpga.driver.transport import connect
@@ -52,6 +52,8 @@ def searched(port: object) -> bool:
 
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
     """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
+    if port is not None and (sheet := sheets.split(port)) is not None:
+        return f"{find(sheet[0], None, baud)}#{sheet[1]}"
     found = ports.candidates()
     if port is not None and port.startswith(USB):
         found = _with_number(port.removeprefix(USB), found)
@@ -63,7 +65,7 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
             f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
         )
     heard = survey(found, baud)
-    meant = [one for one in heard if one.hello is not None and _is_meant(one.hello, port, skin)]
+    meant = _meant(heard, port, skin)
     if len(meant) == 1:
         return meant[0].candidate.device
     report = "; ".join(map(str, heard))
@@ -77,20 +79,25 @@ def survey(candidates: Sequence[Candidate], baud: int) -> list[Found]:
     if not candidates:
         return []
     with ThreadPoolExecutor(len(candidates)) as pool:
-        return list(pool.map(lambda one: _heard(one, baud), candidates))
+        heard = pool.map(lambda one: _heard(one, baud), candidates)
+        return [found for at_one_port in heard for found in at_one_port]
 
 
-def _heard(candidate: Candidate, baud: int) -> Found:
+def _heard(candidate: Candidate, baud: int) -> list[Found]:
+    """What is at a port: a board, or each sheet of one that serves several."""
     try:
-        return Found(candidate, listen(candidate.device, baud), "")
+        names = sheets.open_at(candidate.device) or [candidate.device]
+        heard = [one for name in names for one in listen(name, baud).items()]
+        return [Found(dataclasses.replace(candidate, device=name), hello, "") for name, hello in heard]
     except ContactFPGAError as error:
-        return Found(candidate, None, str(error))
+        return [Found(candidate, None, str(error))]
 
 
-def listen(device: str, baud: int, seconds: float | None = None) -> Hello:
-    """The hello that a board says by itself at this port within ``seconds``; nothing is sent."""
+def listen(device: str, baud: int, seconds: float | None = None) -> dict[str, Hello]:
+    """The hellos that a board says by itself at this port within ``seconds``, by the port to open; nothing is sent."""
     seconds = LISTEN_S if seconds is None else seconds
     transport = connect(device, baud)
+    of_sheets = sheets.Greetings(device)
     try:
         conversation = Conversation(device)
         until = time.monotonic() + seconds
@@ -98,13 +105,18 @@ def listen(device: str, baud: int, seconds: float | None = None) -> Hello:
             if conversation.stats.before_hello and seconds < PATIENT_S:  # what may be frames
                 until, seconds = until + PATIENT_S - seconds, PATIENT_S
                 continue
-            for event in conversation.receive_runs(transport.read(left), time.monotonic()):
+            data = transport.read(left)
+            if of_sheets.take(data, time.monotonic()):
+                return of_sheets.heard
+            for event in conversation.receive_runs(data, time.monotonic()):
                 if isinstance(event, Hello):
-                    return event
+                    return {device: event}
                 if isinstance(event, ContactFPGAError):
                     raise event
     finally:
         transport.close()
+    if of_sheets.heard:
+        return of_sheets.heard
     came = conversation.stats.bytes
     if came:
         raise OnlyNoise(f"{came} bytes came, but no hello; is the baud rate the Skin's? Asked for was {baud}")
@@ -115,15 +127,28 @@ def _with_number(number: str, candidates: Iterable[Candidate]) -> list[Candidate
     candidates = list(candidates)
     found = [one for one in candidates if one.serial_number == number]
     if not found:
-        there = ", ".join(visible(one.serial_number) for one in candidates if one.serial_number) or "none"
-        raise PortNotFound(f"no board with USB serial number {visible(number)} is plugged in; there is {there}")
+        there = ", ".join(visible(one.serial_number) for one in candidates if one.serial_number)
+        others = f"; there is {there}" if there else ", nor any other with a serial number"
+        raise PortNotFound(f"no board with USB serial number {visible(number)} is plugged in{others}")
     return found
 
 
-def _is_meant(hello: Hello, port: str | None, skin: Skin | None) -> bool:
-    if port is not None and port.startswith(NAME) and hello.name != port.removeprefix(NAME):
-        return False
-    return skin is None or hello.fingerprint == skin.fingerprint
+def _meant(heard: Sequence[Found], port: str | None, skin: Skin | None) -> list[Found]:
+    """Those that were asked for by name; by Skin; and where its name tells several of these apart, by that."""
+    found = [one for one in heard if one.hello is not None]
+    if port is not None and port.startswith(NAME):
+        found = _named(found, port.removeprefix(NAME))
+        if len(found) == 1:  # of another Skin, too: whoever opens it says so
+            return found
+    if skin is not None:
+        found = [one for one in found if one.hello is not None and one.hello.fingerprint == skin.fingerprint]
+        if len(found) > 1 and skin.name:
+            found = _named(found, skin.name) or found
+    return found
+
+
+def _named(found: Sequence[Found], name: str) -> list[Found]:
+    return [one for one in found if one.hello is not None and one.hello.name == name]
 
 
 def _of(port: str | None, skin: Skin | None) -> str:

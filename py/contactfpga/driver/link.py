@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import weakref
 from collections.abc import Callable
@@ -10,9 +11,10 @@ from typing import Protocol
 
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.silence import Silence
+from contactfpga.driver.timed_out import timed_out
 from contactfpga.driver.told import Told
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
+from contactfpga.errors import BoardClosed, ContactFPGAError, NoSuchCommand, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.hello import Hello
@@ -21,6 +23,9 @@ from contactfpga.zones.zone import Zones
 
 TURN_S = 0.05
 """How often the reader checks whether the board was closed."""
+
+ASK_S = 1.0
+"""How often :meth:`Link.ask` asks."""
 
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
@@ -69,6 +74,7 @@ class Link:
         self.last_s = transport.clock()
         """When it came."""
         self._last_bytes = 0  # that had come by then
+        self._asked_s = -math.inf  # by :meth:`ask`
         self._sending = threading.Lock()
         self._commanding = threading.Lock()
         self._waiters: list[_Waiter] = []
@@ -97,10 +103,20 @@ class Link:
             with self.changed:
                 self._waiters.remove(waiter)
 
+    def ask(self) -> None:
+        """Ask the board, at most once per second; nobody waits for the answer, which says how late frames are."""
+        with self.changed:
+            now = self.transport.clock()
+            if now < self._asked_s + ASK_S:
+                return
+            self._asked_s = now
+            self.conversation.ask(now, now)
+        self._send()
+
     def command(self, command: Command, timeout: float) -> Found:
         """Have the board do something; the first frame scanned after it took the command, or the error that came in
         its place. Raises :class:`NoSuchCommand`."""
-        deadline = self.clock() + timeout
+        deadline, denied = self.clock() + timeout, self._denied()
         if not self._commanding.acquire(timeout=timeout):
             raise ReadTimeout(f"{self.transport.name}: another command was not answered within {timeout:g} s")
         try:
@@ -112,6 +128,11 @@ class Link:
             try:
                 self._send()
                 return self.wait_for(waiter.look, deadline, timeout)
+            except ReadTimeout:
+                if self._denied() == denied:
+                    raise
+                step = "start it with `contactfpga publish --allow-commands` if it shall"
+                raise NoSuchCommand(f"{self.transport.name}: its publisher passes on no commands; {step}") from None
             finally:
                 with self.changed:
                     self._waiters.remove(waiter)
@@ -167,7 +188,7 @@ class Link:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()
                 if left <= 0:
-                    raise self._timed_out(timeout, start)
+                    raise timed_out(self.transport.name, timeout, self.conversation, start, counters_of(self.transport))
                 if self.transport.threaded or self._turning is not None:
                     self.changed.wait(min(left, 1.0) if self.transport.threaded else TURN_S)
                 else:
@@ -195,6 +216,10 @@ class Link:
     def _breaks(self) -> int:
         counters = counters_of(self.transport)
         return 0 if counters is None else counters.passed_breaks
+
+    def _denied(self) -> int:
+        counters = counters_of(self.transport)
+        return 0 if counters is None else counters.denied
 
     def _take(self, data: bytes) -> None:
         for event in self.conversation.receive_runs(data, self.transport.clock()):
@@ -256,23 +281,3 @@ class Link:
                     return
             with contextlib.suppress(ContactFPGAError):  # the next read says so
                 self._send()
-
-    def _timed_out(self, timeout: float, start: int) -> ReadTimeout:
-        stats = self.conversation.stats
-        head = f"{self.transport.name}: no frame within {timeout:g} s"
-        if stats.bytes == start:
-            return BoardSilent(
-                f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
-                f"`contactfpga doctor {self.transport.name}` checks"
-            )
-        seen = f"{stats.bytes - start} bytes came"
-        if not stats.frames and not stats.hellos:
-            damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
-            return OnlyNoise(
-                f"{head}; {seen}, but no valid packet ({damaged}); is the baud rate the Skin's, "
-                "and is this a contactfpga board?"
-            )
-        return ReadTimeout(
-            f"{head}; {seen}, {stats.hellos} hellos and {stats.frames} frames since the port was opened; "
-            "give it a longer timeout, or send less to the board"
-        )

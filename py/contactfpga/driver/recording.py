@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import re
 from pathlib import Path
 from typing import BinaryIO, Protocol
 from urllib.parse import unquote
 
-from contactfpga.driver.mcap_bytes import MAGIC, McapStream
+from contactfpga.driver.mcap_bytes import McapStream
+from contactfpga.driver.mcap_part import MAGIC, files_of
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import number_in
@@ -18,6 +18,9 @@ from contactfpga.inputs.values import number_in
 SCHEME = "replay://"
 _OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
 """Where they begin; a path may have other question marks."""
+_UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
+"""What looks like options that there are not."""
+_KNOWN = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
 class Recorded(Protocol):
@@ -43,9 +46,9 @@ class Tap(Protocol):
 class FileTap:
     """Writes the bytes to a file."""
 
-    def __init__(self, path: str | Path, port: str):
+    def __init__(self, path: str | Path):
         self._path = path
-        self._file = create(path, port)
+        self._file = create(path)
 
     def take(self, data: bytes, clock_s: float) -> None:
         """Append them. Raises :class:`ContactFPGAError`."""
@@ -86,9 +89,7 @@ def parse(name: str) -> ReplayAddress:
     for part in rest[0].split("&") if rest else ():
         key, equals, value = part.partition("=")
         if not equals or key not in ("pace", "start", "link"):
-            raise PortNotFound(
-                f"{name}: {part!r} is no option; there are ?pace=1, ?start=SECONDS and ?link=NAME, with & between"
-            )
+            raise PortNotFound(f"{name}: {part!r} is no option; there are {_KNOWN}")
         if key in found:
             raise PortNotFound(f"{name}: {key} is given twice")
         found[key] = value
@@ -116,14 +117,15 @@ def open_recorded(name: str) -> Recorded:
     """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
     try:
         asked = parse(name)
-        file = open_regular(asked.path)
+        file = open_regular(files_of(asked.path)[0])
         if file.read(len(MAGIC)) == MAGIC:
             file.close()
             return McapStream(asked.path, asked.link, asked.start_s)
         file.seek(0)
     except OSError as error:
         reason = error.strerror or told(error)
-        raise PortNotFound(f"{name} cannot be opened: {reason}; is the path right?") from None
+        hint = f"the options are {_KNOWN}" if _UNKNOWN.search(name) else "is the path right?"
+        raise PortNotFound(f"{name} cannot be opened: {reason}; {hint}") from None
     except ValueError as error:  # a path with a zero byte
         raise PortNotFound(f"{name} cannot be opened: {error}") from None
     if asked.start_s or asked.link is not None:
@@ -135,19 +137,20 @@ def open_recorded(name: str) -> Recorded:
 
 
 def check(path: str | Path) -> None:
-    """Refuse a file that cannot be made, before a board is opened or built for it."""
+    """Refuse a file that cannot be made or holds something, before a board is opened or built for it."""
     place = Path(path)
+    if place.is_file() and place.stat().st_size:
+        raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")
     if place.is_dir():
         raise ContactFPGAError(f"{path} cannot be written: it is a folder; name a file")
     if not place.parent.is_dir():
         raise ContactFPGAError(f"{path} cannot be written: there is no folder {place.parent}")
 
 
-def create(path: str | Path, port: str) -> BinaryIO:
-    """The file that gets every byte from ``port``, empty; never the one that is being replayed."""
+def create(path: str | Path) -> BinaryIO:
+    """A file for every byte from a port; never one that holds something."""
+    check(path)
     try:
-        if port.startswith(SCHEME) and os.path.exists(path) and os.path.samefile(path, parse(port).path):
-            raise ContactFPGAError(f"{path} is what {port} reads; record to another file")
         return open(path, "wb")
     except OSError as error:
         raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None

@@ -11,7 +11,7 @@ from urllib.parse import unquote
 from contactfpga.errors import PortNotFound
 from contactfpga.inputs.values import number_in
 
-OPTIONS = ("scene", "skin", "threshold", "units")
+OPTIONS = ("scene", "skin", "threshold", "units", "sheets")
 _FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER and &units=FILE where wanted"
 _ESCAPES = "a % that is meant is written %25, a & %26"
 
@@ -26,6 +26,8 @@ class SimAddress:
     """Above which a recording's numbers count as pressed."""
     units: str | None = None
     """File of the pressure units that the scene presses on."""
+    sheets: str | None = None
+    """File of several sheets at one FPGA, in place of a Skin; the scene touches each of them."""
 
 
 def parse(name: str) -> SimAddress:
@@ -46,6 +48,8 @@ def parse(name: str) -> SimAddress:
             raise PortNotFound(f"{name}: {key} is empty; {_FORM}")
     if "threshold" in found:
         found["threshold"] = _number(name, found["threshold"])
+    if "sheets" in found and (other := {"skin", "threshold", "units"} & set(found)):
+        raise PortNotFound(f"{name}: with sheets there is no {min(other)}; their Skins are in the file of the sheets")
     return SimAddress(**found)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
+from collections.abc import Iterable
 
 from contactfpga.net.message import Counters
 
@@ -61,3 +62,17 @@ class Stats:
         """Everything in plain Python values, ready for JSON."""
         net = None if self.net is None else dataclasses.asdict(self.net)
         return {**vars(self), "damaged": dict(self.damaged), "net": net}
+
+
+def total(every: Iterable[Stats]) -> Stats:
+    """All of them added up."""
+    found = Stats()
+    for one in every:
+        for field in dataclasses.fields(Stats):
+            if field.name != "net":
+                setattr(found, field.name, getattr(found, field.name) + getattr(one, field.name))
+        if one.net is not None:
+            before = found.net or Counters()
+            names = [field.name for field in dataclasses.fields(Counters)]
+            found.net = Counters(**{name: getattr(before, name) + getattr(one.net, name) for name in names})
+    return found

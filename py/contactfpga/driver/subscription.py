@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Iterator
 from typing import Generic, TypeVar, cast
 
@@ -160,6 +161,7 @@ class Subscription(Listening[Zones]):
 
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds; see :meth:`Board.batch`."""
+        max_s = checked_span(max_s)
         link, until = self._link, self._link.clock() + max_s
         self._wait(timeout)
         if link.transport.live:  # of a recording, what was read at once
@@ -172,17 +174,24 @@ class Subscription(Listening[Zones]):
     # ---- for the board
 
     def newest(self, max_age_s: float, timeout: float) -> Zones:
-        """The next frame, none that came longer ago than this; raises :class:`NoData` as soon as there can be none."""
+        """The next frame, none that came or was scanned longer ago than this; raises :class:`NoData` as soon as there
+        can be none."""
         if not self._link.transport.live:
             return self.next(timeout)
         with self._link.changed:
             self._frames.drop_older(self._link.transport.clock() - max_age_s)
         now, silent_at = self._link.clock(), self._link.last_s + max_age_s
         try:
-            return frame_of(self._link.wait_for(self._pop, min(now + timeout, silent_at), timeout))
+            zones = frame_of(self._link.wait_for(self._pop, min(now + timeout, silent_at), timeout))
         except ReadTimeout:
             if now + timeout < silent_at:
                 raise
+        else:
+            if (age_s := self._link.clock() - latest_scan_s(zones)) <= max_age_s:
+                return zones
+            self._link.ask()  # the answer shows it if it is the clock that was wrong
+            late = f"{self._link.transport.name}: frame {zones.sequence} waited on its way, {age_s:.3g} s or more"
+            raise NoData(f"{late} (allowed are {max_age_s:g} s)", self._silence())
         silence = self._silence()
         raise NoData(f"{silence} (allowed are {max_age_s:g} s)", silence)
 
@@ -208,6 +217,12 @@ class Subscription(Listening[Zones]):
                 raise error
 
 
+def latest_scan_s(zones: Zones) -> float:
+    """When a frame of a board was scanned at the latest, on the port's clock."""
+    at_s, sigma_s = zones.host_time_s, zones.host_sigma_s
+    return math.inf if at_s is None or sigma_s is None else at_s + 2 * sigma_s
+
+
 def frame_of(found: object) -> Zones:
     """The frame that was waited for; raises the error that came in its place."""
     found = checked_item(found)
@@ -227,3 +242,10 @@ def checked(timeout: float) -> float:
     if not is_finite(timeout) or timeout <= 0:
         raise ValueError(f"timeout is {timeout!r}; it must be a positive number of seconds")
     return float(timeout)
+
+
+def checked_span(max_s: float) -> float:
+    """The seconds of a batch as a float; raises ValueError unless they are finite and not below 0."""
+    if not is_finite(max_s) or max_s < 0:
+        raise ValueError(f"max_s is {max_s!r}; it must be a number of seconds, 0 or more")
+    return float(max_s)

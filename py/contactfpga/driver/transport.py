@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import shlex
 import time
 from typing import Protocol
 
 from contactfpga.circuit import Circuit, load_checked
 from contactfpga.cover import Cover, load_cover
-from contactfpga.driver import recording, sim_address
+from contactfpga.driver import recording, sheets, sim_address
 from contactfpga.driver.replay import ReplayTransport
 from contactfpga.errors import MissingExtra, PortLost, PortNotFound
+from contactfpga.inputs.values import shown
 from contactfpga.net.address import SCHEME
 from contactfpga.net.message import Counters
 from contactfpga.net.port import ZenohPort
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 CHUNK = 65_536
 """Most bytes one read returns."""
@@ -72,6 +76,8 @@ class SerialTransport:
         try:
             self._port.open()
         except self._errors as error:
+            if "locked" in str(error):
+                raise PortNotFound(f"{name} is in use: another program reads this port; close it first") from None
             raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
 
     def read(self, timeout_s: float) -> bytes:
@@ -174,14 +180,34 @@ def counters_of(transport: Transport) -> Counters | None:
 def connect(name: str | SimulatedPort, baud: int) -> Transport:
     """Open the transport that ``name`` asks for, or that a virtual board is."""
     if not isinstance(name, str):
+        if not hasattr(name, "read"):
+            raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
         return SimTransport("the virtual board", name)
+    if (sheet := sheets.split(name)) is not None:
+        return sheets.share(*sheet, baud, connect)
     if name.startswith("sim:"):
         return SimTransport.named(name)
     if name.startswith("replay:"):
         return ReplayTransport(name)
     if name.startswith(SCHEME):
         return ZenohPort(name)
+    if (reason := _no_port(name)) is not None:
+        raise PortNotFound(reason)
     return SerialTransport(name, baud)
+
+
+def _no_port(name: str) -> str | None:
+    """What to say of a name that can be no serial port; None: it may be one."""
+    if not name:
+        return "the port has no name; leave it out to take the board that is plugged in"
+    scheme, colon, _ = name.partition("://")
+    if colon:
+        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE and zenoh://KEY"
+    if not os.path.isfile(name):
+        return None
+    if name.endswith(".toml"):
+        return f"{name} is a file; for the boards of a robot there is: contactfpga body {shlex.quote(name)}"
+    return f"{name} is a file; to play a recording name {shlex.quote(f'replay://{name}')} as the port"
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
@@ -189,11 +215,12 @@ def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
     ``skin``: where it names no file."""
     asked = sim_address.parse(name)
     cover, circuit = None, None
+    several = Several.load(asked.sheets) if asked.sheets is not None else None
     if asked.skin is not None:
         skin = Skin.load(asked.skin)
         cover, circuit = load_cover(asked.skin), load_checked(asked.skin, skin)
     try:
-        return _virtual_board(asked, skin, cover, circuit)
+        return _virtual_board(asked, skin, cover, circuit) if several is None else _virtual_sheets(asked, several)
     except ModuleNotFoundError as error:
         raise MissingExtra(f"sim:// ({error})", "sim") from None
     except ValueError as error:  # a scene that is not known, or that does not fit the sheet
@@ -214,6 +241,12 @@ def _virtual_board(
     return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
 
 
+def _virtual_sheets(asked: sim_address.SimAddress, several: Several) -> SimulatedPort:
+    from contactfpga_sim.board import virtual
+
+    return virtual.sheets_for(several, asked.scene)
+
+
 def _reason(error: Exception) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
 
@@ -222,7 +255,5 @@ def _next_step(error: Exception, name: str) -> str:
     if isinstance(error, PermissionError):
         return "add yourself to the group that owns it (often `dialout`), or see `contactfpga doctor`"
     if isinstance(error, FileNotFoundError):
-        return "is the board plugged in? `contactfpga doctor` lists the ports"
-    if "locked" in str(error):
-        return "another program reads this port; close it first"
-    return f"`contactfpga doctor {name}` may say why"
+        return "is the board plugged in? `contactfpga doctor --list` lists the ports"
+    return f"`contactfpga doctor {shlex.quote(name)}` may say why"

@@ -4,6 +4,7 @@ SI units, in the link's frame. A wrench is what contacts exert on the link; norm
 below 0.
 """
 
+from contactfpga.haptics.alone import AloneWatch
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.calibrate import Calibration, calibrate
 from contactfpga.haptics.closings import ClosingWatch
@@ -20,6 +21,7 @@ from contactfpga.haptics.units import LoadCells
 from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
 
 __all__ = [
+    "AloneWatch",
     "Bumper",
     "Calibration",
     "Center",

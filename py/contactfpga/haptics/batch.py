@@ -10,7 +10,8 @@ from contactfpga.haptics.wrench import Noise
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:
-    """(m, 3): centers of pressure of (m, 6) wrenches; NaN where a wrench does not push."""
+    """Centers of pressure (m, 3) in m, in the link's frame, of (m, 6) wrenches in N and Nm. A wrench that does not push
+    has NaN."""
     fx, fy, fz, mx, my, mz = np.asarray(wrenches, float).T
     with np.errstate(invalid="ignore", divide="ignore"):
         if isinstance(surface, Plane):
@@ -32,7 +33,7 @@ def _on_cylinder(surface: Cylinder, fx: Floats, fy: Floats, fz: Floats, mx: Floa
 
 
 def one(wrenches: Floats, points: Floats, noise: Noise | None = None) -> Floats:
-    """(m, 3): forces at one known point (m, 3) of each of (m, 6) wrenches."""
+    """Forces (m, 3) in N, one contact for each of (m, 6) wrenches, at known points (m, 3) in m."""
     wrenches, points = np.asarray(wrenches, float), np.asarray(points, float)
     if noise is None:
         return wrenches[:, :3].copy()

@@ -28,8 +28,6 @@ class Calibration:
     """What was never loaded, in words."""
     residual_n: float
     """Root mean square of what the loads' forces are off by, after calibration."""
-    before_n: float
-    """The same by the matrix before it."""
     advice: str
     """What to do next."""
 
@@ -67,7 +65,7 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
     rank, open_ones = rank_of(known, length)
     missing = tuple(" with ".join(_named(one)) for one in reduced(open_ones))
     off = _rms(after)
-    return Calibration(cells.changed(zeros, matrix), rank, missing, off, _rms(rest), _advice(cells, rank, missing, off))
+    return Calibration(cells.changed(zeros, matrix), rank, missing, off, _advice(cells, rank, missing, off))
 
 
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:

@@ -48,7 +48,7 @@ class ClosingWatch:
 
     @property
     def closings(self) -> list[Closing]:
-        """The same with the push at which each closed."""
+        """The closed switches, each with the push in N at which it closed."""
         return [Closing(*cell, push) for cell, push in sorted(self._pushes.items())]
 
     def take(self, zones: Zones) -> None:
@@ -81,7 +81,7 @@ class ClosingWatch:
         self.complete = len(self._pushes) == after.pressed
 
     def _changed(self, before: Zones, after: Zones) -> tuple[list[Cell], list[Cell]]:
-        """New and gone cells by exact sums."""
+        """Cells that closed and cells that opened, from exact sums."""
         count = after.pressed - before.pressed
         if count == 0:
             return [], []
@@ -115,7 +115,7 @@ class ClosingWatch:
         return sorted(around - self._pushes.keys())
 
     def _at(self, before: Zones, after: Zones, row: int) -> float | None:
-        """The push as the row was scanned, between the two frames: rows come one after the other."""
+        """The push in N when the row was scanned: rows are scanned one after the other, from one frame to the next."""
         if self.push_n is None:
             return None
         if self._push_before is None:

@@ -34,7 +34,8 @@ def frame(normal: Vector) -> Floats:
 
 
 def intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
-    """Of each push, over all forces in the cones that exert the same wrench as ``forces``, which lie in them."""
+    """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
+    ``forces``, which lie in them. None: no largest one."""
     basis, firsts = _basis(system.touches, frictionless)
     _, values, turned = np.linalg.svd(system.centered(system.matrix() @ basis))
     free = turned[int((values > 1e-9 * values[0]).sum()) :].T
@@ -54,7 +55,7 @@ def intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> l
 
 
 def nearest(system: System) -> Floats:
-    """(3k,): the forces in the cones whose wrench is nearest; of equal ones the smallest."""
+    """The forces (3k,) in N in the cones that exert the nearest wrench; if several do, the smallest of them."""
     basis, firsts = _basis(system.touches, False)
     matrix = system.root @ system.matrix() @ basis
     square = matrix.T @ matrix

@@ -95,7 +95,7 @@ class Contact:
 
     @property
     def point_m(self) -> Vector:
-        """In the link's frame."""
+        """Where it touches, in m in the link's frame."""
         return self.touch.point_m
 
     @property
@@ -105,7 +105,7 @@ class Contact:
 
     @property
     def covariance_m2(self) -> Floats:
-        """(3, 3) of the point: as far as it may be off along the surface."""
+        """Covariance (3, 3) of the point in m2, along the surface only."""
         normal = np.array(self.touch.normal)
         return np.asarray(self.touch.point_sigma_m**2 * (np.eye(3) - np.outer(normal, normal)))
 
@@ -160,7 +160,7 @@ class Solution:
 
     @property
     def residual(self) -> tuple[float, float, float, float, float, float]:
-        """The wrench without what the forces exert."""
+        """What is left of the wrench if the one that the forces exert is subtracted."""
         (fx, fy, fz), (mx, my, mz) = self.wrench.force_n, self.wrench.moment_nm
         for touch, (px, py, pz) in zip(self.touches, self.forces_n):
             x, y, z = touch.point_m
@@ -224,7 +224,7 @@ class Contacts(Sequence[Contact]):
 
     @property
     def unexplained(self) -> Wrench | None:
-        """What only the units see, where :attr:`alarm` says that there is something: the rest of the wrench."""
+        """The rest of the wrench, which only the units see; None unless :attr:`alarm` is set."""
         if not self.alarm:
             return None
         rest = self._solution.residual

@@ -1,4 +1,4 @@
-"""Zeros that wander: watched while nothing touches."""
+"""How far the units' zeros have drifted, watched while nothing touches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contactfpga.haptics.units import LoadCells
 
 @dataclasses.dataclass(frozen=True)
 class Drift:
-    """How far zeros have wandered."""
+    """How far zeros have drifted."""
 
     deviations_n: Floats
     """(n,): of each unit from its zero, averaged."""

@@ -71,8 +71,8 @@ class Known:
         return chance, misfit
 
     def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
-        """Force that closes the switch from each place, and its standard deviation; within a step of the grid it
-        varies, too."""
+        """The force in N that closes the switch from each place, and its standard deviation, which includes how much
+        the force varies within a step of the grid."""
         row, column = cell
         distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
         needed = self.reach.closing_n(distance)

@@ -27,7 +27,8 @@ def _unit(radius_m: float, degrees: float, z_m: float, tilt: float, sign: float)
 
 
 def hexapod(radius_m: float, tilt: float, z_m: float = 0.0) -> LoadCells:
-    """Six units on a ring about z, every 60 degrees, tilted by ``tilt`` rad from the ring to z, to alternate sides."""
+    """Six units on a ring about z, one every 60 degrees. Each is tilted by ``tilt`` rad from the ring toward z,
+    in turn to one side and to the other."""
     return LoadCells([_unit(radius_m, 60 * i, z_m, tilt, (-1) ** i) for i in range(6)])
 
 
@@ -46,7 +47,7 @@ TILTS = tuple(range(30, 80, 5))
 
 
 def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[Layout]:
-    """What may stand on rings of this radius within a cylinder that is touched from ``low_m`` to ``high_m``."""
+    """Arrangements on rings of this radius, in m, in a cylinder that is touched from z = ``low_m`` to ``high_m``."""
     middle, quarter = (low_m + high_m) / 2, (high_m - low_m) / 4
     found = []
     for degrees in TILTS:
@@ -64,6 +65,6 @@ def on_cylinder(radius_m: float, low_m: float, high_m: float) -> list[Layout]:
 
 
 def on_plane(radius_m: float, height_m: float) -> list[Layout]:
-    """What may stand on a ring of this radius under a flat bumper whose outside is at ``height_m``."""
+    """Arrangements on a ring of this radius, in m, under a flat bumper whose outside is at z = ``height_m``."""
     tilts = [Layout(f"hexapod, {degrees} degrees", hexapod(radius_m, math.radians(degrees))) for degrees in TILTS]
     return [Layout("3 on a plane", tripod(radius_m)), *tilts]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from contactfpga.errors import ReadTimeout, ReplayEnded
+from contactfpga.haptics.alone import AloneWatch
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.contact import Contacts
 from contactfpga.haptics.solve import contacts
@@ -26,6 +27,7 @@ def felt(
     *,
     motion: Motion | None = None,
     tracks: Tracks | None = None,
+    alone: AloneWatch | None = None,
 ) -> Contacts | None:
     """The force at each zone of a frame, from the units' readings at its moment; None where these are not known (yet).
 
@@ -36,7 +38,7 @@ def felt(
     if zones.units is None:
         return None
     wrench = cells.wrench(zones.units.readings, motion)
-    return contacts(wrench, zones, cells.surface, friction, sheet_m=cells.sheet_m, tracks=tracks)
+    return contacts(wrench, zones, cells.surface, friction, sheet_m=cells.sheet_m, tracks=tracks, alone=alone)
 
 
 class Source(Protocol):

@@ -112,7 +112,7 @@ class Locator:
         closings: Sequence[Closing] = (),
         center: Place | None = None,
     ) -> Place:
-        """By all that is known of one contact.
+        """The place of one contact from everything that is known of it; takes some 10 ms.
 
         Args:
             cells: (row, column) of each pressed switch of its zone; the others around it are open.
@@ -138,7 +138,8 @@ class Locator:
         return _place(found, bool(closings), center is not None)
 
     def _box(self, cells: Sequence[tuple[int, int]], force_n: float, center: Place | None) -> Box:
-        """All places from which these cells can be pressed; a threshold may be spread, a force be off."""
+        """A box around all places from which these cells can be pressed, with room for the spread of thresholds and the
+        noise of the force."""
         far = 1.2 * self._reach.reach_m(1.5 * force_n + 5 * self._sigma) + max(self._pitch_x, self._pitch_y)
         rows, columns = zip(*cells)
         left, right = self._pitch_x * max(columns) - far, self._pitch_x * min(columns) + far

@@ -22,7 +22,7 @@ SMALL = 1e-6
 
 
 def pushes(system: System) -> Solution:
-    """Pushes along the normals alone: no friction, or units that do not see it."""
+    """Only pushes along the normals, for contacts without friction and for units that do not see it."""
     found = _along_normals(system)
     if system.places_widen(np.ravel(found)):
         found = _along_normals(system)
@@ -30,7 +30,7 @@ def pushes(system: System) -> Solution:
 
 
 def many(system: System) -> Solution:
-    """Pushes along the normals if they suffice to exert the wrench, else forces within friction's cones."""
+    """Pushes along the normals if these exert the wrench to within its noise, else forces within friction's cones."""
     forces = _along_normals(system)
     if system.places_widen(np.ravel(forces)):
         forces = _along_normals(system)
@@ -40,7 +40,8 @@ def many(system: System) -> Solution:
 
 
 def within_cones(system: System) -> Solution:
-    """The forces within friction's cones that come nearest to the wrench; needs Clarabel."""
+    """The forces within friction's cones that come nearest to the wrench. Raises
+    :class:`~contactfpga.MissingExtra` without Clarabel."""
     forces = cones.nearest(system)
     if system.places_widen(forces):
         forces = cones.nearest(system)

@@ -27,7 +27,7 @@ Box = tuple[float, float, float, float]
 
 @dataclasses.dataclass(frozen=True)
 class Posterior:
-    """Middle and spread of a probability."""
+    """Mean and spread of a probability over places."""
 
     x_m: float
     y_m: float
@@ -39,7 +39,7 @@ class Posterior:
 
 
 def of(evidence: Evidence, box: Box) -> Posterior:
-    """The probability that the evidence gives to the places in the box."""
+    """Mean and spread of the place, from the evidence at the points of a grid over the box; takes at most 12 grids."""
     for level in range(LEVELS):
         x, y, steps = _grid(box)
         chance, misfit = evidence(x, y, max(steps))

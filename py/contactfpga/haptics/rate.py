@@ -1,6 +1,6 @@
-"""How good an arrangement of units is for a link: judged by the contacts it has to find.
+"""How good an arrangement of units is for a link, judged by the contacts it has to find.
 
-A condition number would hang on the origin and the unit of length.
+Not by the matrix's condition number, which depends on the origin and on the unit of length.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Task:
             positive("depth", second, "m")
 
     def places(self) -> list[tuple[Vector, Vector]]:
-        """Points and normals that are tried."""
+        """Points in m, and unit normals, at which contacts are tried."""
         first, second = self.size_m
         if isinstance(self.surface, Cylinder):
             round_m = 2 * math.pi * self.surface.radius_m
@@ -93,7 +93,7 @@ class Task:
 
 @dataclasses.dataclass(frozen=True)
 class Rating:
-    """What an arrangement comes to; worst over all places unless said otherwise."""
+    """Figures of an arrangement, each for the worst place unless it says otherwise."""
 
     layout: Layout
     bears_n: float

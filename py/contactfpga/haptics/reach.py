@@ -17,7 +17,8 @@ LARGEST_N = 1e4
 
 
 class Reach:
-    """The force that closes a switch at a distance, and back; grows with the distance.
+    """The force that closes a switch at a distance, and the distance at which a force still does. Both are tables
+    (:mod:`contactfpga.cover` computes them), within 0.01 % of the force.
 
     Args:
         cover: foam, switch and, for a patch, what touches.
@@ -52,7 +53,7 @@ class Reach:
         return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
 
     def reach_m(self, force_n: float) -> float:
-        """How far the force closes switches; 0 where it does not even close the one below it."""
+        """How far in m the force closes switches; 0 if it does not even close the one below it."""
         return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
 
 

@@ -19,7 +19,7 @@ FINENESS = 256
 
 @dataclasses.dataclass(frozen=True)
 class Static:
-    """Errors over all places, in the unit of the pitch; a contact that closes no switch does not count."""
+    """Errors over all places at which a contact closes a switch, in pitches."""
 
     barycenter_rms: float
     barycenter_95: float
@@ -32,7 +32,7 @@ class Static:
 
 @functools.lru_cache(maxsize=256)
 def static(reach: float, pitch_x: float = 1.0, pitch_y: float = 1.0, fineness: int = FINENESS) -> Static:
-    """Errors at a reach, in the unit of reach and pitches."""
+    """Errors at a reach, in the unit in which reach and pitches are given."""
     places = (np.arange(fineness) + 0.5) / fineness - 0.5
     x, y = (axis.ravel() for axis in np.meshgrid(places * pitch_x, places * pitch_y))
     columns, rows = (int(np.ceil(reach / pitch + 0.5)) for pitch in (pitch_x, pitch_y))
@@ -75,7 +75,7 @@ def _rms(errors: Floats) -> float:
 
 @functools.lru_cache(maxsize=64)
 def worst_95(pitch_x: float, pitch_y: float) -> float:
-    """What 95 % of a barycenter's errors stay below at whatever reach."""
+    """A bound in the unit of the pitches: at every reach 95 % of a barycenter's errors stay below it."""
     pitch = max(pitch_x, pitch_y)
     found = [static(pitch * share, pitch_x, pitch_y, 64).barycenter_95 for share in (0.5, 0.6, 0.7, 0.71, 0.8, 1.0)]
     return float(np.nanmax(found))

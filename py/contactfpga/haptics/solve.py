@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from contactfpga.haptics import few, many
+from contactfpga.haptics.alone import AloneWatch
 from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.contact import FULL_WRENCH, Contacts, Seen, Solution, Touch
 from contactfpga.haptics.surface import Surface
@@ -25,6 +26,7 @@ def contacts(
     sheet_m: tuple[float, float] = (0.0, 0.0),
     link: str = "",
     tracks: Tracks | None = None,
+    alone: AloneWatch | None = None,
 ) -> Contacts:
     """The force at each zone, or at each place in a list of :class:`Touch`.
 
@@ -40,9 +42,11 @@ def contacts(
         sheet_m: where column 0 and row 0 lie on the surface laid flat.
         link: name of the link; by default that of the wrench's frame.
         tracks: of the same zones, for :attr:`Contact.track`.
+        alone: knows places of contacts from the time when they were alone; it has taken this frame.
     """
     if isinstance(zones, Zones):
         touches: Sequence[Touch] = touched(zones, surface, friction, sheet_m)
+        touches = touches if alone is None else alone.sharpened(zones, touches)
         seen = Seen(link, zones.time_us, () if tracks is None else _tracked(zones, tracks))
     else:
         touches, seen = zones, Seen(link)

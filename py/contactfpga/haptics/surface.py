@@ -59,7 +59,7 @@ class Plane:
         return Center((x, y, h), (0.0, 0.0, 1.0), -fz, math.hypot(fx, fy), torsion, wrench.force_n, (x, y), spread)
 
     def slopes(self, fz: float, x_m: float, y_m: float) -> Floats:
-        """(2, 6): how the center of pressure changes with the wrench."""
+        """Derivative (2, 6) of the center of pressure, in m per N and per Nm of the wrench."""
         h = self.height_m
         return np.array([[h, 0, -x_m, 0, -1, 0], [0, h, -y_m, 1, 0, 0]]) / fz
 
@@ -104,7 +104,7 @@ class Cylinder:
         return Center(point, normal, -push, sideways, torsion, wrench.force_n, (radius * angle, z), spread)
 
     def slopes(self, wrench: Wrench, push: float, normal: Vector, z: float) -> Floats:
-        """(2, 6): how arc length and z change with the wrench."""
+        """Derivative (2, 6) of arc length and z, in m per N and per Nm of the wrench."""
         (fx, fy, _), (mx, my, mz) = wrench.force_n, wrench.moment_nm
         radius, square = self.radius_m, fx * fx + fy * fy
         across = mz / radius

@@ -47,11 +47,11 @@ class System:
 
     @functools.cached_property
     def root(self) -> Floats:
-        """Its transpose times itself is the weight."""
+        """Root of the weight: its transpose times the root is the weight."""
         return np.sqrt(self.weight) if self.noise is None else self.noise.root
 
     def matrix(self) -> Floats:
-        """(6, 3k): from forces to wrench."""
+        """The matrix (6, 3k) from k forces in N to the wrench in N and Nm."""
         rows: list[list[float]] = [[], [], [], [], [], []]
         for x, y, z in self.points:
             rows[0] += (1.0, 0.0, 0.0)
@@ -63,7 +63,7 @@ class System:
         return np.array(rows)
 
     def pushes(self) -> Floats:
-        """(6, k): from pushes along the normals to wrench."""
+        """The matrix (6, k) from k pushes in N along the normals to the wrench in N and Nm."""
         columns = []
         for (x, y, z), touch in zip(self.points, self.touches):
             nx, ny, nz = touch.normal
@@ -103,11 +103,11 @@ class System:
         return True
 
     def chi2(self, rest: Floats) -> float | None:
-        """Of a residual; None without noise."""
+        """Chi-square of a residual (6,); None without noise."""
         return None if self.noise is None else float(rest @ self.weight @ rest)
 
     def freedom(self, rank: int) -> int:
-        """Components of the wrench that forces of this rank leave over."""
+        """How many components of the wrench are left to check forces of this rank."""
         return max(0, (6 if self.noise is None else self.noise.rank) - rank)
 
 

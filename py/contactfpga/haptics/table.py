@@ -25,7 +25,7 @@ BUMPER_KEYS = ("mass_kg", "center_m", "inertia_kg_m2")
 
 
 def load(path: str | Path) -> dict[str, Any]:
-    """What :class:`LoadCells` is made of, from a file. Raises :class:`HapticsError`, OSError."""
+    """The arguments of :class:`LoadCells`, from a units.toml. Raises :class:`HapticsError`, OSError."""
     values = tomlfile.load(path, HapticsError)
     try:
         return read(values)
@@ -34,7 +34,7 @@ def load(path: str | Path) -> dict[str, Any]:
 
 
 def read(values: dict[str, Any]) -> dict[str, Any]:
-    """The same from tables."""
+    """The same, from the tables of such a file."""
     _known(values, KEYS, "the file")
     given = values.get("unit")
     if not isinstance(given, list) or not given:

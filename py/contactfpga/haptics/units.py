@@ -121,7 +121,7 @@ class LoadCells:
 
     @functools.cached_property
     def singular_values(self) -> Floats:
-        """Of the (6, n) matrix in N and Nm, largest first."""
+        """Singular values of the (6, n) matrix in N and Nm, largest first."""
         return np.asarray(np.linalg.svd(self.geometry, compute_uv=False), float)
 
     @functools.cached_property
@@ -143,8 +143,8 @@ class LoadCells:
 
     @property
     def unseen(self) -> Floats:
-        """(6 - rank, 6): sums of a wrench's components, about the link's origin, that no unit reads: each row's inner
-        product with the wrench. As a motion the row is one that no unit resists."""
+        """What no unit reads, (6 - rank, 6): the inner product of each row with a wrench about the link's origin. Read
+        as a motion, a row is one that no unit resists."""
         vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] /= length
@@ -158,7 +158,7 @@ class LoadCells:
         return [_in_words(one) for one in reduced(self.unseen)]
 
     def noise_at(self, point_m: Vector) -> Floats:
-        """(3,): standard deviations in N of the force of a single contact at a known point."""
+        """Standard deviations (3,) in N of the force of a single contact at a known point, along x, y and z."""
         if self.rank < 6:
             raise HapticsError(f"the units see {self.rank} of 6 components; not all of a force is known at any point")
         exerts = np.concatenate([np.eye(3), turning(point_m)])
@@ -197,7 +197,7 @@ class LoadCells:
         return self.changed(read.mean(axis=0), self.matrix if self.calibrated else None, gravity_m_s2)
 
     def changed(self, zeros: Floats, matrix: Floats | None, gravity_m_s2: Vector | None = None) -> LoadCells:
-        """The same with other zeros, and with this calibration; None: none."""
+        """Units with these zeros (n,) in steps and this matrix, (6, n) in N and Nm per step; None: not calibrated."""
         return LoadCells(
             [dataclasses.replace(unit, zero=float(zero)) for unit, zero in zip(self.units, zeros)],
             frame=self.frame,

@@ -27,13 +27,13 @@ def minus(vector: Vector) -> Vector:
 
 
 def turning(point: Sequence[float]) -> Floats:
-    """(3, 3): from a force at the point to its moment."""
+    """The matrix (3, 3) from a force in N at the point in m to its moment in Nm about the origin."""
     x, y, z = point
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def solve_symmetric(matrix: Sequence[Sequence[float]], wanted: Vector) -> Vector:
-    """x of ``matrix`` x = ``wanted``; the (3, 3) matrix is symmetric and positive definite."""
+    """The x with ``matrix`` x = ``wanted``. The (3, 3) matrix must be symmetric and positive definite."""
     (a, b, c), (_, d, e), (_, _, f) = matrix
     low = b / a
     lower = c / a

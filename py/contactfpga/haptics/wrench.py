@@ -69,7 +69,7 @@ class Noise:
         return np.asarray((vectors[:, seen] / np.sqrt(values[seen])).T * over)
 
     def widened(self, moments: Floats) -> Noise:
-        """With (3, 3) added to the covariance of the moments, where the units see these at all."""
+        """The same noise with ``moments``, (3, 3) in N2m2, added to the covariance of the moments that units see."""
         more = np.zeros((6, 6))
         more[3:, 3:] = moments
         if self.rank < 6:
@@ -109,13 +109,13 @@ class Wrench:
 
     @property
     def array(self) -> Floats:
-        """(6,): force and moment."""
+        """Force in N and moment in Nm, (6,)."""
         return np.array((*self.force_n, *self.moment_nm))
 
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """How the link moves, in its own frame: what it takes to carry the bumper along."""
+    """How the link moves, in its own frame, for the force that carries the bumper along."""
 
     gravity_m_s2: Vector = (0.0, 0.0, -9.80665)
     """Which way things fall, in the link's frame."""
@@ -138,7 +138,7 @@ class Bumper:
     """About its center of mass."""
 
     def wrench(self, motion: Motion) -> Floats:
-        """(6,): what the units must exert on the bumper so that it moves along with the link."""
+        """The wrench (6,) in N and Nm that the units must exert on the bumper to move it with the link."""
         center, inertia = np.array(self.center_m), np.array(self.inertia_kg_m2)
         spin, more = np.array(motion.turning_rad_s), np.array(motion.turning_rad_s2)
         felt = np.array(motion.acceleration_m_s2) - np.array(motion.gravity_m_s2)

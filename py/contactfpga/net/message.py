@@ -6,7 +6,8 @@ import dataclasses
 import struct
 
 _HEAD = struct.Struct("<4sQQQqI")
-_MAGIC = b"cfp1"
+_NAME, VERSION = b"cfp", b"1"
+_MAGIC = _NAME + VERSION
 HEAD_BYTES = _HEAD.size
 
 MOST_BYTES = 1 << 16
@@ -60,13 +61,13 @@ class Counters:
     lost_bytes: int = 0
     """Bytes of the board in them."""
     refused: int = 0
-    """Messages that are none of a publisher, came twice, or too late."""
+    """Messages that are none of a publisher, came twice or too late, or are of a second publisher of the key."""
     publishers: int = 0
     """Publishers that were heard: 1, and one more for each restart."""
     breaks: int = 0
     """Holes after which times are not known before the next hello."""
     passed_breaks: int = 0
-    """Those of them that were read up to now."""
+    """Those of them that were read, or left out, up to now."""
     left_out: int = 0
     """Bytes that this program did not take in time."""
     denied: int = 0
@@ -77,22 +78,28 @@ class Stream:
     """Puts the bytes of messages together again, with a delimiter in each hole, so that no packet is made of two."""
 
     def __init__(self, counters: Counters):
+        self.alive: set[int] = set()
+        """Publishers that are known to run: as long as one does, no other follows it."""
+        self.other_version = False
+        """Messages of another version came, and none of this one."""
         self._counters = counters
         self._last: Message | None = None
 
     def take(self, payload: bytes) -> tuple[bytes, bool]:
         """The bytes that a message adds, and whether they come after a break."""
         message, counters, last = Message.decode(payload), self._counters, self._last
-        if message is None or (last is not None and not _follows(message, last)):
+        if message is None or (last is not None and not self._follows(message, last)):
             counters.refused += 1
+            self.other_version |= last is None and payload.startswith(_NAME) and not payload.startswith(_MAGIC)
             return b"", False
+        self.other_version = False
         counters.messages += 1
         counters.denied = message.denied
         self._last = message
         if last is None or message.publisher != last.publisher:
             counters.publishers += 1
             counters.breaks += last is not None
-            return b"\0" + message.data, last is not None
+            return (b"\0" if last is not None else b"") + message.data, last is not None
         missing = message.sequence - last.sequence - 1
         hole = message.offset - last.offset - len(last.data)
         counters.lost_messages += missing
@@ -101,9 +108,8 @@ class Stream:
         counters.breaks += broken
         return (b"\0" if hole or broken else b"") + message.data, broken
 
-
-def _follows(message: Message, last: Message) -> bool:
-    """Whether a message may come after that one."""
-    if message.publisher != last.publisher:
-        return True
-    return message.sequence > last.sequence and message.offset >= last.offset + len(last.data)
+    def _follows(self, message: Message, last: Message) -> bool:
+        """Whether a message may come after that one."""
+        if message.publisher != last.publisher:
+            return last.publisher not in self.alive
+        return message.sequence > last.sequence and message.offset >= last.offset + len(last.data)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import collections
+import contextlib
+import re
 import threading
 import time
 from typing import TYPE_CHECKING
 
-from contactfpga.errors import ContactFPGAError, PortLost, PortNotFound
+from contactfpga.errors import ContactFPGAError, PortLost, PortNotFound, VersionMismatch
 from contactfpga.net import session
 from contactfpga.net.address import parse
-from contactfpga.net.message import Counters, Stream
+from contactfpga.net.message import VERSION, Counters, Stream
 
 if TYPE_CHECKING:
     import zenoh
@@ -33,9 +35,9 @@ class ZenohPort:
         self._changed = threading.Condition()
         self._pieces: collections.deque[tuple[bytes, bool]] = collections.deque()
         self._waiting = 0
-        self._alive: set[str] = set()
         self._gone_s: float | None = None  # since when nobody publishes
         self._stream = Stream(self.counters)
+        self._asks: zenoh.Publisher | None = None
         try:
             self._session = session.connected(address.connect, address.config)
         except ContactFPGAError as error:
@@ -53,8 +55,11 @@ class ZenohPort:
 
     def _find(self) -> None:
         with self._changed:
-            if not self._changed.wait_for(lambda: self._alive, FOUND_S):
-                raise PortNotFound(f"{self.name}: nobody publishes it; is `contactfpga publish` running with this key?")
+            if not self._changed.wait_for(lambda: self._stream.alive, FOUND_S):
+                step = "is `contactfpga publish` running with this key"
+                if self._address.config is not None:
+                    step += ", and do its access rules let this user read it"
+                raise PortNotFound(f"{self.name}: nobody publishes it; {step}?")
 
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte."""
@@ -67,6 +72,11 @@ class ZenohPort:
                 self.counters.passed_breaks += after_break
                 self._waiting -= len(piece)
                 data += piece
+            if self._stream.other_version:
+                raise VersionMismatch(
+                    f"{self.name}: its publisher sends messages of another version than {VERSION.decode()}, which this "
+                    "host reads; install a contactfpga of the same release on both computers"
+                )
             if not data and self._gone_s is not None and time.monotonic() - self._gone_s > self._address.wait_s:
                 raise PortLost(
                     f"{self.name} is gone: its publisher ended, or the network is broken; open it again when it is back"
@@ -75,6 +85,7 @@ class ZenohPort:
 
     def write(self, data: bytes) -> None:
         """Ask the board."""
+        assert self._asks is not None
         self._asks.put(data)
 
     def clock(self) -> float:
@@ -83,6 +94,11 @@ class ZenohPort:
 
     def close(self) -> None:
         """Leave the network; may be called twice."""
+        import zenoh
+
+        if self._asks is not None:
+            with contextlib.suppress(zenoh.ZError):  # gone already, which is what closing wants
+                self._asks.undeclare()  # else Zenoh would keep the session in memory
         self._session.close()
 
     def _take(self, sample: zenoh.Sample) -> None:
@@ -97,11 +113,13 @@ class ZenohPort:
             self._changed.notify_all()
 
     def _leave_out(self) -> None:
-        oldest, _ = self._pieces.popleft()
+        """Of those that wait, the oldest; what follows comes after a break then."""
+        oldest, oldest_broken = self._pieces.popleft()
         self._waiting -= len(oldest)
-        self.counters.left_out += len(oldest)
-        self.counters.breaks += 1
-        following, _ = self._pieces[0]
+        self.counters.left_out += len(oldest) - oldest.startswith(b"\0")
+        following, broken = self._pieces[0]
+        self.counters.breaks += not (oldest_broken or broken)
+        self.counters.passed_breaks += oldest_broken and broken
         self._pieces[0] = (following if following.startswith(b"\0") else b"\0" + following), True
         self._waiting += len(self._pieces[0][0]) - len(following)
 
@@ -109,10 +127,14 @@ class ZenohPort:
         """A publisher begins or ends."""
         import zenoh
 
+        name = str(sample.key_expr).rpartition("/")[2]
+        if not re.fullmatch("[0-9a-f]{16}", name):
+            return
         with self._changed:
+            alive = self._stream.alive
             if sample.kind == zenoh.SampleKind.PUT:
-                self._alive.add(str(sample.key_expr))
+                alive.add(int(name, 16))
             else:
-                self._alive.discard(str(sample.key_expr))
-            self._gone_s = None if self._alive else time.monotonic()
+                alive.discard(int(name, 16))
+            self._gone_s = None if alive else time.monotonic()
             self._changed.notify_all()

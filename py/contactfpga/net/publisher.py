@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import random
 import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
+from contactfpga.errors import ContactFPGAError
 from contactfpga.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Message
+from contactfpga.net.session import LEASE_MS
 from contactfpga.wire.asked import Asked, asked_in
 
 if TYPE_CHECKING:
     import zenoh
 
+SLICE_S = 0.01
+"""A port is read at least this often while bytes are collected, lest its own memory runs over."""
 SIMULATED_S = 0.002
 """The most simulated time that passes at once."""
 
@@ -36,7 +41,7 @@ class Publisher:
 
     ``batch_s``: how long bytes are collected before they are sent. ``block``: where the network is too slow, wait and
     let the port overflow; else Zenoh drops messages. Both are counted by who reads. ``commands``: pass commands on as
-    well, not requests alone.
+    well, not requests alone. Raises :class:`~contactfpga.ContactFPGAError` where someone else has the key.
     """
 
     def __init__(
@@ -59,6 +64,7 @@ class Publisher:
         self._offset = 0
         self._begun_s = time.monotonic() - source.clock()
         self._asked: collections.deque[bytes] = collections.deque(maxlen=64)
+        _check_alone(session, key)
         control = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
         self._out = session.declare_publisher(f"{key}/bytes", congestion_control=control, express=True)
         self._in = session.declare_subscriber(f"{key}/ask", self._take)
@@ -80,8 +86,10 @@ class Publisher:
         read_us = round(self._clock() * 1e6)
         if data and self._batch_s:
             if self._source.threaded:
-                time.sleep(self._batch_s)
-                data += self._read(0.0)
+                until_s = time.monotonic() + self._batch_s
+                while (left_s := until_s - time.monotonic()) > 0:
+                    time.sleep(min(left_s, SLICE_S))
+                    data += self._read(0.0)
             else:
                 until = self._source.clock() + self._batch_s
                 while (left := until - self._source.clock()) > 0 and len(data) < MOST_BYTES:
@@ -115,6 +123,18 @@ class Publisher:
             return
         self.passed += 1
         if self._source.threaded:
-            self._source.write(data)
+            with contextlib.suppress(ContactFPGAError):  # the next read says so, or who asks asks again
+                self._source.write(data)
         else:
             self._asked.append(data)
+
+
+def _check_alone(session: zenoh.Session, key: str) -> None:
+    """One that was killed may seem to live for a while."""
+    until_s = time.monotonic() + 2 * LEASE_MS / 1000
+    while list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
+        if time.monotonic() > until_s:
+            raise ContactFPGAError(
+                f"key is {key!r}; it is published already; end that publisher, or give this one --key"
+            )
+        time.sleep(0.1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,18 @@ if TYPE_CHECKING:
 
 LEASE_MS = 1000
 """After this long without a sign of life a peer counts as gone."""
+MOST_RECEIVED = 1 << 20
+"""Bytes of one message that a session takes, which Zenoh keeps roughly: more than any of ours, and little memory."""
 CONNECT_MS = 2000
 """How long a connection may take."""
+
+
+FILES = (
+    *(f"transport/link/tls/{name}" for name in ("root_ca_certificate", "listen_private_key", "listen_certificate")),
+    *(f"transport/link/tls/{name}" for name in ("connect_private_key", "connect_certificate")),
+    "transport/auth/usrpwd/dictionary_file",
+)
+"""Settings that name a file."""
 
 
 def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
@@ -26,7 +37,11 @@ def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.S
 
 def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
     """A session that connects to a router, and listens nowhere."""
-    settings = {"mode": "client", "connect/endpoints": [endpoint or ENDPOINT], "connect/timeout_ms": CONNECT_MS}
+    settings = {
+        "mode": "client",
+        "connect/endpoints": [endpoint or ENDPOINT],
+        "connect/timeout_ms": CONNECT_MS,
+    }
     return _open(settings, endpoint, config, "connect")
 
 
@@ -40,6 +55,8 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": LEASE_MS,
+        "transport/shared_memory/enabled": False,
+        "transport/link/rx/max_message_size": MOST_RECEIVED,
     }
     found, given = zenoh.Config(), {}
     if config is not None:
@@ -49,6 +66,7 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
             found = zenoh.Config.from_file(config)
         except zenoh.ZError as error:
             raise ContactFPGAError(f"config {config!r}: {_reason(error)}") from None
+        _check_files(found, config)
         given = {name: found.get_json(name) for name in settings} | {"mode": "null"}
     usual = zenoh.Config()
     for name, value in settings.items():
@@ -59,7 +77,17 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
     try:
         return zenoh.open(found)
     except zenoh.ZError as error:
-        raise ContactFPGAError(f"{_where(places)}: cannot {what} there: {_reason(error)}; {_step(what)}") from None
+        reason = f"no connection within {CONNECT_MS / 1000:g} s" if what == "connect" else _reason(error)
+        step = _step(what, reason, places)
+        raise ContactFPGAError(f"{_where(places)}: cannot {what} there: {reason}; {step}") from None
+
+
+def _check_files(found: zenoh.Config, config: str) -> None:
+    """Zenoh says of some that there is no connection."""
+    for name in FILES:
+        path = json.loads(found.get_json(name))
+        if path is not None and not Path(path).is_file():
+            raise ContactFPGAError(f"config {config!r}: {name} is {path!r}; there is no such file")
 
 
 def _insert(found: zenoh.Config, name: str, value: Any) -> None:
@@ -76,10 +104,25 @@ def _where(places: Any) -> str:
     return ", ".join(map(str, places)) if isinstance(places, list) else str(places)
 
 
-def _step(what: str) -> str:
+def _step(what: str, reason: str, places: Any) -> str:
     if what == "listen":
-        return "where another publisher listens already, connect to it: --connect ENDPOINT"
+        taken = "connect to the publisher that listens there: --connect ENDPOINT"
+        return taken if "in use" in reason else f"give an endpoint of this computer, for instance {ENDPOINT}"
+    if isinstance(places, list) and any(map(_answers, places)):
+        return "something listens there; are certificates, user and password those that it asks for?"
     return "is `contactfpga publish` running there?"
+
+
+def _answers(place: str) -> bool:
+    """Whether something takes connections at an endpoint of TCP."""
+    found = re.fullmatch(r"(?:tcp|tls)/\[?(.+?)\]?:(\d+)(?:[?#].*)?", place)
+    if found is None:
+        return False
+    try:
+        socket.create_connection((found[1], int(found[2])), timeout=1.0).close()
+    except (OSError, OverflowError):
+        return False
+    return True
 
 
 def _reason(error: Exception) -> str:

@@ -27,7 +27,7 @@ def export(recording: Recording, path: str | Path) -> int:
     pyarrow is missing, which Parquet needs.
     """
     target = Path(path)
-    write = _WRITERS.get(target.suffix)
+    write = _WRITERS.get(target.suffix.lower())
     if write is None:
         raise ContactFPGAError(f"{path}: its name ends in {target.suffix!r}; take one of: {', '.join(_WRITERS)}")
     part = target.with_name(f"{target.name}.part")

@@ -32,6 +32,7 @@ class McapFile:
             raise MissingExtra(f"a recording ({error})", "record") from None
         self.path = path
         self.messages = 0
+        self._first_ns = self._last_ns = 0
         self._failed = False
         self._file = WholeFile(path)
         # Chunks end where we say so.
@@ -42,6 +43,11 @@ class McapFile:
         self._waiting = 0
         self._since_s = math.inf
         self.flush()
+
+    @property
+    def seconds(self) -> float:
+        """From its first message to its last one."""
+        return (self._last_ns - self._first_ns) / 1e9
 
     @property
     def size(self) -> int:
@@ -83,6 +89,8 @@ class McapFile:
     def _add(self, channel: int, time_ns: int, data: bytes) -> None:
         self._writer.add_message(channel, time_ns, data, time_ns)
         self._waiting += len(data) + _MESSAGE_BYTES
+        self._first_ns = min(self._first_ns, time_ns) if self.messages else time_ns
+        self._last_ns = max(self._last_ns, time_ns)
         self.messages += 1
 
     def flush_old(self, now_s: float) -> None:

@@ -11,14 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.driver.board import Board
+from contactfpga.driver.mcap_part import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.recordings import messages
 from contactfpga.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.hellos import Cutter
-
-METADATA = "contactfpga"
-"""Name of what stands in a file for each link: its hello and its Skin."""
 
 PATIENCE_S = 2.0
 """How long a new file waits for hellos to begin with; boards say one twice per second."""
@@ -31,10 +29,10 @@ class Split:
     bytes: float | None = None
     seconds: float | None = None
 
-    def due(self, file: McapFile, seconds: float) -> bool:
-        """Whether this file, which was begun so long ago, is full."""
+    def due(self, file: McapFile) -> bool:
+        """Whether this file is full, or holds as much time."""
         full = self.bytes is not None and file.size >= self.bytes
-        return file.messages > 0 and (full or (self.seconds is not None and seconds >= self.seconds))
+        return file.messages > 0 and (full or (self.seconds is not None and file.seconds >= self.seconds))
 
 
 class Recorder:
@@ -83,7 +81,7 @@ class Recorder:
                     file.flush_old(now_s)
             if self._old is not None:
                 self._end_old(now_s)
-            elif self._split is not None and self._split.due(self.file, now_s - self._begun_s):
+            elif self._split is not None and self._split.due(self.file):
                 self._old, self.file = self.file, self._begin()
                 for name, values in self._about:
                     self.file.metadata(name, values)
@@ -121,7 +119,7 @@ class Recorder:
         self._begun_s = time.monotonic()
         path = self.path
         if self._split is not None:
-            path = path.with_name(f"{path.stem}_{len(self.files) + 1:04d}{path.suffix}")
+            path = numbered(path, len(self.files) + 1)
         file = McapFile(path)
         self.files.append(path)
         return file

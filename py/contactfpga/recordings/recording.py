@@ -11,9 +11,9 @@ from pathlib import Path
 
 from contactfpga import notebook
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_bytes import McapBytes, RecordingError
+from contactfpga.driver.mcap_bytes import McapBytes
+from contactfpga.driver.mcap_part import METADATA, RecordingError
 from contactfpga.inputs.values import is_finite
-from contactfpga.recordings.recorder import METADATA
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.run import Run
@@ -27,7 +27,7 @@ LAST_S = 0.2
 
 
 class Recording:
-    """A file of `contactfpga record` that was closed or recovered.
+    """What `contactfpga record` wrote, closed or recovered; of files that are split all, by the name recorded to.
 
     Every call reads the file, of which it keeps nothing in memory. Frames are made of the board's own bytes, as by the
     driver. Raises :class:`ContactFPGAError` where the file cannot be read.
@@ -49,8 +49,9 @@ class Recording:
 
     @functools.cached_property
     def links(self) -> dict[str, Hello]:
-        """The first hello of each link, whose ``sheet`` has lines and lengths. A link that said none is left out: its
-        frames cannot be read. Raises :class:`ContactFPGAError` where there is no other."""
+        """The first hello of each link, whose ``sheet`` has lines and lengths, in the order in which they were added. A
+        link that said none is left out: its frames cannot be read. Raises :class:`ContactFPGAError` where there is no
+        other."""
         found = {link: hello for link in self._file.links if (hello := self._hello(link)) is not None}
         if not found:
             raise RecordingError(f"{self.path} holds no hello; its frames cannot be read")
@@ -63,7 +64,7 @@ class Recording:
         return {link: _skin(texts.get(link, "")) for link in self.links}
 
     def texts(self, name: str) -> list[dict[str, str]]:
-        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds."""
+        """Texts that are kept in it by name; ``robot``: the `robot.toml` whose links it holds, and what that names."""
         return self._file.texts(name)
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None, link: str | None = None) -> Iterator[Timed]:

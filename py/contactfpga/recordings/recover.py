@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver.mcap_bytes import LARGEST, MAGIC, RecordingError
+from contactfpga.driver.mcap_part import LARGEST, MAGIC, RecordingError
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.recordings.mcap_file import McapFile
@@ -37,7 +37,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
     """Copy what is whole into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``; the old one stays
     as it is. Raises :class:`RecordingError` where there is nothing to copy, or a file of the new one's name."""
     source = Path(path)
-    target = source.with_name(f"{source.stem}_recovered{source.suffix}") if into is None else Path(into)
+    target = source.parent / f"{source.stem}_recovered{source.suffix}" if into is None else Path(into)
     try:
         file = open_regular(source)
     except OSError as error:
@@ -46,7 +46,8 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
         if file.read(len(MAGIC)) != MAGIC:
             raise RecordingError(f"{source} is no MCAP file")
         found = Recovered(target)
-        copy = _Copy(target)
+        copy = _Copy(target, *_definitions(file))
+        file.seek(len(MAGIC))
         try:
             for record in _records(file, found):
                 copy.take(record, found)
@@ -61,10 +62,9 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
 class _Copy:
     """The new file."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, schemas: dict[int, Any], channels: dict[int, Any]):
         self._file = McapFile(path)
-        self._schemas: dict[int, Any] = {}
-        self._channels: dict[int, Any] = {}
+        self._schemas, self._channels = dict(schemas), dict(channels)
         self._first_ns: int | None = None
 
     def take(self, record: Any, found: Recovered) -> None:
@@ -86,6 +86,19 @@ class _Copy:
 
     def close(self) -> None:
         self._file.close()
+
+
+def _definitions(file: BinaryIO) -> tuple[dict[int, Any], dict[int, Any]]:
+    """Schemas and channels, which a closed file repeats at its end: else all is lost where their first piece is
+    damaged. None where it has no end."""
+    try:
+        from mcap.reader import SeekingReader
+
+        file.seek(0)
+        summary = SeekingReader(file).get_summary()
+    except Exception:  # whatever the library stumbles over in a file without an end, or where it is not installed
+        summary = None
+    return ({}, {}) if summary is None else (summary.schemas, summary.channels)
 
 
 def _records(file: BinaryIO, found: Recovered) -> Iterator[Any]:

@@ -11,8 +11,10 @@ from types import TracebackType
 
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
+from contactfpga.driver.mcap_part import SUFFIX
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.values import is_finite, shown
 from contactfpga.recordings.link_messages import LinkMessages
 from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
 from contactfpga.recordings.mount import Mount
@@ -20,8 +22,6 @@ from contactfpga.recordings.recorder import Recorder, Split, link_name
 from contactfpga.recordings.whole_file import RecordingFailed
 from contactfpga.ros.feed import Felt
 from contactfpga.skin import Skin
-
-SUFFIX = ".mcap"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +86,8 @@ class Session:
         ``name``: of its link; by default that of its Skin. ``mount``: where its sheet lies on a robot. ``felt``: from
         the open board to what says the forces at a frame's zones.
         """
+        if self._begun is not None:
+            raise ContactFPGAError("this recording has begun; add all boards before start()")
         buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
         try:
@@ -96,7 +98,14 @@ class Session:
         self._opened.append(_Opened(link_name(board.hello) if name is None else name, board, buffer, mount, force))
 
     def start(self, seconds: float | None = None) -> None:
-        """Make the file, and record for so long, or until :meth:`stop`."""
+        """Make the file, and record for so long, or until :meth:`stop`. Raises ValueError, and
+        :class:`ContactFPGAError` where there is no board or it was started before."""
+        if seconds is not None and (not is_finite(seconds) or seconds <= 0):
+            raise ValueError(f"seconds is {shown(seconds)}; it must be a positive number, or None until stop()")
+        if self._begun is not None:
+            raise ContactFPGAError("this recording was started already; make another Session")
+        if not self._opened:
+            raise ContactFPGAError("there is no board to record; add() one first")
         # In a thread of its own, as all that writes: where Ctrl-C interrupts the main thread nothing is left half made.
         # Events are waited for, as a `join` that is interrupted forgets that its thread still runs.
         self._begun = threading.Event()

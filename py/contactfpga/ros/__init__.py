@@ -5,3 +5,6 @@ from __future__ import annotations
 from contactfpga.ros.types import PACKAGE, messages
 
 __all__ = ["PACKAGE", "messages"]
+
+MAX_DOMAIN = 232
+"""The last domain of DDS: beyond, its port numbers end."""

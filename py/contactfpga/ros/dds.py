@@ -6,8 +6,9 @@ import functools
 import re
 from typing import Any
 
-from contactfpga.errors import MissingExtra
-from contactfpga.inputs.values import shown
+from contactfpga.errors import BoardClosed, MissingExtra
+from contactfpga.inputs.values import shown, whole
+from contactfpga.ros import MAX_DOMAIN
 from contactfpga.ros.hashes import type_hash
 from contactfpga.ros.loopback import kept_inside
 from contactfpga.ros.settings import TOPICS, Topic
@@ -36,6 +37,8 @@ class Publisher:
             raise MissingExtra(f"publishing to ROS 2 ({error})", "ros") from None
         if not re.fullmatch(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", namespace):
             raise ValueError(f"namespace is {shown(namespace)}; it has letters, digits and _, and / between parts")
+        if whole(domain) is None or not 0 <= domain <= MAX_DOMAIN:
+            raise ValueError(f"domain is {shown(domain)}; it must be a whole number from 0 to {MAX_DOMAIN}")
         form = NETWORK if network else LOCALHOST
         self._namespace = namespace
         config = form.format(compatibility=_NO_TYPE_INFORMATION)
@@ -51,7 +54,10 @@ class Publisher:
         return TOPICS[name].resolved(self._namespace)
 
     def send(self, topic: str, data: bytes) -> None:
-        """Publish a message by the name of its topic, a key of :data:`TOPICS`."""
+        """Publish a message by the name of its topic, a key of :data:`TOPICS`. Raises
+        :class:`~contactfpga.BoardClosed` after :meth:`close`."""
+        if self._participant is None:
+            raise BoardClosed("this publisher was closed; make another one")
         writer, kind = self._writers[topic]
         sample = object.__new__(kind)
         sample.serialize = lambda **_: data  # it is written already
@@ -70,9 +76,9 @@ class Publisher:
         return DataWriter(self._participant, made, qos=qos_of(topic)), kind
 
     def close(self) -> None:
-        """Leave the domain."""
+        """Leave the domain; may be called twice."""
         self._writers.clear()
-        del self._participant, self._domain
+        self._participant = self._domain = None
 
     def __enter__(self) -> Publisher:
         return self

@@ -24,7 +24,7 @@ MAX_SUMS, MAX_WEIGHT = 4, 127
 
 @dataclasses.dataclass(frozen=True)
 class Units:
-    """Of a Skin with ``units``."""
+    """What follows from a Skin with ``units``."""
 
     skin: Skin
 
@@ -34,14 +34,14 @@ class Units:
 
     @property
     def level_clocks(self) -> int:
-        """How long the SPI clock is high, and how long low."""
+        """Clocks for which the SPI clock is high, and for which it is low."""
         most_hz = self.converter.most_hz(self.skin.converter_v)
         least = self.converter.least_level_ns * self.skin.clock_hz
         return max(-(-self.skin.clock_hz // (2 * most_hz)), -(-least // 1_000_000_000))
 
     @property
     def spacing_clocks(self) -> int:
-        """From a unit's sample to that of the next one."""
+        """Clocks from a unit's sample to that of the next unit; 0 where all are sampled at once."""
         return self.converter.spacing_levels * self.level_clocks
 
     @property
@@ -52,20 +52,20 @@ class Units:
 
     @property
     def delay_us(self) -> int:
-        """From the middle of what a conversion averages until it is ready, to the nearest us."""
+        """Latency of a conversion: from the middle of what it averages until it is ready, to the nearest us."""
         pace = self.converter.pace
         return 0 if pace is None else round(pace.delay_halves * self.sweep_clocks * 500_000 / self.skin.clock_hz)
 
     @property
     def sweep_clocks(self) -> int:
-        """From a unit's sample to its next one."""
+        """Clocks from a unit's sample to its next one."""
         if (pace := self.converter.pace) is not None:
             return 2 * self.pace_level_clocks * pace.period
         return self.converter.sweep_levels * self.level_clocks * self.skin.units
 
     @functools.cached_property
     def sum_bits(self) -> int:
-        """Of the largest amount that a weighted sum of deviations can have; 0 without sums."""
+        """Bits of the largest amount that a weighted sum of deviations can have; 0 without sums."""
         full = (1 << self.converter.bits) - 1
         return max((full * sum(map(abs, row)) for row in self.skin.unit_sums), default=0).bit_length()
 

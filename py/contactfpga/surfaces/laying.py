@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import io
+import logging
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contactfpga.errors import MissingExtra
+from contactfpga.inputs.files import open_regular
 from contactfpga.surfaces.answer import SurfaceError
 from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import Floats
@@ -41,14 +44,21 @@ class Triangles:
             import trimesh
         except ModuleNotFoundError as error:
             raise MissingExtra(f"reading a mesh ({error})", "surface") from None
-        with open(path, "rb") as file:
+        # What the library stumbles over it logs, traceback and all, where nobody else takes it.
+        logging.getLogger("trimesh").addHandler(logging.NullHandler())
+        with open_regular(path) as file:
             try:
-                mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower())
+                # Unprocessed, as else triangles without a place are left out in silence.
+                mesh = trimesh.load_mesh(io.BytesIO(file.read()), file_type=path.suffix[1:].lower(), process=False)
             except Exception as error:  # whatever a parser of many formats stumbles over
                 raise SurfaceError(f"{path}: not a mesh: {str(error) or type(error).__name__}") from None
         if not len(getattr(mesh, "faces", ())):
             raise SurfaceError(f"{path}: no triangles in it")
-        return cls(scale * np.asarray(mesh.triangles, float), _corner_normals(mesh))
+        corners = np.asarray(mesh.triangles, float)
+        if wrong := int((~np.isfinite(corners)).any(axis=(1, 2)).sum()):
+            raise SurfaceError(f"{path}: {wrong} of its {len(corners)} triangles have a corner that is no point")
+        mesh.merge_vertices()
+        return cls(scale * corners, _corner_normals(mesh))
 
     def hit(self, starts: Floats, ways: Floats) -> tuple[Floats, Floats]:
         """(n, 3) points that rays meet first, and outward normals there; NaN where they meet nothing."""
@@ -77,6 +87,7 @@ class Triangles:
         rays = np.arange(len(starts))
         met = np.isfinite(distance[rays, which])
         u, v = u[rays, which], v[rays, which]
+        u, v = np.where(met, u, 0.0), np.where(met, v, 0.0)  # else of a triangle without an area, perhaps
         weights = np.stack([1 - u - v, u, v], axis=1)
         normals = (weights[:, :, None] * self.normals[which]).sum(axis=1)
         normals *= np.where((normals * ways).sum(axis=1) > 0, -1.0, 1.0)[:, None]

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-import threading
 import time
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from contactfpga.body import Body
-from contactfpga.body.open_body import OpenBody, open_board
+import numpy as np
+
+from contactfpga.body import Body, Contact
+from contactfpga.body.contact import on_link
+from contactfpga.body.open_body import OpenBody
+from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.view import picture
 from contactfpga.view.fingers import Hand, Touchable
+from contactfpga.view.panel import Timeline
+from contactfpga.view.playback import Playback
 from contactfpga.view.robot import RobotStage
 from contactfpga.view.sources import Moment
+from contactfpga.view.tiles import MM
 
 if TYPE_CHECKING:
     import viser
@@ -24,6 +32,20 @@ if TYPE_CHECKING:
 TURN_S = 0.04
 TOLD_S = 0.25
 TURN_RAD = 3.15
+
+
+class Shown(Protocol):
+    """A robot with boards, or a recording of them."""
+
+    title: str
+    body: Body
+    angles: dict[str, float]
+    """In rad, of prismatic joints in m; what the sliders set."""
+    virtual: dict[str, Touchable]
+    """Virtual boards, by their links."""
+
+    def states(self) -> dict[str, LinkState]:
+        """Of all links, now."""
 
 
 class BodySource:
@@ -34,11 +56,8 @@ class BodySource:
         self.body = Body.load(path)
         kinematics = self.body.kinematics
         self.angles: dict[str, float] = dict.fromkeys(kinematics.joint_names if kinematics else (), 0.0)
-        """In rad, of prismatic joints in m; what the sliders set."""
         self.virtual: dict[str, Touchable] = {}
-        """Virtual boards, by their links."""
         self._timeout = timeout
-        self._lock = threading.Lock()
         self._open = OpenBody(self.body, lambda _: self.angles, timeout=timeout, opened=self._opened)
 
     def _opened(self, plan: Plan) -> Board:
@@ -60,7 +79,7 @@ class BodySource:
 class BodyView:
     """Shows a body in a server's page."""
 
-    def __init__(self, server: viser.ViserServer, source: BodySource):
+    def __init__(self, server: viser.ViserServer, source: Shown):
         self._source = source
         self.stage = RobotStage(server, source.body)
         self._moved = dict(source.angles)
@@ -73,6 +92,8 @@ class BodyView:
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.set_panel_label("contactfpga")
         self._facts = gui.add_markdown("")
+        self._timeline = Timeline(server, source) if isinstance(source, Playback) else None
+        self._felt: dict[str, LinkState] = {}
         self._add_sliders(server)
 
     def _add_sliders(self, server: viser.ViserServer) -> None:
@@ -99,20 +120,50 @@ class BodyView:
             if virtual is not None and name not in self.hands:
                 self.hands[name] = Hand.on(virtual, source.body.links[name].skin.sheet)
                 stage.press_with(self.hands[name])
-            if state.zones is not None:
+            if state.zones is None:
+                stage.draw_no_data()
+            else:
                 truth = None if virtual is None else virtual.pressed
-                stage.draw(Moment(state.zones, self._trackers[name].update(state.zones), truth))
+                tracks = self._trackers[name].update(state.zones)
+                stage.draw(Moment(state.zones, tracks, truth, arrows=self._arrows(source.body.links[name], state)))
         if self._turned_s - self._told_s > TOLD_S:
             self._told_s = self._turned_s
             self._facts.content = facts(source, states, self.stage.unread)
+            if self._timeline is not None:
+                self._timeline.write()
+
+    def _arrows(self, plan: Plan, newest: LinkState) -> np.ndarray | None:
+        """Forces of the newest frame, or of the one before, where its readings have not come yet."""
+        before, self._felt[plan.name] = self._felt.get(plan.name), newest
+        if plan.units is None:
+            return None
+        for state in (newest, before):
+            if state is not None and state.zones is not None and state.zones.units is not None:
+                return pushes(plan, on_link(plan, state))
+        return None
 
 
-def facts(source: BodySource, states: dict[str, LinkState], unread: set[str]) -> str:
+def pushes(plan: Plan, contacts: Iterable[Contact]) -> np.ndarray:
+    """(n, 2, 3) arrows in m in the sheet's own frame, one for each contact with a force, from outside to its point."""
+    arrows = []
+    for one in contacts:
+        if one.point_m is None or one.force_n is None or np.linalg.norm(one.force_n) < picture.LEAST_N:
+            continue
+        tip = (np.array(one.point_m) - plan.pose.point_m) @ plan.pose.rotation
+        force = np.array(one.force_n) @ plan.pose.rotation
+        arrows.append((tip - picture.MM_PER_N * MM * force, tip))
+    return np.array(arrows) if arrows else np.zeros((0, 2, 3))
+
+
+def facts(source: Shown, states: dict[str, LinkState], unread: set[str]) -> str:
     """As the panel shows them."""
     lines = [f"**source** {source.title}  "]
+    if isinstance(source, Playback):
+        lines.append(f"**moment** {source.position_s:.3f} of {source.duration_s:.3f} s  ")
     if unread:
         lines.append(f"**meshes** {', '.join(sorted(unread))} cannot be read; lines between joints are drawn  ")
     for name, state in states.items():
-        zones = "" if state.zones is None else f", {len(state.zones)} zones"
+        found = 0 if state.zones is None else len(state.zones)
+        zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
         lines.append(f"**{name}** {state}{zones}  ")
     return "\n".join(lines)

@@ -24,7 +24,8 @@ from contactfpga.view.bodies import BodySource, BodyView
 from contactfpga.view.fingers import Hand
 from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
-from contactfpga.view.replayed import is_recording, load
+from contactfpga.view.recorded_body import BodyPlayer, holds_robot
+from contactfpga.view.replayed import LinkRecording, is_recording, load
 from contactfpga.view.sources import BoardSource, Source
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Shown:
     web: viser.ViserServer
     guard: Guard
     view: View | BodyView
-    source: Source | BodySource
+    source: Source | BodySource | BodyPlayer
     hand: Hand | None
     """The mouse's, on a virtual board."""
     url: str
@@ -70,12 +71,14 @@ def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int 
     does."""
     named = named or Named()
     _check(named)
-    source: Source | BodySource
-    source, hand = (BodySource(named.port, named.timeout), None) if _is_body(named.port) else _source(named)
+    source, hand = _source(named)
     try:
         web, guard = server.serve(host, http_port)
         try:
-            view = BodyView(web, source) if isinstance(source, BodySource) else View(web, source, hand)
+            if isinstance(source, (BodySource, BodyPlayer)):
+                view: View | BodyView = BodyView(web, source)
+            else:
+                view = View(web, source, hand)
             yield Shown(web, guard, view, source, hand, guard.url(web.get_port()))
         finally:
             server.stop(web)
@@ -97,19 +100,24 @@ def _check(named: Named) -> None:
     recorded = port is not None and not is_body and is_recording(port)
     for name in ("skin", "baud", "units"):
         if getattr(named, name) is not None and (is_body or recorded):
-            other = "says it of each link" if is_body else "is a recording"
-            raise ContactFPGAError(f"--{name} is of a board; {port} {other}")
+            other = "sets it for each link" if is_body else "is a recording"
+            raise ContactFPGAError(f"--{name} is for a board; {port} {other}")
     if named.link is not None and not recorded:
-        raise ContactFPGAError(f"--link is of a recording; {'name one' if port is None else f'{port} is none'}")
+        raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
 
 def _is_body(port: str | None) -> TypeGuard[str]:
     return port is not None and port.endswith(".toml")
 
 
-def _source(named: Named) -> tuple[Source, Hand | None]:
+def _source(named: Named) -> tuple[Source | BodySource | BodyPlayer, Hand | None]:
+    if _is_body(named.port):
+        return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):
-        return Player(load(named.port, named.link, named.timeout)), None
+        recorded = load(named.port, named.link, named.timeout)
+        if isinstance(recorded, LinkRecording) and not recorded.named and holds_robot(recorded.recording):
+            return BodyPlayer(recorded.recording), None
+        return Player(recorded), None
     if named.port is not None and not named.port.startswith("sim:"):
         cells = _cells(named)
         board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)

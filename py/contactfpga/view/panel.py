@@ -9,7 +9,7 @@ import numpy as np
 from contactfpga import picture_style
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand
-from contactfpga.view.player import SPEEDS, Player
+from contactfpga.view.playback import SPEEDS, Playback
 from contactfpga.view.sources import Moment, Source
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Panel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("contactfpga")
         self._facts = gui.add_markdown("")
-        self._timeline = Timeline(server, source) if isinstance(source, Player) else None
+        self._timeline = Timeline(server, source) if isinstance(source, Playback) else None
         self._chart = self._add_chart(server)
         if hand is not None:
             self._add_mouse(server, hand)
@@ -114,14 +114,14 @@ class Panel:
 class Timeline:
     """Where a recording is, and how fast it goes on."""
 
-    def __init__(self, server: viser.ViserServer, player: Player):
+    def __init__(self, server: viser.ViserServer, player: Playback[Any]):
         self._player = player
         gui = server.gui
         end_s = max(player.duration_s, 1e-3)
         step_s = 10.0 ** np.floor(np.log10(end_s / 1000))
         self._place = gui.add_slider("s", 0.0, float(np.ceil(end_s / step_s) * step_s), float(step_s), 0.0)
         self._button = gui.add_button("Pause")
-        speed = gui.add_dropdown("speed", tuple(SPEEDS), "1")
+        speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         # What the server itself sets has no client.
         self._place.on_update(lambda event: player.seek(self._place.value) if event.client is not None else None)
         self._button.on_click(lambda _: player.pause() if player.playing else player.play())

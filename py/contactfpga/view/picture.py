@@ -26,11 +26,18 @@ def rgb(color: str) -> tuple[int, int, int]:
     return value >> 16, value >> 8 & 0xFF, value & 0xFF
 
 
-OPEN, TRUE, REPORTED, GHOST = (
-    rgb(color) for color in (picture_style.SHEET, picture_style.SKY, picture_style.BLUE, picture_style.ORANGE)
+OPEN, TRUE, REPORTED, GHOST, UNKNOWN = (
+    rgb(color)
+    for color in (
+        picture_style.SHEET,
+        picture_style.SKY,
+        picture_style.BLUE,
+        picture_style.ORANGE,
+        picture_style.SOFT,
+    )
 )
 """Cells: open; closed on a virtual board that sends zones only, which is its own truth; closed, as the board reports;
-perhaps made by other closed ones."""
+perhaps made by other closed ones; of a link without data."""
 
 CIRCLE, TRAIL, PUSH = (rgb(color) for color in (picture_style.VERMILLION, picture_style.GREEN, picture_style.PURPLE))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from contactfpga.driver import driver, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_bytes import MAGIC
+from contactfpga.driver.mcap_part import MAGIC, SUFFIX, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet
@@ -41,7 +41,7 @@ class Recorded(Protocol):
 
 def is_recording(name: str) -> bool:
     """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
-    return name.startswith(recording.SCHEME) or Path(name).is_file()
+    return name.startswith(recording.SCHEME) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
 def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
@@ -55,7 +55,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
     link = link or asked.link
     if not _is_mcap(asked.path):
         if link is not None:
-            raise ContactFPGAError(f"{asked.path} holds one board; --link is of what `contactfpga record` makes")
+            raise ContactFPGAError(f"{asked.path} holds one board; --link is for files of `contactfpga record`")
         return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout)
     from contactfpga.recordings import Recording
 
@@ -64,7 +64,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
 
 def _is_mcap(path: Path) -> bool:
     try:
-        with open_regular(path) as file:
+        with open_regular(files_of(path)[0]) as file:
             return file.read(len(MAGIC)) == MAGIC
     except (OSError, RuntimeError, ValueError):  # which is said where it is opened
         return False
@@ -142,27 +142,29 @@ class LinkRecording:
 
     def __init__(self, recording: Recording, link: str | None = None):
         links = recording.links
+        self.named = link is not None
+        """Whether this link was asked for, or is the first one."""
         if link is None:
             link = next(iter(links))
         if link not in links:
             raise ContactFPGAError(f"{recording.path} has no link {link!r}; it has {', '.join(links)}")
-        self._recording, self._link = recording, link
+        self.recording, self._link = recording, link
         self.title = f"{recording.path.name}, {link}"
         self.sheet = links[link].sheet
 
     @property
     def duration_s(self) -> float:
-        return self._recording.duration_s
+        return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
         """As :meth:`Recorded.frames`."""
-        return ((seconds, zones) for seconds, _, zones in self._recording.frames(start_s, end_s, self._link))
+        return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
         """As :meth:`Recorded.lateness`."""
         conversation = Conversation(self.title, live=False)
         found = []
-        for seconds, data in self._recording.raw_bytes(self._link):
+        for seconds, data in self.recording.raw_bytes(self._link):
             times_us = [_last_us(event) for event in conversation.receive_runs(data, 0.0)]
             if known := [time_us for time_us in times_us if time_us is not None]:
                 found.append((seconds, seconds - known[-1] / 1e6))

@@ -46,6 +46,8 @@ class Moment:
     felt: tuple[Contacts, Zones] | None = None
     """The newest forces that are known, with their frame, which is some milliseconds older than :attr:`zones`: the
     readings after it have to come first."""
+    arrows: np.ndarray | None = None
+    """(n, 2, 3) in m, in the sheet's frame: the same of a link of a robot, whose units count in the link's frame."""
 
 
 class Source(Protocol):

@@ -82,17 +82,25 @@ class Stage:
     def draw(self, moment: Moment) -> None:
         """Show it. Only what differs is sent."""
         zones = moment.zones
-        colors = picture.tile_colors(zones, moment.truth)
-        if self._colors is None or not np.array_equal(colors, self._colors):
-            self.cells.batched_colors = self._colors = colors
+        self._color(picture.tile_colors(zones, moment.truth))
         found = picture.spots(zones, self.tiles.surface, self._lift_mm)
         self._draw_lines("circles", found.circles, picture.CIRCLE, 3.0)
         self._draw_points(found.points)
         self._trails.add(moment.tracks)
         self._draw_lines("trails", self._trails.lines, picture.TRAIL, 2.0)
         self._draw_labels(moment.tracks)
-        if self._load_cells is not None:
-            self._draw_arrows(moment)
+        self._draw_arrows(self._forces(moment))
+
+    def draw_no_data(self) -> None:
+        """Dark cells and nothing on them: nobody knows what touches."""
+        self._color(np.tile(np.array(picture.UNKNOWN, np.uint8), (len(self.tiles.points_mm), 1)))
+        for handle in (*self._lines.values(), self._points, *self._labels, self._arrows):
+            if handle is not None:
+                handle.visible = False
+
+    def _color(self, colors: np.ndarray) -> None:
+        if self._colors is None or not np.array_equal(colors, self._colors):
+            self.cells.batched_colors = self._colors = colors
 
     def _draw_lines(self, name: str, lines: np.ndarray, color: tuple[int, int, int], width: float) -> None:
         handle = self._lines.get(name)
@@ -109,11 +117,13 @@ class Stage:
         handle.points = lines.astype(np.float32)
         handle.visible = True
 
-    def _draw_arrows(self, moment: Moment) -> None:
-        assert self._load_cells is not None
-        arrows = np.zeros((0, 2, 3))
-        if moment.felt is not None:
-            arrows = picture.pushes(*moment.felt, self._load_cells, self.tiles.surface)
+    def _forces(self, moment: Moment) -> np.ndarray:
+        """(n, 2, 3) arrows."""
+        if moment.felt is not None and self._load_cells is not None:
+            return picture.pushes(*moment.felt, self._load_cells, self.tiles.surface)
+        return np.zeros((0, 2, 3)) if moment.arrows is None else moment.arrows
+
+    def _draw_arrows(self, arrows: np.ndarray) -> None:
         if len(arrows):
             radius = 0.08 * self._pitch_mm * MM
             self._arrows = self._server.scene.add_arrows(

@@ -12,12 +12,13 @@ from contactfpga.skin.derived import SELF_TEST, Derived
 from contactfpga.skin.rates import pulsed
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.framing import DELIMITER, KIND_HELLO, PacketError, digits, last_byte, number, seal
+from contactfpga.wire.numbered import Place
 from contactfpga.wire.units import FACTS_BYTES, UnitFacts
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
 
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 9, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
 
 _SHEET = struct.Struct("<BBBBBBHBB")
 _PITCH = struct.Struct("<dd")
@@ -45,6 +46,7 @@ _SIZES = {
     FINGERPRINT: _FINGERPRINT_BYTES,
     RATES: _RATES.size,
     UNITS: FACTS_BYTES,
+    PLACE: len(Place._fields),
     CHECK: _CHECK.size,
 }
 """The least bytes of a field."""
@@ -70,6 +72,8 @@ class Hello:
     """Numbers of the commands that the board takes; see :meth:`Board.command`."""
     units: UnitFacts | None = None
     """Its pressure units; None: it has none."""
+    place: Place | None = None
+    """Of the sheet among several ones at one FPGA; None: it is alone."""
     sent: int
     """Frames sent since power-up."""
     epoch: int
@@ -90,8 +94,13 @@ class Hello:
         return pulsed(self.clock_hz, self.baud)
 
 
-def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0) -> bytes:
-    """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end."""
+def encode_hello(
+    skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuck: int = 0, place: Place | None = None
+) -> bytes:
+    """The hello of a board built from ``skin``, as on the wire, with a delimiter at either end.
+
+    ``place``: of the sheet among several ones; the packet itself is not numbered here.
+    """
     sheet = _SHEET.pack(
         skin.rows,
         skin.columns,
@@ -113,6 +122,8 @@ def encode_hello(skin: Skin, sent: int = 0, epoch: int = 0, heard: int = 0, stuc
         facts.append((COMMANDS, bytes(commands)))
     if skin.units:
         facts.append((UNITS, UnitFacts.of(Derived(skin).units).encode()))
+    if place is not None:
+        facts.append((PLACE, bytes(place)))
     fixed = [bytes([kind, len(value)]) + value for kind, value in facts]
     counters = ((sent, SENT_DIGITS), (epoch, EPOCH_DIGITS), (heard, HEARD_DIGITS), (stuck, STUCK_DIGITS), (0, 1))
     state = bytes([STATE, STATE_DIGITS]) + b"".join(digits(value, count) for value, count in counters)
@@ -207,8 +218,16 @@ def _hello(fields: dict[int, bytes]) -> Hello:
         guard=bool(faults & 1),
         commands=fields.get(COMMANDS, b""),
         units=UnitFacts.decode(fields[UNITS]) if UNITS in fields else None,
+        place=_place(fields[PLACE]) if PLACE in fields else None,
         **_counters(state),
     )
+
+
+def _place(data: bytes) -> Place:
+    place = Place(*data[: len(Place._fields)])
+    if place.number >= place.sheets:
+        raise ValueError(f"it is of sheet {place.number} of {place.sheets}")
+    return place
 
 
 def _counters(state: bytes) -> dict[str, int]:

@@ -44,7 +44,7 @@ class UnitFacts:
 
     @classmethod
     def of(cls, units: Units) -> UnitFacts:
-        """Of a Skin."""
+        """What the hello of a Skin's board says of its units."""
         skin = units.skin
         sums = len(skin.unit_sums)
         clocks = units.spacing_clocks, units.sweep_clocks
@@ -79,7 +79,7 @@ class Sweep:
 
 
 def plain_bytes(units: int, bits: int) -> int:
-    """Of a packet."""
+    """Length of a packet in plain bytes, before framing."""
     return units * digits_of_reading(bits) + TRAILER_DIGITS + 1
 
 

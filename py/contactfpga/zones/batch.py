@@ -41,7 +41,7 @@ DIVIDED_ZONE_DTYPE = np.dtype(_WHICH + [(name, DIVIDED_DTYPE[name]) for name in 
 """The same with ``report = "barycenter"``, whose boards send no sums."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch:
     """Consecutive frames and all of their zones: ``batch.zones["x_mm"]`` is an array over all zones, in mm, and
     ``batch.frames["time_us"]`` one over all frames, in us."""
@@ -52,6 +52,14 @@ class Batch:
     """(m,) of :data:`ZONE_DTYPE`, in the order of the frames and within these of the zones."""
     faults: tuple[tuple[str, ...], ...] = ()
     """:attr:`Zones.faults` of each frame."""
+
+    def __len__(self) -> int:
+        """How many frames there are."""
+        return len(self.frames)
+
+    def __repr__(self) -> str:
+        first, last = self.frames["sequence"][[0, -1]]
+        return f"<Batch: frames {first} to {last} ({len(self.frames)}), {len(self.zones)} zones>"
 
     @property
     def starts(self) -> np.ndarray:

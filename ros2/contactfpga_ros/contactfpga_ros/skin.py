@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import signal
 import threading
+from typing import Any
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
@@ -59,7 +60,7 @@ class Skin(Node):
         for name, (value, text) in CONNECTION.items():
             self.declare_parameter(name, value, ParameterDescriptor(description=text))
         self._settings = Settings()
-        self._speakers: dict[str, object] = {}
+        self._speakers: dict[str, Any] = {}
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 

@@ -205,8 +205,8 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
             "ROWS": skin.rows,
             "COLUMNS": skin.columns,
             "GUARD": int(skin.guard),
-            "LINE_OF_ROW": _initializer(skin.line_of_row),
-            "LINE_OF_COLUMN": _initializer(skin.line_of_column),
+            "LINE_OF_ROW": initializer(skin.line_of_row),
+            "LINE_OF_COLUMN": initializer(skin.line_of_column),
             "COL2ROW": int(skin.selects_low),
             "ROW_CHAINS": 0 if skin.row_drive == "direct" else skin.row_chains,
             "COLUMN_CHAINS": 0 if skin.column_read == "direct" else skin.column_chains,
@@ -223,7 +223,7 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
     )
 
 
-def _initializer(numbers: Iterable[int]) -> str:
+def initializer(numbers: Iterable[int]) -> str:
     """Of a C++ array."""
     return "{" + ",".join(map(str, numbers)) + "}"
 

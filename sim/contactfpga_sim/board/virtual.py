@@ -12,7 +12,9 @@ from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.haptics import LoadCells
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.board.several import VirtualSheets
 from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.recordings import Recording
@@ -160,3 +162,8 @@ def board_for(
     if scene is None or not scene.endswith((".npy", ".npz")):
         raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
     return VirtualBoard(skin, Recording.load(scene, threshold), circuit=circuit, units=units)
+
+
+def sheets_for(several: Several, scene: str | None) -> VirtualSheets:
+    """The same for ``sim://?sheets=FILE``; the scene touches each sheet."""
+    return VirtualSheets(several, [scene] * len(several.skins))

@@ -14,6 +14,8 @@ from contactfpga.choices.labellers import LABELLERS
 from contactfpga.choices.reports import REPORTS
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.limits import MIN_AROUND
+from contactfpga.skin.sheet import max_zones
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import request
 from contactfpga_sim.golden.trace import Timeline
@@ -59,6 +61,17 @@ REVERSAL: dict[str, tuple[Any, ...]] = CHOICES | {
     "project_us": (0.1, 1.0, 2.3),
 }
 """The same for line reversal, which takes rows and columns on pins of their own only."""
+
+
+def closed(choices: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
+    """The same for sheets whose ends meet: what such a Skin may choose."""
+    return choices | {
+        "surface": ("closed",),
+        "sheet": ((4, 3), *(sheet for sheet in choices["sheet"] if sheet[1] >= MIN_AROUND)),
+        "labeller": tuple(name for name, labeller in LABELLERS.items() if labeller.closed),
+        "report": ("moments", "cells"),
+        "barycenter_bits": (0,),
+    }
 
 
 def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[str, Any]]:
@@ -109,14 +122,15 @@ def pairs_in(rows: list[list[int]]) -> set[Pair]:
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
-    """The Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE` or :data:`REVERSAL`."""
+    """The Skin for an assignment of :data:`CHOICES`, :data:`ADAPTIVE`, :data:`REVERSAL` or :func:`closed` ones."""
     rows, columns = choice["sheet"]
     megahertz, baud = choice["link"]
     values = {name: choice[name] for name in ("connectivity", "diodes", "debounce", "labeller", "report", "send")}
     values |= {"rows": rows, "columns": columns, "clock_hz": megahertz * 1_000_000, "baud": baud}
     values["scan"] = choice.get("scan", "raster")
-    if choice["surface"] == "cylinder":
-        values |= {"surface": "cylinder", "radius_mm": 2.0 * columns + 5.5, "pitch_y_mm": 7.25}
+    ends_meet = choice["surface"] == "closed"
+    if choice["surface"] != "plane":
+        values |= {"surface": "cylinder", "radius_mm": 2.0 * columns + 5.5, "pitch_y_mm": 7.25, "closed": ends_meet}
     if rows * columns > 1 and choice["mask"] == "cells":
         values["mask"] = ((rows - 1, 0), (0, columns - 1)) if rows * columns > 2 else ((0, 0),)
     elif columns > 1 and choice["mask"] == "column":
@@ -128,7 +142,7 @@ def skin_for(choice: dict[str, Any]) -> Skin:
         values["project_us"] = choice["project_us"]
     if choice["report"] == "barycenter":
         values["barycenter_bits"] = choice["barycenter_bits"]
-    most = Skin(rows=rows, columns=columns, connectivity=choice["connectivity"], settle_us=1000.0).max_zones()
+    most = max_zones(rows, columns, choice["connectivity"], ends_meet)
     if choice["capacity"] != "default":
         values["zone_capacity"] = 1 if choice["capacity"] == "one" else -(-most // 2)
     values |= {"debounce_press_us": 0.0, "debounce_release_us": 0.0}  # until the scan time is known

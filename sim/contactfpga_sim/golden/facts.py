@@ -42,6 +42,13 @@ class Facts:
     """What the rules call R, C, M, E, X, Z, S, L, T, D, P and Q, and the widths of the fields on the wire."""
 
     skin: Skin
+    place: tuple[int, int] | None = None
+    """(number, sheets) of a sheet among several at one FPGA; None: it is alone."""
+
+    @property
+    def closing(self) -> bytes:
+        """What follows the stuffed bytes of a packet: 2, and kind 11 with the sheet's number."""
+        return b"" if self.place is None else bytes([2, 11 * 16 + self.place[0]])
 
     @property
     def rows(self) -> int:

@@ -95,7 +95,7 @@ class Packer:
     def _send(self, packet: Packet, items: Items, taken: int) -> None:
         self._overwritten += self._link.drop()
         closing = packet.push(self._trailer(items))
-        self._link.offer(taken + closing + 2, packet.wire(before=self._facts.fingerprint[:2]))
+        self._link.offer(taken + closing + 2, packet.wire(self._facts.fingerprint[:2], self._facts.closing))
         self._free = taken + closing + 2
 
     def _trailer(self, items: Items) -> bytes:

@@ -14,7 +14,7 @@ from contactfpga_sim.golden.request import Heard
 from contactfpga_sim.golden.scan import Scan
 
 KIND = 4
-SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, CHECK = 1, 2, 3, 4, 5, 6, 7, 8, 9, 255
+SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255
 DIGITS = range(16, 32)
 """Where the digits lie, counted from the delimiter in front."""
 
@@ -39,10 +39,12 @@ def hello(facts: Facts, digits: Sequence[int] = (0,) * len(DIGITS)) -> bytes:
         rest += _field(COMMANDS, facts.commands)
     if skin.units:
         rest += _field(UNITS, _units(facts))
+    if facts.place is not None:
+        rest += _field(PLACE, bytes(facts.place))
     checked = _field(CHECK, struct.pack("<I", zlib.crc32(fixed + rest)))
     packet = Packet()
     packet.push(fixed + _field(STATE, bytes(128 + digit for digit in digits)) + rest + checked + bytes([KIND << 4]))
-    return b"\0" + packet.wire()
+    return b"\0" + packet.wire(after=facts.closing)
 
 
 def _units(facts: Facts) -> bytes:

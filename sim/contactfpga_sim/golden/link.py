@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.faults import Reports, Told, report, slot
 from contactfpga_sim.golden.hello import DIGITS, State, hello
+from contactfpga_sim.golden.turns import Line
 
 
 class Link:
@@ -15,10 +16,17 @@ class Link:
 
     ``told``: what the scan knows of its lines, which must be known up to the cycle of each :meth:`advance`; in the end
     up to that of :meth:`finish`. ``units``: (cycle from which on it waits, packet) of each sweep, the next one of which
-    takes its place.
+    takes its place. ``line``: that it shares with other links; by default it is its own.
     """
 
-    def __init__(self, facts: Facts, state: State, told: Told | None = None, units: Sequence[tuple[int, bytes]] = ()):
+    def __init__(
+        self,
+        facts: Facts,
+        state: State,
+        told: Told | None = None,
+        units: Sequence[tuple[int, bytes]] = (),
+        line: Line | None = None,
+    ):
         self.bytes: list[tuple[int, int]] = []
         """(cycle, value) of every byte handed to the UART so far."""
         self.sent = 0
@@ -43,8 +51,9 @@ class Link:
         """Sweeps that were taken, or replaced by one that was."""
         self._frames_since = 0
         """Frames that went since the last sweep did."""
-        self._idle_from = 0
-        self._uart_from = 0
+        self._line = line or Line(1)
+        self._number = 0 if facts.place is None else facts.place[0]
+        self._line.links[self._number] = self
 
     def want_hello(self, cycle: int) -> None:
         """A hello waits from ``cycle`` on; one hello answers all that wait when it is taken."""
@@ -74,32 +83,37 @@ class Link:
 
     def advance(self, cycle: int) -> None:
         """Let the wire take what it takes up to and including ``cycle``."""
-        while True:
-            due = self._reports.due(cycle) if self._reports and self._idle_from <= cycle else None
-            frame_from = [self._frame[0]] if self._frame else []
-            slot_from = [self._slot[0]] if self._slot else []
-            swept = [self._units[self._swept][0]] if self._swept < len(self._units) else []
-            waits = [*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept]
-            if not waits:
-                return
-            taken = max(self._idle_from, min(waits))
-            if taken > cycle:
-                return
-            if self._hellos and min(self._hellos) <= taken:
-                self._hellos = [wait for wait in self._hellos if wait > taken]
-                self._send_hello(taken)
-            elif due is not None and due <= taken and not self._frame_is_next(taken):
-                self._send_report(taken)
-            elif self._slot and self._slot[0] <= taken and not self._frame_is_next(taken):
-                self._send_slot(taken, self._slot[1])
-            elif not self._frame or self._frame[0] > taken or self._sweep_is_next(taken):
-                self._send_sweep(taken)
-            else:
-                self._frames_since += 1
-                packet = self._frame[1]
-                self._frame = None
-                self.sent += 1
-                self._send(taken, packet)
+        self._line.advance(self._number, cycle)
+
+    def waits_from(self, cycle: int) -> int | None:
+        """The cycle from which on something waits, as far as is known in ``cycle``."""
+        due = self._due(cycle)
+        frame_from = [self._frame[0]] if self._frame else []
+        slot_from = [self._slot[0]] if self._slot else []
+        swept = [self._units[self._swept][0]] if self._swept < len(self._units) else []
+        return min((*self._hellos, *frame_from, *slot_from, *([] if due is None else [due]), *swept), default=None)
+
+    def take(self, taken: int, cycle: int) -> None:
+        """Have the wire take what is next in the cycle ``taken``, as far as is known in ``cycle``."""
+        due = self._due(cycle)
+        if self._hellos and min(self._hellos) <= taken:
+            self._hellos = [wait for wait in self._hellos if wait > taken]
+            self._send_hello(taken)
+        elif due is not None and due <= taken and not self._frame_is_next(taken):
+            self._send_report(taken)
+        elif self._slot and self._slot[0] <= taken and not self._frame_is_next(taken):
+            self._send_slot(taken, self._slot[1])
+        elif not self._frame or self._frame[0] > taken or self._sweep_is_next(taken):
+            self._send_sweep(taken)
+        else:
+            self._frames_since += 1
+            packet = self._frame[1]
+            self._frame = None
+            self.sent += 1
+            self._send(taken, packet)
+
+    def _due(self, cycle: int) -> int | None:
+        return self._reports.due(cycle) if self._reports and self._line.idle_from <= cycle else None
 
     def finish(self, cycle: int) -> None:
         """Let the wire take what it takes up to ``cycle``, and fill in the state of the hellos, now that all is known
@@ -121,8 +135,8 @@ class Link:
         begin = len(self.bytes)
         self._reported.append(begin)
         self._send(taken, report(self._facts))
-        self._after_report = self._idle_from
-        self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._idle_from)
+        self._after_report = self._line.idle_from
+        self._reports.send([cycle for cycle, _ in self.bytes[begin:]], self._line.idle_from)
 
     def _sweep_is_next(self, cycle: int) -> bool:
         """One that waits is, after four frames."""
@@ -142,8 +156,8 @@ class Link:
         begin, self._slot = len(self.bytes), None
         self._send(taken, packet)
         self._slot_over = self.bytes[begin + len(packet) - 5][0] + 1
-        self._after_report = self._idle_from
-        self._reports.pause(self._idle_from)
+        self._after_report = self._line.idle_from
+        self._reports.pause(self._line.idle_from)
 
     def _send_hello(self, taken: int) -> None:
         self._blank.append((len(self.bytes), taken, self.sent))
@@ -160,9 +174,9 @@ class Link:
         self.bytes[begin : begin + len(packet)] = list(zip(cycles, packet, strict=True))
 
     def _send(self, taken: int, packet: bytes) -> None:
-        cycle = max(taken + 2, self._uart_from)
+        cycle = max(taken + 2, self._line.uart_from)
         for value in packet:
             self.bytes.append((cycle, value))
             cycle += self._byte_clocks
-        self._uart_from = cycle
-        self._idle_from = cycle - self._byte_clocks + 1
+        self._line.uart_from = cycle
+        self._line.idle_from = cycle - self._byte_clocks + 1

@@ -22,9 +22,10 @@ class Packet:
             self._plain.append(byte)
         return cycles
 
-    def wire(self, before: bytes = b"") -> bytes:
-        """The packet as it goes over the wire: stuffed, check bytes, delimiter. The check covers ``before`` as well."""
-        stuffed = stuff(bytes(self._plain))
+    def wire(self, before: bytes = b"", after: bytes = b"") -> bytes:
+        """The packet as it goes over the wire: stuffed, then ``after``, check bytes, delimiter. The check covers
+        ``before`` as well."""
+        stuffed = stuff(bytes(self._plain)) + after
         return stuffed + check(stuffed, before) + b"\0"
 
 

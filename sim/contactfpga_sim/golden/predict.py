@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from contactfpga_sim.golden.frame import Items, Packer, Queue, join
 from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.golden.turns import Line
 from contactfpga_sim.golden.work import Departure
 
 if TYPE_CHECKING:
@@ -22,30 +24,59 @@ if TYPE_CHECKING:
 
 def predict(skin: Skin, timeline: Timeline, cycles: int) -> Trace:
     """What a board built from ``skin`` does in cycles 0 to ``cycles`` - 1, by the rules of docs/timing.md."""
-    trace, link, _ = _play(skin, timeline, cycles)
+    trace, link, _ = _play(facts(skin), timeline, cycles)
     trace.bytes = link.bytes
     trace.line = uart.line(link.bytes, facts(skin).bit_clocks)
     return trace.until(cycles)
 
 
+def predict_several(skins: Sequence[Skin], timelines: Sequence[Timeline], cycles: int) -> list[Trace]:
+    """The same for sheets at one FPGA, a trace for each; ``line`` and ``contact`` of each are those that they share.
+
+    What is received is the same in all timelines. Each sheet is played in a thread of its own, which waits for the
+    others where it shares the line with them.
+    """
+    known = [Facts(skin, (number, len(skins))) for number, skin in enumerate(skins)]
+    line = Line(len(skins))
+    with ThreadPoolExecutor(len(skins)) as pool:
+        plays = [pool.submit(_play_one, line, *one, cycles) for one in zip(known, timelines, strict=True)]
+        played = [play.result() for play in plays]
+    sent = uart.line(sorted(byte for _, link in played for byte in link.bytes), known[0].bit_clocks)
+    contact: list[tuple[int, int]] = []
+    for trace, link in played:
+        trace.bytes, trace.line = link.bytes, sent
+        contact = safe.either(contact, trace.contact)
+    for trace, _ in played:
+        trace.contact = contact
+    return [trace.until(cycles) for trace, _ in played]
+
+
+def _play_one(line: Line, known: Facts, timeline: Timeline, cycles: int) -> tuple[Trace, Link]:
+    assert known.place is not None
+    try:
+        return _play(known, timeline, cycles, line)[:2]
+    finally:
+        line.leave(known.place[0])
+
+
 def driven(skin: Skin, timeline: Timeline, cycles: int) -> list[tuple[int, int]]:
     """(cycle, rows) of every change of the rows that are driven in cycles 0 to ``cycles`` - 1; bit r is row r."""
-    return [change for change in _play(skin, timeline, cycles)[2].driven if change[0] < cycles]
+    return [change for change in _play(facts(skin), timeline, cycles)[2].driven if change[0] < cycles]
 
 
 def beginnings(skin: Skin, timeline: Timeline, cycles: int) -> list[int]:
     """Cycles in which a frame begins, up to ``cycles`` and one beyond."""
-    return _play(skin, timeline, cycles)[2].beginnings
+    return _play(facts(skin), timeline, cycles)[2].beginnings
 
 
-def _play(skin: Skin, timeline: Timeline, cycles: int) -> tuple[Trace, Link, scan.Scanned]:
-    known = facts(skin)
-    heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands))
+def _play(known: Facts, timeline: Timeline, cycles: int, line: Line | None = None) -> tuple[Trace, Link, scan.Scanned]:
+    skin = known.skin
+    heard = request.heard(timeline.received, known.bit_clocks, bool(known.commands), known.closing)
     trace = Trace(cycles)
     frames: list[scan.Scan] = []
     told = Told()
     pressed = units.play(known, timeline, heard.requests, cycles)
-    link = Link(known, State(known, frames, heard), told, pressed.packets)
+    link = Link(known, State(known, frames, heard), told, pressed.packets, line)
     half_second = 2**19 * known.clocks_per_us
     timed = range(half_second + 1, cycles, half_second) if known.scan.waits else ()
     for cycle in (0, *timed, *(one.cycle + 1 for one in heard.requests if one.hello)):

@@ -40,9 +40,12 @@ class Heard:
         return self.numbers[index - 1][1] if index else 0
 
 
-def request(number: int, hello: bool = False, bit_clocks: int = 4) -> bytes:
-    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit."""
-    return _sent(_digits(number, 3) + bytes([KIND << 4 | hello]), bit_clocks)
+def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"") -> bytes:
+    """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
+
+    ``closing``: that of the sheet, among several ones, that it is for.
+    """
+    return _sent(_digits(number, 3) + bytes([KIND << 4 | hello]), bit_clocks, closing)
 
 
 def command(number: int, what: int, value: int = 0, hello: bool = False, bit_clocks: int = 4) -> bytes:
@@ -55,10 +58,10 @@ def _digits(value: int, count: int) -> bytes:
     return bytes(128 + value // 128**place % 128 for place in range(count))
 
 
-def _sent(plain: bytes, bit_clocks: int) -> bytes:
+def _sent(plain: bytes, bit_clocks: int, closing: bytes = b"") -> bytes:
     packet = Packet()
     packet.push(plain)
-    data = b"\0" + packet.wire()
+    data = b"\0" + packet.wire(after=closing)
     return pulses(data) if uart.pulsed(bit_clocks) else data
 
 
@@ -83,9 +86,11 @@ def requests(cycles: Iterable[int], bit_clocks: int) -> list[tuple[int, bytes]]:
     return sent
 
 
-def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False) -> Heard:
+def heard(
+    received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool = False, closing: bytes = b""
+) -> Heard:
     """Requests, and on a board that takes them ``commands``, among (cycle, bytes), each of which begin at the pin back
-    to back in that cycle."""
+    to back in that cycle; ``closing``: of those for this one of several sheets."""
     found = Heard([], [])
     packet: list[int] | None = None  # bytes since the last delimiter
     for byte in uart.received(received, bit_clocks):
@@ -95,7 +100,7 @@ def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool
         if byte.value is None:
             packet = None
         elif byte.value == 0:
-            if packet is not None and (one := _read(packet, byte.stop, commands)) is not None:
+            if packet is not None and (one := _read(packet, byte.stop, commands, closing)) is not None:
                 found.requests.append(one)
                 found.numbers.append((byte.stop + 1, one.number))
             packet = []
@@ -104,13 +109,16 @@ def heard(received: Iterable[tuple[int, bytes]], bit_clocks: int, commands: bool
     return found
 
 
-def _read(packet: list[int], cycle: int, commands: bool) -> Request | None:
+def _read(packet: list[int], cycle: int, commands: bool, closing: bytes) -> Request | None:
     """The request that a packet is, if it is one. Where there are commands, bit 3 of the first byte tells them."""
     is_command = commands and packet[:1] != [] and bool(packet[0] & 8)
     stuffed, kind = (9, COMMAND_KIND) if is_command else (5, KIND)
-    if len(packet) != stuffed + _CHECK_BYTES or packet[stuffed - 1] >> 4 != kind:
+    checked = stuffed + len(closing)
+    if len(packet) != checked + _CHECK_BYTES or packet[stuffed - 1] >> 4 != kind:
         return None
-    wanted, got = check(bytes(packet[:stuffed])), packet[stuffed:]
+    if bytes(packet[stuffed:checked]) != closing:
+        return None
+    wanted, got = check(bytes(packet[:checked])), packet[checked:]
     if (got[0] ^ wanted[0]) % 128 or (got[1] ^ wanted[1]) % 128 or (got[2] ^ wanted[2]) % 4:
         return None
     what = (packet[4] % 128, _number(packet[5:8])) if is_command else None

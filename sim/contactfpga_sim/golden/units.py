@@ -48,7 +48,7 @@ class ConverterRule:
     """From the selection to the edge at which the last bit is taken."""
 
     def level(self, facts: Facts) -> int:
-        """Clocks of a level."""
+        """Clocks of a level of the SPI clock."""
         fastest = max(hz for volts, hz in self.supplies if volts <= facts.skin.converter_v)
         by_rate = Fraction(facts.skin.clock_hz, 2 * fastest)
         by_level = Fraction(self.least_level_ns * facts.skin.clock_hz, 10**9)
@@ -60,7 +60,7 @@ class ConverterRule:
         return between, between * facts.skin.units
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
-        """Those that begin before ``cycles``."""
+        """The sweeps that begin before ``cycles``."""
         level, begin = self.level(facts), self.first(facts)
         while begin < cycles:
             sweep = []
@@ -102,10 +102,10 @@ class PacedRule:
         return 0, 2 * self.periods * self.pace(facts)
 
     def sweeps(self, facts: Facts, cycles: int) -> Iterator[list[Taken]]:
-        """The first conversion is left out; the n-th is that of what was there one and a half periods before."""
+        """The first two conversions are left out; the n-th is that of what was there one and a half periods before."""
         whole, pace, level = self.spans(facts)[1], self.pace(facts), self.level(facts)
         late_us = round(1.5e6 * whole / facts.skin.clock_hz)
-        ready = 2 * whole - pace
+        ready = 3 * whole - pace
         while ready < cycles:
             time_us = (ready + 3) // facts.clocks_per_us - late_us
             sampled = ready - 3 * whole // 2

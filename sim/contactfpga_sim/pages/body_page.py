@@ -32,7 +32,7 @@ SWEEPS = (1, 2, 5, 10)
 
 def outages_table() -> str:
     """What becomes of a link."""
-    rows = [("fault", "states of the link", "told after, s", "ok again after, s")]
+    rows = [("fault", "states of the link", "reported after, s", "ok again after, s")]
     with tempfile.TemporaryDirectory() as folder:
         for outage in outages.OUTAGES:
             seen = outages.play(outage, Path(folder))

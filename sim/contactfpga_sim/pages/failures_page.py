@@ -52,7 +52,7 @@ def says(study: Study, turned: Turned) -> str:
     return "; ".join(parts)
 
 
-UNNOTICED = ("knob", "where", "why nothing tells")
+UNNOTICED = ("knob", "where", "why nothing reports it")
 
 
 def unnoticed(turned: Mapping[str, Mapping[str, Turned]]) -> str:

@@ -16,10 +16,12 @@ DESIGNS = (
     "flips",
     "silently wrong, 95 %",
     "wrong for, ms: median / longest",
-    "told",
+    "reported",
 )
-MODULES = ("module", "flips", "silently wrong", "told", "masked", "registers silently wrong")
+MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
+OUTCOMES = {"silent": "silently wrong", "told": "reported"}
+"""In words."""
 
 
 def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
@@ -75,11 +77,11 @@ def modules_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
 
 
 def ways_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
-    """What is wrong, or tells, with each design."""
+    """What is wrong with each design, or reports the flip."""
     lines = []
     for design in designs:
         some = [row for row in rows if row.design == design.name and row.found.outcome != "masked"]
         for way, hits in summary.by(some, lambda row: f"{row.found.outcome}|{row.found.kind}").items():
             outcome, kind = way.split("|")
-            lines.append(writer.line((f"`{design.name}`", outcome, kind, str(len(hits)))))
+            lines.append(writer.line((f"`{design.name}`", OUTCOMES[outcome], kind, str(len(hits)))))
     return writer.table(KINDS, lines)

@@ -13,20 +13,22 @@ from contactfpga import picture_style as style
 from contactfpga_sim.pages import failures_page, writer
 from contactfpga_sim.studies.failures import knob_pictures
 from contactfpga_sim.studies.failures.knob import Turned
-from contactfpga_sim.studies.haptics import breaks, felt
+from contactfpga_sim.studies.haptics import breaks, felt, pairs
 from contactfpga_sim.studies.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
 
 CONTACTS = 100
-"""Of each line; `make campaign` presses 1,000."""
+"""Of each line; `make campaign` presses 1,000 in all."""
 
+LIMITS = 1000
+"""Pairs that tell what limits them."""
 APART_MM = (30.0, 60.0, 100.0)
 SHOWN_S = (0.5e-3, 2e-3, 8e-3, 15e-3)
 
 
 @functools.cache
-def found(setting: Setting, count: int = CONTACTS) -> dict[str, np.ndarray]:
+def found(setting: Setting, count: int = CONTACTS, times_s: tuple[float, ...] = TIMES_S) -> dict[str, np.ndarray]:
     """(contacts, times) errors in m of each method."""
-    each = [felt.errors(setting, seed) for seed in range(count)]
+    each = [felt.errors(setting, seed, times_s) for seed in range(count)]
     return {method: np.array([one[method] for one in each]) for method in METHODS}
 
 
@@ -62,6 +64,15 @@ def pairs_table() -> str:
     return writer.table_of(rows)
 
 
+def limits_table() -> str:
+    """What limits the forces of two fingers."""
+    rows = [["how fingers are located", "error of a push", "95 % interval"]]
+    for method, errors in pairs.errors(60.0, LIMITS).items():
+        middle, low, high = interval(errors)
+        rows.append([method, f"{middle:.2f} N", f"{low:.2f} to {high:.2f} N"])
+    return writer.table_of(rows)
+
+
 @functools.cache
 def turned() -> dict[str, dict[str, Turned]]:
     """Every break."""
@@ -84,6 +95,7 @@ def breaks_pictures() -> str:
 TABLES: writer.Tables = {
     "felt": felt_table,
     "pairs": pairs_table,
+    "limits": limits_table,
     "breaks": breaks_table,
     "breakpictures": breaks_pictures,
 }

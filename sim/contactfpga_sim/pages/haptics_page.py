@@ -61,7 +61,7 @@ def places_table() -> str:
 
 def wrong_table() -> str:
     """The same where they do not."""
-    rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "says so"]]
+    rows = [["method", "what it does not know", "error", "the barycenter's", "stated radius", "covers", "reports it"]]
     for case in coverage.WRONG:
         found = coverage.run(case, CONTACTS)
         lengths = [f"{1e3 * one:.2f} mm" for one in (found.rms_m, found.barycenter_m, found.radius_m)]

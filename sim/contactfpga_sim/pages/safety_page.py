@@ -22,13 +22,20 @@ OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "`guard`, `alive` and a deadline": ("guarded", ("flags", "deadline", "alive")),
     "these and `self_test`": ("guarded", ("flags", "deadline", "alive", start.HOST)),
 }
-"""Options with the Skin and with what tells a fault."""
+"""Options with the Skin and with what reports a fault."""
 NAMES = {"flags": "the frame's flag", "deadline": "no frame", "alive": "`alive` stops"}
 
 
 def faults_table() -> str:
-    """Each fault with what tells it, how fast, and what was wrong before."""
-    head = ["fault", "what it does unnoticed", "told by", "after, at most", "`contact` after", "frames wrong before"]
+    """Each fault with what reports it, how fast, and what was wrong before."""
+    head = [
+        "fault",
+        "what it does unnoticed",
+        "reported by",
+        "after, at most",
+        "`contact` after",
+        "frames wrong before",
+    ]
     rows = [[*head, "without options", "what is left to do"]]
     for name, fault in FAULTS.items():
         guarded, plain = _harmful("guarded", name), _harmful("plain", name)
@@ -48,8 +55,8 @@ def faults_table() -> str:
 
 
 def coverage_table() -> str:
-    """Told faults of the listed ones, with and without each option."""
-    rows = [["options", "faults told at every place", "diagnostic coverage", "places told"]]
+    """Reported faults of the listed ones, with and without each option."""
+    rows = [["options", "faults reported at every place", "diagnostic coverage", "places reported"]]
     for name, (skin, channels) in OPTIONS.items():
         counts = [_told(skin, fault, channels) for fault in FAULTS]
         whole = sum(told == of for told, of in counts)
@@ -85,9 +92,9 @@ def _is_told(places: list[Place]) -> bool:
 
 
 def _told_by(places: list[Place], host: str) -> str:
-    """What tells it, at all places or at some."""
+    """What reports it, at all places or at some."""
     if not any(_channels(place) for place in places):
-        return f"**not told** by a scan; meant for `{host}`" if host else "**not told**"
+        return f"**not reported** by a scan; meant for `{host}`" if host else "**not reported**"
     words = dict.fromkeys(_general(word) for place in places for word in place.words)
     names = NAMES | {"flags": f"{NAMES['flags']} ({', '.join(words)})"}
     said = [names[channel] for channel in NAMES if any(channel in _channels(place) for place in places)]
@@ -96,7 +103,7 @@ def _told_by(places: list[Place], host: str) -> str:
 
 
 def _tested(fault: str) -> str:
-    """What the self-test at power-up tells of it."""
+    """What the self-test at power-up reports of it."""
     times = [us for us in start.found(fault).values() if us is not None]
     of = len(start.found(fault))
     share = "" if len(times) == of else f" at {len(times)} of {of} places"
@@ -111,7 +118,7 @@ def _general(word: str) -> str:
 def _count(places: list[Place], channels: tuple[str, ...]) -> str:
     told = sum(any(place.us(channel) is not None for channel in channels) for place in places)
     if told in (0, len(places)):
-        return "told" if told else "not told"
+        return "reported" if told else "not reported"
     return f"{told} of {len(places)}"
 
 
@@ -125,7 +132,7 @@ def _after(places: list[Place], channels: tuple[str, ...]) -> str:
 def times_table() -> str:
     """What the study waits for."""
     rows = [["wait", "for"]]
-    rows.append([f"{trial.LONGEST_US:,} µs", "a fault that is not told until then counts as not told"])
+    rows.append([f"{trial.LONGEST_US:,} µs", "a fault that is not reported until then counts as not reported"])
     rows.append([f"{trial.QUIET_US:,} µs", "the watchdog's time without an edge of `alive`"])
     rows.append([f"{trial.DEADLINE_US:,} µs", "the host's deadline for a frame"])
     rows.append([f"{trial.STEP_US} µs", "the grid of the times"])

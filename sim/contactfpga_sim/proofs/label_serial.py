@@ -7,13 +7,14 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
-from contactfpga_hdl.payloads import moments_layout
+from contactfpga_hdl.payloads import zone_layout
 from contactfpga_sim.proofs.bugs import Bug
 from contactfpga_sim.proofs.case import Case
 from contactfpga_sim.proofs.inside import Inside
 from contactfpga_sim.proofs.label import rows_into, skin_of
 from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.zones import OpenRow, next_row, open_rows_agree
+from contactfpga_sim.proofs.turned import TurnedRow, empty_row, next_row, turned_rows_agree, turns_are_known
+from contactfpga_sim.proofs.zones import OpenRow, open_rows_agree
 
 
 def _skin(rows: int, columns: int, connectivity: int, closed: bool) -> Skin:
@@ -67,7 +68,7 @@ def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: i
     """Free: any rows at any time. Assumed: records are taken as they come.
 
     Claimed: when a row can be taken, the zones that end with the one before have left, each once, and after a last row
-    one end mark; that is so after C + e + 2 clocks at most.
+    one end mark; that is so after C + e + 2 clocks at most, or where the ends meet after two more.
     """
     _labeller(proof, columns, connectivity, rows, closed, proof.claim)
 
@@ -81,16 +82,15 @@ def _labeller(
     inside = proof.put(dut)
     valid, cells, last = rows_into(proof, dut)
     m.d.comb += dut.records.ready.eq(1)
-    moments = moments_layout(dut.derived).size  # they come first in records and words
-    wanted = proof.chosen(moments, "wanted")
+    wanted = proof.chosen(zone_layout(dut.derived).size, "wanted")
     handed, record = valid & dut.rows.ready, dut.records.payload
 
     y = Signal(range(rows))
-    open_row = OpenRow(dut.derived, "open")
+    open_row = empty_row(dut.derived)
     after, ended = next_row(m, dut.derived, open_row, cells, last, y, wanted)
     expected, expected_end = Signal(range(2 * columns + 1)), Signal()
     seen, seen_ends = Signal(range(2 * columns + 1)), Signal(range(2 * columns + 1))
-    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value()[:moments] == wanted))
+    seen_now = seen + (dut.records.valid & ~record.end & (record.zone.as_value() == wanted))
     ends_now = seen_ends + (dut.records.valid & record.end)
     longest = columns + dut.derived.open_zones + 2 + 2 * closed
     age = Signal(range(longest + 2), init=longest)
@@ -106,6 +106,8 @@ def _labeller(
         _at_rest(proof, dut, inside, open_row)
         proof.lemma(Mux(inside["last"], 0, inside["y"] + 1)[: len(y)] == y)
     open_rows_agree(proof, open_row)
+    if isinstance(open_row, TurnedRow):
+        turned_rows_agree(proof, open_row)
     place_bits = len(inside["first"])
     for place in range(dut.derived.open_zones, 2 << place_bits):
         proof.lemma((place < 1 << place_bits) | (inside.word("groups", place) == 0))
@@ -129,10 +131,16 @@ def _at_rest(proof: Proof, dut: SerialLabeller, inside: Inside, open_row: OpenRo
             of_zone = open_row.moments[x].as_value()
             proof.lemma(word[: len(of_zone)] == of_zone)
             proof.lemma(~word[moments])  # has_run
+        if isinstance(open_row, TurnedRow):
+            with proof.m.If(starts[x]):
+                linked = inside.word("linked_runs", place)
+                turns_are_known(proof, open_row, x, inside.word("groups", place), linked)
     proof.lemma(inside["before"] == open_row.cells << 1)
     proof.lemma((inside["cells"] == 0) & ~inside["cell_left"] & ~inside["before_left"])
     proof.lemma(~inside["active"] & ~inside["tail"] & ~inside["second"])
     proof.lemma(inside["whole"] & ~inside["has_run"] & (inside["moments"] == 0))
+    if derived.skin.closed:
+        proof.lemma(~inside["at_seam"])
     found = Value.cast(inside.part("groups").read_ports[0].data)
     started = proof.before(Const(1))  # at power-up it is not known what the memory reads
     proof.lemma(~started | (found == 0))
@@ -180,6 +188,11 @@ _BUGS = (
 )  # fmt: skip
 
 
+_CLOSED_BUGS = (
+    Bug("the seam is forgotten in a last row", SerialLabeller, "meets",
+        lambda meets, inside: meets & ~inside["last"]),
+    Bug("the seam is no turn", SerialLabeller, "turn_now", lambda *_: 0),
+)  # fmt: skip
 _OVERFLOW_BUGS = (
     Bug("always in the first place", SerialLabeller, "write__addr", lambda *_: 0),
     Bug("a place is read again", SerialLabeller, "wanted",
@@ -206,9 +219,13 @@ CASES = (
     _case(records_are_the_zones, 2, 4, 11),
     _case(records_are_the_zones, 3, 8, 12, bugs=_BUGS, bug_clocks=14),
     _case(records_are_the_zones, 3, 4, 14, campaign=True),
+    _case(records_are_the_zones, 3, 8, 11, rows=2, closed=True, campaign=True, bugs=_CLOSED_BUGS, bug_clocks=14),
+    _case(records_are_the_zones, 3, 4, 13, rows=2, closed=True, campaign=True),
     _case(nothing_overflows, 1, 8, 8),
     _case(nothing_overflows, 2, 4, 11),
     _case(nothing_overflows, 3, 8, 12, bugs=_OVERFLOW_BUGS, bug_clocks=17),
+    _case(nothing_overflows, 3, 8, 11, rows=2, closed=True, campaign=True),
+    _case(nothing_overflows, 3, 4, 12, rows=2, closed=True, campaign=True),
     _case(stalls_change_nothing, 8, 8, 2, bugs=_STALL_BUGS, bug_clocks=16),
     _case(stalls_change_nothing, 8, 4, 2),
     _case(stalls_change_nothing, 8, 4, 2, closed=True),

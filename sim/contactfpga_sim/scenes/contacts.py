@@ -53,6 +53,18 @@ class Swing:
         return self.middle + self.reach * math.cos(2 * math.pi * self.hertz * seconds + self.phase_rad)
 
 
+@dataclasses.dataclass(frozen=True)
+class Round:
+    """A value that runs from ``start`` over ``length`` and begins again, ``hertz`` times per second."""
+
+    start: float
+    length: float
+    hertz: float
+
+    def __call__(self, seconds: float) -> float:
+        return self.start + self.length * (self.hertz * seconds % 1.0)
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Contact:
     """One thing that touches the sheet while its force is above 0."""

@@ -13,6 +13,8 @@ from rich.text import Text
 from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
+from contactfpga_sim.golden import cylinder
 from contactfpga_sim.golden.zones import flood
 
 COLORS = style.PALETTE[:6]
@@ -24,6 +26,8 @@ ACROSS = 4
 class Drawn(Protocol):
     """What a drawing needs of a scene."""
 
+    @property
+    def skin(self) -> Skin: ...
     @property
     def scene(self) -> str: ...
     @property
@@ -38,7 +42,7 @@ def in_terminal(outcomes: Sequence[Drawn], unicode: bool = True) -> Columns:
 
 
 def _sheet(out: Drawn, unicode: bool) -> Text:
-    labels, _ = flood(out.cells, 8)
+    labels = _labels(out)
     count = out.frame.zones if out.frame else 0
     text = Text(f"{out.scene}: {count} zone{'' if count == 1 else 's'}\n")
     for pieces in _halves(labels) if unicode else _ascii(labels):
@@ -46,6 +50,11 @@ def _sheet(out: Drawn, unicode: bool) -> Text:
             text.append(character, style=look)
         text.append("\n")
     return text
+
+
+def _labels(out: Drawn) -> np.ndarray:
+    find = cylinder.flood if out.skin.closed else flood
+    return find(out.cells, out.skin.connectivity)[0]
 
 
 Pieces = Iterator[tuple[str, str]]
@@ -75,15 +84,15 @@ def _style(above: int, below: int) -> str:
     return colors[0] if len(set(colors)) == 1 else f"{colors[0]} on {colors[1]}"
 
 
-def to_file(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
+def to_file(outcomes: Sequence[Drawn], path: Path) -> None:
     """A panel a scene: its cells in the colors of their zones, and the barycenters that came over the wire."""
     import matplotlib
 
     with matplotlib.rc_context(style.SETTINGS):
-        _save(outcomes, skin, path)
+        _save(outcomes, path)
 
 
-def _save(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
+def _save(outcomes: Sequence[Drawn], path: Path) -> None:
     from matplotlib.colors import to_rgb
 
     palette = np.array([to_rgb(color) for color in (style.SHEET, *COLORS)])
@@ -92,20 +101,20 @@ def _save(outcomes: Sequence[Drawn], skin: Skin, path: Path) -> None:
     panels = figure.subplots(down, ACROSS, squeeze=False)
     for panel in panels.flat:
         panel.axis("off")
-    half_x, half_y = skin.pitch_x_mm / 2, skin.pitch_y_mm / 2
-    extent = (
-        *(-half_x, (skin.columns - 1) * skin.pitch_x_mm + half_x),
-        *((skin.rows - 1) * skin.pitch_y_mm + half_y, -half_y),
-    )
     for panel, out in zip(panels.flat, outcomes):
-        labels, _ = flood(out.cells, skin.connectivity)
+        labels = _labels(out)
         shown = np.where(labels > 0, (labels - 1) % len(COLORS) + 1, 0)
-        panel.imshow(palette[shown], extent=extent, interpolation="nearest")
-        if out.frame is not None and len(out.frame.moments):
-            area, sum_x, sum_y = out.frame.moments.T[:3]
-            x_mm, y_mm = sum_x * skin.pitch_x_mm / area, sum_y * skin.pitch_y_mm / area
-            panel.plot(x_mm, y_mm, "k+", markersize=7, markeredgewidth=1.4)
+        panel.imshow(palette[shown], extent=_extent(out.skin), interpolation="nearest")
+        if out.frame is not None:
+            zones = Zones(out.frame, out.skin.sheet).array
+            panel.plot(zones["x_mm"], zones["y_mm"], "k+", markersize=7, markeredgewidth=1.4)
         panel.set_title(out.scene, fontsize=style.SMALL)
     figure.suptitle("Contact zones and their barycenters (+), as they came over the wire", fontsize=style.LARGE)
     path.parent.mkdir(parents=True, exist_ok=True)
     style.save(figure, path)
+
+
+def _extent(skin: Skin) -> tuple[float, float, float, float]:
+    half_x, half_y = skin.pitch_x_mm / 2, skin.pitch_y_mm / 2
+    right, bottom = (skin.columns - 1) * skin.pitch_x_mm + half_x, (skin.rows - 1) * skin.pitch_y_mm + half_y
+    return -half_x, right, bottom, -half_y

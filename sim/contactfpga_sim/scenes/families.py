@@ -131,7 +131,8 @@ def place(rng: Random, skin: Skin, shape: Shape) -> tuple[float, float]:
     """Where in mm the shape's origin lies when the shape is anywhere on the sheet."""
     left, right, top, bottom = sheet(skin)
     boxes = [(part.x_m, part.y_m, *part.half_box_m) for part in shape]
-    x = _along(rng, left, right, [(x - half, x + half) for x, _, half, _ in boxes], skin.pitch_x_mm)
+    ends = [(0.0, 0.0)] if skin.closed else [(x - half, x + half) for x, _, half, _ in boxes]  # it may lie on the seam
+    x = _along(rng, left, right, ends, skin.pitch_x_mm)
     y = _along(rng, top, bottom, [(y - half, y + half) for _, y, _, half in boxes], skin.pitch_y_mm)
     return x, y
 

@@ -8,9 +8,11 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes.contacts import Contact, M, Shape, Track, Value
+from contactfpga_sim.scenes.cylinder import on_all_turns
 from contactfpga_sim.scenes.families import TRIES, Random, place
 from contactfpga_sim.scenes.file import Kind, Range, SceneFile, SceneFileError
-from contactfpga_sim.scenes.scene import Scene, sheet
+from contactfpga_sim.scenes.scene import Scene, around_m, sheet
+from contactfpga_sim.scenes.truth import Box, widths
 
 DIRECTIONS = 128
 """In which the distance of two shapes is looked for; it comes out short by at most 0.03 % of their size."""
@@ -45,7 +47,7 @@ def _apart(rng: Random, file: SceneFile, skin: Skin) -> tuple[Contact, ...] | No
             for _ in range(PLACES):
                 contact = _drawn(rng, file, kind, skin)
                 begin = _start(contact)
-                if file.gap_mm is None or all(distance_mm(begin, other) >= file.gap_mm for other, _ in placed):
+                if file.gap_mm is None or all(_gap_mm(begin, other, skin) >= file.gap_mm for other, _ in placed):
                     placed.append((begin, contact))
                     break
             else:
@@ -90,6 +92,15 @@ def _along(
         return Track(given.seconds, tuple(edge + value for value in given.values))
     start = anywhere if given is None else edge + given.draw(rng)
     return Track((0.0, seconds), (start, start + speed * seconds)) if speed and seconds else start
+
+
+def _gap_mm(one: Shape, other: Shape, skin: Skin) -> float:
+    """How far two shapes are apart on the sheet, around a closed one either way."""
+    if skin.closed:
+        around = around_m(skin)
+        ends = [end for part in one for end in widths(part, Box())]
+        other = tuple(on_all_turns(other, Box(min(ends) - around, max(ends) + around), around))
+    return distance_mm(one, other)
 
 
 def distance_mm(one: Shape, other: Shape) -> float:

@@ -15,7 +15,8 @@ import numpy as np
 from contactfpga.cover import Cover, Load
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import cells, contacts
-from contactfpga_sim.scenes.contacts import Contact, Swing
+from contactfpga_sim.scenes.contacts import Contact, Round, Swing
+from contactfpga_sim.scenes.cylinder import all_loads, truth_around
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.scenes.shapes import SHAPES
 from contactfpga_sim.scenes.truth import Box, Truth, truth_of
@@ -32,7 +33,8 @@ FOOT_MM = 260.0
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """Contacts over time. On a cylinder places are those on the sheet laid flat, and the cover counts as flat."""
+    """Contacts over time. On a cylinder places are those on the sheet laid flat, and the cover counts as flat. Around a
+    closed sheet they are counted on: a contact that reaches past one end also lies at the other."""
 
     contacts: tuple[Contact, ...]
 
@@ -44,16 +46,21 @@ class Scene:
     def truth(self, seconds: float, skin: Skin | None = None) -> Truth:
         """Number of contacts, areas in mm2 and barycenters in mm at that time, from the continuous shapes: parts that
         overlap or touch are one contact. With a Skin, of what lies on its sheet, which ends half a pitch beyond the
-        outermost switches."""
+        outermost switches, or where it is closed meets itself there."""
         parts = [part for load in self.loads(seconds) for part in load.parts]
-        return truth_of(parts, Box() if skin is None else sheet(skin))
+        if skin is None:
+            return truth_of(parts)
+        return truth_around(parts, sheet(skin), around_m(skin)) if skin.closed else truth_of(parts, sheet(skin))
 
     def pressed(self, seconds: float, skin: Skin, cover: Cover | None = None) -> np.ndarray:
         """(rows, columns) bool: the switches that are closed at that time. ``cover``: where there
         is none, those that lie under a contact. ``skin.mask`` plays no part, it is the gateware's."""
         x = np.arange(skin.columns) * skin.pitch_x_mm * contacts.M
         y = np.arange(skin.rows) * skin.pitch_y_mm * contacts.M
-        return (cover or Cover()).closed(self.loads(seconds), x, y[:, None])
+        loads = self.loads(seconds)
+        if skin.closed:
+            loads = all_loads(loads, sheet(skin).left, around_m(skin))
+        return (cover or Cover()).closed(loads, x, y[:, None])
 
     def on(self, skin: Skin, cover: Cover | None = None) -> CellsAt:
         """:meth:`pressed` on this sheet as a function of time."""
@@ -67,6 +74,11 @@ def sheet(skin: Skin) -> Box:
     """The sheet laid flat, in m: half a pitch more than the outermost switches on every side."""
     x, y = skin.pitch_x_mm * contacts.M, skin.pitch_y_mm * contacts.M
     return Box(-x / 2, (skin.columns - 0.5) * x, -y / 2, (skin.rows - 0.5) * y)
+
+
+def around_m(skin: Skin) -> float:
+    """Length of the sheet along its columns, which is the circumference of a closed one, in m."""
+    return skin.columns * skin.pitch_x_mm * contacts.M
 
 
 def _extent(skin: Skin) -> tuple[float, float]:
@@ -131,12 +143,33 @@ def nothing(skin: Skin) -> Scene:
     return Scene(())
 
 
+def around(skin: Skin) -> Scene:
+    """A fingertip that moves around the limb of a closed sheet twice per second, over the seam at first; on an open
+    sheet it leaves at the last column and comes back at the first."""
+    _, height = _extent(skin)
+    start = -skin.pitch_x_mm / 2
+    x = Round(start, skin.columns * skin.pitch_x_mm, 2.0)
+    return Scene((Contact(shape=contacts.disc(FINGER_MM), x_mm=x, y_mm=height / 2),))
+
+
+def grip(skin: Skin) -> Scene:
+    """A hand that grips the limb of a closed sheet all the way round; on an open sheet, a bar across all columns."""
+    width, height = _extent(skin)
+    shape = contacts.edge(width + 2 * skin.pitch_x_mm, max(1.1 * skin.pitch_y_mm, 0.3 * height))
+    return Scene((Contact(shape=shape, x_mm=width / 2, y_mm=height / 2, force_n=60.0),))
+
+
 CONTACTS: dict[str, Callable[[Skin], Scene]] = {
     scene.__name__: scene for scene in (fingertip, two_fingers, palm, sole, edge, moving, pushing, nothing)
 }
-"""Every contact scene by its name."""
+"""Every contact scene for any sheet by its name."""
 
-NAMES = (*CONTACTS, *SHAPES)
+AROUND: dict[str, Callable[[Skin], Scene]] = {scene.__name__: scene for scene in (around, grip)}
+"""Those for sheets whose ends meet."""
+
+_BY_NAME = CONTACTS | AROUND
+
+NAMES = (*_BY_NAME, *SHAPES)
 """All that :func:`scene` knows by name: contacts, and the shapes that break labellers."""
 
 Source = str | Path | np.ndarray | Scene | Recording | CellsAt | None
@@ -162,8 +195,8 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
     if callable(source):
         return _checked(skin, source)
     name = str(source)
-    if name in CONTACTS:
-        return CONTACTS[name](skin).on(skin, cover)
+    if name in _BY_NAME:
+        return _BY_NAME[name](skin).on(skin, cover)
     if name in SHAPES:
         shape = SHAPES[name](skin.rows, skin.columns)
         return lambda seconds: shape
@@ -178,7 +211,7 @@ def contacts_of(skin: Skin, source: Source) -> Scene | None:
         return source
     if source is None:
         source = "fingertip"
-    return CONTACTS[source](skin) if isinstance(source, str) and source in CONTACTS else None
+    return _BY_NAME[source](skin) if isinstance(source, str) and source in _BY_NAME else None
 
 
 def _checked(skin: Skin, callback: CellsAt) -> CellsAt:

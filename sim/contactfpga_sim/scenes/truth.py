@@ -13,7 +13,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ class TrueContact(NamedTuple):
 
     area_mm2: float
     x_mm: float
-    """Barycenter along the columns; column 0 lies at 0."""
+    """Barycenter along the columns; column 0 lies at 0. NaN if the contact goes all the way round a closed sheet."""
     y_mm: float
     """Barycenter along the rows; row 0 lies at 0."""
 
@@ -68,12 +68,13 @@ class Box(NamedTuple):
 
 def truth_of(parts: Sequence[Part], box: Box = Box()) -> Truth:  # noqa: B008, a tuple that cannot change
     """The contacts that these parts make, as far as they lie in the box."""
-    inside = [part for part in parts if _inside(part, box)]
-    found = []
-    for group in _groups(inside, box):
-        area, x, y = _measured(group, box)
-        if area > 0:
-            found.append(TrueContact(area * 1e6, x * 1e3, y * 1e3))
+    groups = _groups([part for part in parts if lies_in(part, box)], box)
+    return in_order(measured(group, box) for group in groups)
+
+
+def in_order(contacts: Iterable[tuple[float, float, float]]) -> Truth:
+    """The truth of contacts with these areas in m2 and barycenters in m."""
+    found = [TrueContact(area * 1e6, x * 1e3, y * 1e3) for area, x, y in contacts if area > 0]
     return Truth(tuple(sorted(found, key=lambda one: (one.y_mm, one.x_mm, one.area_mm2))))
 
 
@@ -82,26 +83,28 @@ def _heights(part: Part, box: Box) -> tuple[float, float]:
     return max(part.y_m - half, box.top), min(part.y_m + half, box.bottom)
 
 
-def _widths(part: Part, box: Box) -> tuple[float, float]:
+def widths(part: Part, box: Box) -> tuple[float, float]:
+    """Where it begins and ends along the columns, in m."""
     half = part.half_box_m[0]
     return max(part.x_m - half, box.left), min(part.x_m + half, box.right)
 
 
-def _inside(part: Part, box: Box) -> bool:
-    return _distance([part], box) < 0
+def lies_in(part: Part, box: Box) -> bool:
+    """Whether any of it does."""
+    return distance_m([part], box) < 0
 
 
 def _groups(parts: Sequence[Part], box: Box) -> list[list[Part]]:
     """Parts that are joined, directly or through others."""
     groups: list[list[Part]] = []
     for part in parts:
-        joined = [group for group in groups if any(_distance([part, other], box) <= TOUCH_M for other in group)]
+        joined = [group for group in groups if any(distance_m([part, other], box) <= TOUCH_M for other in group)]
         groups = [group for group in groups if not any(group is one for one in joined)]
         groups.append([part, *(other for group in joined for other in group)])
     return groups
 
 
-def _distance(parts: Sequence[Part], box: Box) -> float:
+def distance_m(parts: Sequence[Part], box: Box) -> float:
     """Below 0 if all these parts have a place in the box in common; a distance along x or y in m otherwise.
 
     A part's left end is convex over y and its right end concave, so what lies between the rightmost left end and the
@@ -109,7 +112,7 @@ def _distance(parts: Sequence[Part], box: Box) -> float:
     """
     low = max(_heights(part, box)[0] for part in parts)
     high = min(_heights(part, box)[1] for part in parts)
-    beside = max(_widths(part, box)[0] for part in parts) - min(_widths(part, box)[1] for part in parts)
+    beside = max(widths(part, box)[0] for part in parts) - min(widths(part, box)[1] for part in parts)
     if low - high > TOUCH_M or beside > TOUCH_M:
         return max(low - high, beside)
     if low > high:
@@ -132,7 +135,7 @@ def _gaps(parts: Sequence[Part], box: Box, y: np.ndarray) -> np.ndarray:
     return left - right
 
 
-def _measured(parts: Sequence[Part], box: Box) -> tuple[float, float, float]:
+def measured(parts: Sequence[Part], box: Box) -> tuple[float, float, float]:
     """Area in m2 and barycenter in m of the union of these parts within the box."""
     if len(parts) == 1 and _holds(box, parts[0]):
         return parts[0].area_m2, parts[0].x_m, parts[0].y_m

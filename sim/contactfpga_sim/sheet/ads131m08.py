@@ -7,11 +7,14 @@ from collections.abc import Sequence
 PERIOD, AHEAD = 2048, 4
 """Periods of its clock from one conversion to the next, and before that during which ready is high anyhow."""
 WORDS, BITS = 10, 24
+SETTLING = 2
+"""Results after power-up from the filter that settles within one period."""
 
 
 class Ads131m08:
-    """All channels at once. A result is what the inputs were one and a half periods before it is ready, which is the
-    middle of what its filter averages. It keeps two results that were not read."""
+    """All channels at once. A result is what the inputs were in the middle of what its filter averages: three periods,
+    but one alone for the first two results after power-up (SBAS950B 8.3.7.1). It keeps two results that were not read.
+    """
 
     reads: tuple[str, ...] = ("spi_clock", "spi_select_n", "spi_mosi", "spi_pace")
     gives: tuple[str, ...] = ("spi_miso", "spi_ready_n")
@@ -47,13 +50,13 @@ class Ads131m08:
 
     def _convert(self) -> None:
         self._periods += 1
-        into = self._periods % PERIOD
+        result, into = divmod(self._periods, PERIOD)
         if into == PERIOD // 2:
             self._middles = [*self._middles[-1:], list(self.codes)]
         elif into == PERIOD - AHEAD:
             self._ready_n = 1
         elif into == 0:
-            self._results = [*self._results[-1:], self._middles[0]]
+            self._results = [*self._results[-1:], self._middles[-1 if result <= SETTLING else 0]]
             self._ready_n = 0
 
     def _next_frame(self) -> int:

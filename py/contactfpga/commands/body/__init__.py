@@ -16,7 +16,8 @@ USUAL_TOPIC = "show"
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topics, each with its flags."""
-    commands = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC")
+    parser.usage = f"%(prog)s ROBOT.toml ...\n       %(prog)s {{{','.join(TOPICS)}}} ..."
+    commands = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC", prog=parser.prog)
     for name, topic in TOPICS.items():
         topic.add_flags(commands.add_parser(name, help=topic.HELP, description=topic.HELP))
 

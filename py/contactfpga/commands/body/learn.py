@@ -12,12 +12,13 @@ import numpy as np
 
 from contactfpga.body import Body, folds
 from contactfpga.body.open_body import OpenBody
+from contactfpga.body.plan import Plan
 from contactfpga.commands.body.register import link
 from contactfpga.console import numbers, outputs, terminal
-from contactfpga.inputs.values import number_in
+from contactfpga.inputs.values import number_in, shown
 from contactfpga.zones.zone import Zones
 
-HELP = "Learn which cells the folding cover presses over a joint's range, with nobody near."
+HELP = "Learn which cells the folding cover presses over a joint's range, while nobody touches it."
 MAX_LINE = 200
 
 
@@ -30,17 +31,18 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("output", metavar="FOLDS.json", help=output)
     step = f"How finely angles are told apart (default: {folds.STEP_RAD:g})."
     parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
-    parser.epilog = (
-        "Reads the joint's angle in rad from standard input, a line each time that the robot says it, until it ends."
-    )
+    parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     body = Body.load(args.robot)
     plan = link(body, args.link)
+    _check(body, plan, args.joint)
     output = outputs.file(args.output, "FOLDS.json")
-    terminal.say(f"move {args.joint} slowly over its whole range, there and back, with nobody near", sys.stderr)
+    terminal.say(
+        f"move {args.joint} slowly over its whole range, there and back; nobody may touch the cover", sys.stderr
+    )
     alone = Body({plan.name: plan})
     with alone.open() as opened:
         found = folds.learn(args.joint, _pairs(opened, plan.name, sys.stdin), args.step)
@@ -56,8 +58,22 @@ def run(args: argparse.Namespace) -> int:
         hang=2,
     )
     if gaps:
-        terminal.say(f"{gaps} steps between were not visited: there nothing will be marked; move more slowly", hang=2)
+        between = max(found.frames) - min(found.frames) - 1
+        missed = f"no frame came at {gaps} of the {between} steps between"
+        terminal.say(f"{missed}: move more slowly, or folds there are not marked", hang=2)
     return 0
+
+
+def _check(body: Body, plan: Plan, joint: str) -> None:
+    """Before anybody moves the robot. Raises ValueError."""
+    names = None if body.kinematics is None else body.kinematics.joint_names
+    if names is not None and joint not in names:
+        raise ValueError(f"joint {shown(joint)} is no joint of the URDF; it has {', '.join(names)}")
+    if plan.skin.report != "cells":
+        raise ValueError(
+            f'link {shown(plan.name)}: its Skin has report = "{plan.skin.report}"; folds are learned cell by cell, so '
+            'build it with report = "cells"'
+        )
 
 
 def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, Zones]]:
@@ -68,7 +84,9 @@ def _pairs(opened: OpenBody, name: str, lines: TextIO) -> Iterator[tuple[float, 
             continue
         angle = number_in(line[:MAX_LINE])
         if not math.isfinite(angle):
-            raise ValueError(f"line {number} of standard input is {numbers.shortened(line.strip())!r}, no angle in rad")
+            raise ValueError(
+                f"line {number} of standard input is {numbers.shortened(line.strip())!r}; it must be an angle in rad"
+            )
         state = opened.read().links[name]
         if state.status != "ok" or state.zones is None:
             raise ValueError(f"link {name!r}: {state}; nothing can be learned without data")

@@ -14,6 +14,9 @@ from contactfpga.inputs.values import number_in
 
 HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
 
+READINGS_S = 0.03
+"""After a frame: its readings of pressure units come when the next ones do."""
+
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
@@ -22,11 +25,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", choices=(BASE, LINK), help=frame)
     joint = "Angle of a joint in rad, or m of one that slides; may be repeated (default: 0)."
     parser.add_argument("--joint", action="append", default=[], type=angle, metavar="NAME=RAD", help=joint)
-    seconds = "Run for this many seconds and print the state every second."
+    seconds = "Print the state every second, for this long (default: once)."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
     parser.add_argument("--json", action="store_true", help="Print a line with one JSON object each time.")
     wait = "Seconds to wait for each board (default: 1)."
-    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, help=wait)
+    parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
 
 
 def angle(text: str) -> tuple[str, float]:
@@ -47,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
         until = time.monotonic() + (args.seconds or 0.0)
         while True:
             snapshot = opened.read(args.timeout)
+            if any(plan.units is not None for plan in body.links.values()):
+                time.sleep(READINGS_S)
             _print(snapshot, frame, args.json)
             left = until - time.monotonic()
             if left <= 0:

@@ -91,7 +91,7 @@ def _link(args: argparse.Namespace) -> tuple[Surface, tuple[float, float], float
 def _picture(path: str | None) -> Path | None:
     if path is None:
         return None
-    if Path(path).suffix not in (".svg", ".png"):
+    if Path(path).suffix.lower() not in (".svg", ".png"):
         raise HapticsError(f"--picture is {path!r}; its name must end in .svg or .png")
     return outputs.file(path, "--picture")
 

@@ -33,7 +33,8 @@ private:
 };
 
 // An ADS131M08 as Texas Instruments SBAS950B has it at power-up: all channels at once, 24-bit words, bits on rising edges. A
-// result is what the inputs were one and a half periods before it is ready; two that were not read are kept.
+// result is what the inputs were one and a half periods before it is ready, the first two half a period; two that were not
+// read are kept.
 class Ads131m08 {
 public:
     uint32_t codes[8] = {};
@@ -62,7 +63,7 @@ private:
     void convert() {
         const unsigned into = ++periods_ % 2048;
         if (into == 1024) {
-            earlier_ = middles_++ ? middle_ : now();
+            earlier_ = middles_++ < 2 ? now() : middle_;
             middle_ = now();
         } else if (into == 2044) {
             ready_n = true;

@@ -78,7 +78,8 @@ SETTLE = Study(
         "the same with guard lines": functools.partial(_slow, LAZY_GUARDED, LAZY_CIRCUIT),
     },
     helps="`contactfpga settle` says which times a circuit needs; smaller resistances, precharge",
-    unnoticed="a switch that pulls too slowly reads as one that is not pressed; a guard line does so too, and tells",
+    unnoticed="a switch that pulls too slowly reads as one that is not pressed; a guard line does so too, and reports "
+    "it",
 )
 
 

@@ -47,8 +47,8 @@ BROKEN = Study(
         "column, with guard lines": functools.partial(_broken, GUARDED, "column"),
     },
     helps="guard lines; `contactfpga wire` shows lines that never read pressed",
-    unnoticed="what is past a break looks like switches that nobody presses; only one that is closed for good tells, "
-    "and guard lines have these",
+    unnoticed="what is past a break looks like switches that nobody presses; only one that is closed for good shows "
+    "it, and guard lines have these",
 )
 
 BROKEN_REVERSAL = dataclasses.replace(

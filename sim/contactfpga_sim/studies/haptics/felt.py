@@ -9,24 +9,26 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 import contactfpga
-from contactfpga.haptics import ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
+from contactfpga.haptics import AloneWatch, ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
 from contactfpga.haptics.answer import Floats
 from contactfpga.haptics.layouts import tripod
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.scenes.contacts import Contact, disc
+from contactfpga_sim.scenes.contacts import Contact, Track, disc
 from contactfpga_sim.scenes.felt import Felt
 from contactfpga_sim.scenes.scene import Scene
 from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
 
 RATE_N_S = 1600.0
 MOST_N = 30.0
-BEGIN_S = 1e-3
+LEAD_S = 1.5e-3
+"""From power-up until the first switch closes. The push has begun before; what it did then changes no answer."""
 LOOK_S = 20e-6
 RING_M = 0.075
 GAIN_N = 0.02
@@ -93,28 +95,22 @@ class Touching:
 
     def push(self, seconds: float) -> float:
         """In N."""
-        return min(MOST_N, RATE_N_S * max(0.0, seconds - BEGIN_S))
+        return min(MOST_N, max(0.0, float(self.closing_n.min()) + RATE_N_S * (seconds - LEAD_S)))
 
     def pressed(self, seconds: float) -> np.ndarray:
         """(rows, columns) bool."""
         found: np.ndarray = self.closing_n <= self.push(seconds)
         return found
 
-    @property
-    def first_s(self) -> float:
-        """When the first switch closes."""
-        return BEGIN_S + float(self.closing_n.min()) / RATE_N_S
-
     def board(self) -> VirtualBoard:
         """That feels it."""
         cells, rng = self.setting.cells, np.random.default_rng([self.seed, 8])
-        turn = np.linalg.pinv(cells.matrix)
+        x, y = self.place_m + np.array(cells.sheet_m)
+        each = np.linalg.pinv(cells.matrix) @ np.array([0, 0, -1, -y, x, 0])
         sigma = self.setting.unit_sigma_n / GAIN_N
 
         def readings(seconds: float) -> list[int]:
-            push, (x, y) = self.push(seconds), self.place_m + np.array(cells.sheet_m)
-            exerted = np.array([0, 0, -push, -push * y, push * x, 0])
-            noisy = turn @ exerted + ZERO + sigma * rng.standard_normal(3)
+            noisy = self.push(seconds) * each + ZERO + sigma * rng.standard_normal(3)
             steps: list[int] = np.clip(np.rint(noisy), 0, 4095).astype(int).tolist()
             return steps
 
@@ -150,18 +146,18 @@ def ramp(setting: Setting, seed: int) -> Touching:
     return Touching(setting, (MIDDLE + np.random.default_rng(seed).random(2)) * 1e-3 * setting.pitch_mm, seed)
 
 
-def errors(setting: Setting, seed: int) -> dict[str, list[float]]:
-    """Of one contact, in m: for each method at each of :data:`TIMES_S`; NaN while it has no answer."""
+def errors(setting: Setting, seed: int, times_s: Sequence[float] = TIMES_S) -> dict[str, list[float]]:
+    """Of one contact, in m: for each method at each of these rising times; NaN while it has no answer."""
     touching, cells = ramp(setting, seed), setting.cells
-    frames = heard(touching, touching.first_s + TIMES_S[-1] + 0.2e-3)
+    frames = heard(touching, LEAD_S + times_s[-1] + 0.2e-3)
     assert cells.noise.covariance is not None
     push_sigma = math.sqrt(float(cells.noise.covariance[2, 2]) + (RATE_N_S * 0.15e-3) ** 2 / 12)
     finder = Locator(setting.skin.sheet, reach_of(POINT), setting.spread, push_sigma)
     truth = touching.place_m
     found: dict[str, list[float]] = {method: [] for method in METHODS}
     watch, taken = ClosingWatch(cells), 0
-    for time_s in TIMES_S:
-        now = touching.first_s + time_s
+    for time_s in times_s:
+        now = LEAD_S + time_s
         came = [one.zones for one in frames if one.came_s <= now]
         known = [one.zones for one in frames if one.known_s <= now]
         for zones in known[taken:]:
@@ -203,28 +199,39 @@ class Forces:
 
 
 FINGER_MM = 6.0
-KINDS = ("point", f"finger of {2 * FINGER_MM:g} mm")
+FINGER = f"finger of {2 * FINGER_MM:g} mm"
+KINDS = POINTS, AT_ONCE, ONE_FIRST = ("point", FINGER, f"{FINGER}, one of them alone before")
+FIRST_S = 0.025
+"""For which it is alone."""
+BOTH = 4
+"""Frames of both, the last of which is asked."""
 
 
-def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) -> Forces:
+def two(apart_mm: float, seed: int, kind: str = POINTS, push_n: float = 12.0) -> Forces:
     """Two contacts this far apart at a random place and angle of the sheet of 10 mm, and their pushes as found. Points
     lie where each alone closes a switch; fingers lie anywhere, since they are wider than the pitch."""
     setting = SETTINGS[0]
     cells, skin = setting.cells, setting.skin
-    near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == KINDS[0] else math.inf
-    places = _pair(setting, apart_mm, near_mm, np.random.default_rng([seed, 9]))
-    fingers = tuple(Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push_n) for x, y in places)
+    near_mm = 1e3 * reach_of(POINT).reach_m(push_n) if kind == POINTS else math.inf
+    places = pair(setting, apart_mm, near_mm, np.random.default_rng([seed, 9]))
+    pushes = (push_n, Track((FIRST_S - 1e-6, FIRST_S), (0.0, push_n)) if kind == ONE_FIRST else push_n)
+    fingers = tuple(
+        Contact(shape=disc(FINGER_MM), x_mm=x, y_mm=y, force_n=push) for (x, y), push in zip(places, pushes)
+    )
     units = Felt(Scene(fingers), cells, skin, seed)
-    if kind == KINDS[0]:
+    if kind == POINTS:
         each = np.array([1 / Touching(setting, 1e-3 * np.array(place), seed).closing_n for place in places])
         closed = push_n * each.sum(axis=0) >= 1
         board = VirtualBoard(skin, lambda seconds: closed, units=units)
     else:
         board = VirtualBoard(skin, Scene(fingers), units=units)
     with contactfpga.open(board, skin) as opened:
-        frames = WithReadings(opened)
-        zones = [frames.next() for _ in range(4)][-1]
-    found = felt(cells, zones, friction=0.0)
+        frames, alone, both = WithReadings(opened), AloneWatch(cells), 0
+        while both < BOTH and opened.clock() < FIRST_S + 0.02:
+            zones = frames.next()
+            alone.take(zones)
+            both += len(zones) == 2
+    found = felt(cells, zones, friction=0.0, alone=alone)
     if found is None or len(zones) != 2:
         return Forces(len(zones), ())
     true_m = 1e-3 * np.array(places) + np.array(cells.sheet_m)
@@ -232,7 +239,7 @@ def two(apart_mm: float, seed: int, kind: str = KINDS[0], push_n: float = 12.0) 
     return Forces(2, tuple((one.normal_n or 0.0) - push_n for one in pairs))
 
 
-def _pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+def pair(setting: Setting, apart_mm: float, near_mm: float, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Places in mm, each nearer than ``near_mm`` to a switch."""
     pitch = setting.pitch_mm
     while True:

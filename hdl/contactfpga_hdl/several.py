@@ -1,0 +1,65 @@
+"""Several sheets at one FPGA: a whole chain for each, and one UART."""
+
+from amaranth.hdl import Cat, Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin.derived import Derived
+from contactfpga.skin.several import Several
+from contactfpga.wire.numbered import Place
+from contactfpga_hdl.link.turns import Turns
+from contactfpga_hdl.link.uart import Transmitter
+from contactfpga_hdl.top import Top, receiver_of
+
+_INSIDE = ("bits", "bytes", "turn", "holds", "contact")
+"""Ports of a sheet's :class:`Top` that do not lead outside."""
+
+
+class SeveralTop(wiring.Component):
+    """A :class:`Top` for each sheet, its pins and probes named as there with the sheet's number after them, as
+    ``row_data_0``; ``tx``, ``rx`` and ``contact``, which is high while any sheet is touched, are shared.
+
+    Sheets know nothing of each other but whose turn it is to send. Each keeps its newest frame until then.
+    """
+
+    def __init__(self, several: Several, probes: bool = False):
+        self.several = several
+        count = len(several.skins)
+        self.sheets = [Top(skin, probes, place=Place(number, count)) for number, skin in enumerate(several.skins)]
+        shared = {"tx": Out(1, init=1), "rx": In(1, init=1), "contact": Out(1)}
+        super().__init__(shared | {f"{name}_{number}": member for number, name, member in self._outside()})
+
+    def elaborate(self, platform):
+        m = Module()
+        derived = Derived(self.several.skins[0])  # its rates are those of all
+        m.submodules.transmitter = transmitter = Transmitter(derived.bit_clocks)
+        m.submodules.receiver = receiver = receiver_of(derived)
+        m.submodules.turns = turns = Turns(len(self.sheets))
+        m.d.comb += [
+            self.tx.eq(transmitter.pin),
+            receiver.pin.eq(self.rx),
+            turns.holds.eq(Cat(sheet.holds for sheet in self.sheets)),
+            self.contact.eq(Cat(sheet.contact for sheet in self.sheets).any()),
+        ]
+        for number, sheet in enumerate(self.sheets):
+            m.submodules[f"sheet_{number}"] = sheet
+            m.d.comb += [sheet.turn.eq(turns.turn[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]
+            m.d.comb += [
+                getattr(sheet.bits, name).eq(getattr(receiver.bits, name)) for name in receiver.bits.signature.members
+            ]
+            with m.If(turns.turn[number]):
+                m.d.comb += [
+                    transmitter.bytes.valid.eq(sheet.bytes.valid),
+                    transmitter.bytes.payload.eq(sheet.bytes.payload),
+                ]
+        for number, name, member in self._outside():
+            inside, outside = getattr(self.sheets[number], name), getattr(self, f"{name}_{number}")
+            m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
+        return m
+
+    def _outside(self):
+        """(number, name, member) of each port of a sheet that leads outside."""
+        for number, sheet in enumerate(self.sheets):
+            for name, member in sheet.signature.members.items():
+                if name not in _INSIDE:
+                    yield number, name, member

@@ -1,0 +1,58 @@
+"""A `robot.toml` with the files that it names, as texts: to be kept in a recording."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from contactfpga.body import urdf as urdf_file
+from contactfpga.body.answer import BodyError
+from contactfpga.body.body import Body
+
+ROBOT = "robot"
+"""Name of the texts in a recording."""
+TOML = "toml"
+"""The robot's table itself; each other text is named by the place in it that names its file."""
+FILES = ("skin", "units", "folds", "surface")
+"""Of a link."""
+
+
+def pack(path: str | Path) -> dict[str, str]:
+    """The texts, by name, of a file that :meth:`Body.load` has read. Raises OSError."""
+    path = Path(path)
+    text = path.read_text(encoding="utf-8")
+    found = {TOML: text}
+    for table, key, name in _files(tomllib.loads(text)):
+        file = urdf_file.located(table[key], path.parent) if key == "urdf" else path.parent / table[key]
+        found[name] = base64.b64encode(file.read_bytes()).decode("ascii")
+    return found
+
+
+def unpack(texts: Mapping[str, str], folder: Path) -> Body:
+    """The body again, with its files in this folder, which must stay as long as the robot's meshes are looked for.
+    Raises :class:`BodyError` where a text is missing, or is none of :func:`pack`."""
+    try:
+        values = tomllib.loads(texts[TOML])
+        for number, (table, key, name) in enumerate(_files(values)):
+            file = folder / str(number)
+            file.write_bytes(base64.b64decode(texts[name], validate=True))
+            table[key] = str(file)
+    except KeyError as error:
+        raise BodyError(f"the recording does not hold the robot's file {error}") from None
+    except (ValueError, TypeError, AttributeError, binascii.Error) as error:
+        raise BodyError(f"the recording's robot cannot be read: {error}") from None
+    return Body.of(values, folder)
+
+
+def _files(values: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str, str]]:
+    """Each table and key that names a file, and the name of its text."""
+    if "urdf" in values:
+        yield values, "urdf", "urdf"
+    for number, link in enumerate(values.get("links", ())):
+        for key in FILES:
+            if isinstance(link.get(key), str):
+                yield link, key, f"links.{number}.{key}"

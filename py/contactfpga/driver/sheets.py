@@ -1,0 +1,222 @@
+"""One port for several boards: an FPGA that serves several sheets says in each packet whose it is (docs/protocol.md).
+
+``PORT#1`` is sheet 1 at a port. Whoever opens it gets the bytes that a board of this one sheet would send, and sends
+as to one. The port itself is opened once, for as long as one of its sheets is open.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from contactfpga.driver.conversation import Conversation
+from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.skin.several import MOST_SHEETS
+from contactfpga.wire import framing
+from contactfpga.wire.hello import Hello, HelloReader
+from contactfpga.wire.hellos import begins_hello
+from contactfpga.wire.numbered import numbered_requests, sheet_of, unnumbered
+
+if TYPE_CHECKING:
+    from contactfpga.driver.transport import Transport
+
+TURN_S = 0.05
+"""How long a sheet reads for all at a time."""
+
+MOST_WAIT = 16_384
+"""Packets that wait for a sheet at most; beyond, the oldest ones are dropped, which its numbers show."""
+
+_DAMAGED = b"\x01\x00"
+"""In place of a packet that does not say whose it is: every sheet counts it as damaged."""
+
+
+def split(name: str) -> tuple[str, int] | None:
+    """The port and the number of a sheet's name; None: it names no sheet. Raises :class:`PortNotFound`."""
+    found = re.fullmatch(r"(.*)#(\d{1,4})", name)
+    if found is None:
+        return None
+    if int(found[2]) >= MOST_SHEETS:
+        raise PortNotFound(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
+    return found[1], int(found[2])
+
+
+class Sorter:
+    """Sorts what comes over a line by sheets."""
+
+    def __init__(self) -> None:
+        self.alone = False
+        """The board has one sheet, which has no number."""
+        self.sheets: int | None = None
+        """As many sheets has the board; None: no hello has come yet."""
+        self._rest = b""
+
+    def take(self, data: bytes) -> list[tuple[int | None, bytes]]:
+        """(sheet, packet with its delimiter) of all packets that ``data`` completes. No sheet: nobody knows whose it
+        was, and the packet is one that every sheet refuses."""
+        *packets, self._rest = (self._rest + data).split(b"\0")
+        return [self._sorted(packet) for packet in packets if packet]
+
+    def _sorted(self, packet: bytes) -> tuple[int | None, bytes]:
+        sheet = sheet_of(packet)
+        if sheet is None:
+            self.alone = self.alone or begins_hello(packet)
+            return None, _DAMAGED
+        packet = unnumbered(packet)
+        if self.sheets is None and begins_hello(packet):
+            hello = HelloReader().take(framing.unseal(packet, b""))
+            self.sheets = hello.place.sheets if hello is not None and hello.place is not None else None
+        return sheet, packet + b"\0"
+
+
+class SharedPort:
+    """A port whose sheets are opened one by one; safe for several threads."""
+
+    def __init__(self, inner: Transport, baud: int):
+        self.inner = inner
+        self.baud = baud
+        self.failure: Exception | None = None
+        self._changed = threading.Condition()
+        self._reading = False
+        self._sorter = Sorter()
+        self._waiting: dict[SheetPort, deque[bytes]] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """The ports of all of its sheets, as far as the board has told of them."""
+        return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
+
+    def add(self, sheet: SheetPort) -> None:
+        """From now on keep what comes of this sheet."""
+        with self._changed:
+            self._waiting[sheet] = deque(maxlen=MOST_WAIT)
+
+    def drop(self, sheet: SheetPort) -> bool:
+        """No longer; whether it was the last one."""
+        with self._changed:
+            return self._waiting.pop(sheet, None) is not None and not self._waiting
+
+    def read(self, sheet: SheetPort, timeout_s: float) -> bytes:
+        """What came of this sheet, waiting at most ``timeout_s`` for it; one of those that wait reads for all."""
+        until = self.inner.clock() + timeout_s
+        with self._changed:
+            while True:
+                if data := b"".join(self._waiting[sheet]):
+                    self._waiting[sheet].clear()
+                    return data
+                self._check(sheet)
+                left = until - self.inner.clock()
+                if left <= 0 and (timeout_s > 0 or self._reading):
+                    return b""
+                if self._reading:
+                    self._changed.wait(TURN_S)
+                    continue
+                came = self._turn(max(0.0, min(left, TURN_S)))
+                if not came and timeout_s <= 0:
+                    return b""
+
+    def _check(self, sheet: SheetPort) -> None:
+        if self.failure is not None:
+            raise self.failure
+        name = self.inner.name
+        if self._sorter.alone:
+            raise PortNotFound(f"{sheet.name}: the board at {name} has one sheet, without a number; open {name}")
+        if (sheets := self._sorter.sheets) is not None and sheet.number >= sheets:
+            raise PortNotFound(f"{sheet.name}: the board at {name} has the sheets 0 to {sheets - 1}")
+
+    def _turn(self, seconds: float) -> bool:
+        """Read once, with the lock held, which is released meanwhile; whether something came."""
+        self._reading = True
+        self._changed.release()
+        data, failure = b"", None
+        try:
+            data = self.inner.read(seconds)
+        except Exception as error:  # of all sheets
+            failure = error
+        finally:
+            self._changed.acquire()
+            self._reading = False
+            self.failure = failure
+            self._changed.notify_all()
+        for number, packet in self._sorter.take(data):
+            for sheet, waiting in self._waiting.items():
+                if number is None or number == sheet.number:
+                    waiting.append(packet)
+        return bool(data)
+
+
+class SheetPort:
+    """A sheet at a port that several share: a :class:`~contactfpga.driver.transport.Transport`."""
+
+    def __init__(self, name: str, number: int, shared: SharedPort):
+        self.name, self.number = name, number
+        self.live, self.threaded = shared.inner.live, shared.inner.threaded
+        self.clock = shared.inner.clock
+        self._shared = shared
+        shared.add(self)
+
+    def read(self, timeout_s: float) -> bytes:
+        return self._shared.read(self, timeout_s)
+
+    def write(self, data: bytes) -> None:
+        self._shared.inner.write(numbered_requests(data, self.number))
+
+    def close(self) -> None:
+        _give_back(self, self._shared)
+
+
+class Greetings:
+    """Hellos of the sheets at a port that is only listened to."""
+
+    def __init__(self, port: str):
+        self.heard: dict[str, Hello] = {}
+        """By the port of the sheet."""
+        self._port = port
+        self._sorter = Sorter()
+        self._conversations: dict[int, Conversation] = {}
+
+    def take(self, data: bytes, now: float) -> bool:
+        """Whether with ``data`` the last one of all came."""
+        for number, packet in self._sorter.take(data):
+            if number is None:
+                continue
+            name = f"{self._port}#{number}"
+            conversation = self._conversations.setdefault(number, Conversation(name))
+            for event in conversation.receive(packet, now):
+                if isinstance(event, Hello):
+                    self.heard[name] = event
+        return len(self.heard) == self._sorter.sheets
+
+
+_open: dict[str, SharedPort] = {}
+_lock = threading.Lock()
+
+
+def share(port: str, number: int, baud: int, connect: Callable[[str, int], Transport]) -> SheetPort:
+    """Sheet ``number`` at a port, which is opened by ``connect`` unless it is open."""
+    with _lock:
+        shared = _open.get(port)
+        if shared is None or shared.failure is not None:
+            shared = _open[port] = SharedPort(connect(port, baud), baud)
+        elif shared.baud != baud:
+            raise ContactFPGAError(
+                f"{port}#{number}: another sheet at this port is open at {shared.baud} baud; give baud = {shared.baud}"
+            )
+        return SheetPort(f"{port}#{number}", number, shared)
+
+
+def open_at(port: str) -> list[str]:
+    """The ports of the sheets at a port that is open in this process; none where it is not."""
+    with _lock:
+        shared = _open.get(port)
+        return [] if shared is None or shared.failure is not None else shared.names
+
+
+def _give_back(sheet: SheetPort, shared: SharedPort) -> None:
+    with _lock:
+        if shared.drop(sheet):
+            if _open.get(shared.inner.name) is shared:
+                del _open[shared.inner.name]
+            shared.inner.close()

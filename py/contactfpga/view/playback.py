@@ -1,0 +1,93 @@
+"""What plays: as fast as asked, from where one is led to."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Generic, TypeVar
+
+from contactfpga.view.sources import TURN_S
+
+Item = TypeVar("Item")
+
+SPEEDS = {"1/1000": 0.001, "1/100": 0.01, "1/10": 0.1, "1/4": 0.25, "1": 1.0, "4": 4.0, "16": 16.0}
+"""By the names that the panel gives them, the seconds of the recording that pass in one."""
+
+BEFORE_S = 0.25
+"""So much before the place that one is led to is read as well: what was there then, a keep-alive later at most."""
+
+
+class Playback(Generic[Item]):
+    """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are for any thread."""
+
+    def __init__(self, duration_s: float, clock: Callable[[], float] = time.monotonic):
+        self.duration_s = duration_s
+        self.position_s = 0.0
+        """The moment that is shown."""
+        self.playing = True
+        self.speed = 1.0
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._items: Iterator[tuple[float, Item]] = iter(())
+        self._next: tuple[float, Item] | None = None
+        self._led_to: float | None = 0.0
+        self._turned_s = clock()
+
+    def begin(self, start_s: float) -> Iterator[tuple[float, Item]]:
+        """What there is from this moment on, with its times; what was seen before counts no more."""
+        raise NotImplementedError
+
+    def follow(self, seconds: float, item: Item) -> None:
+        """Take the next one, which is to be seen now or was meanwhile."""
+        raise NotImplementedError
+
+    def play(self) -> None:
+        """Go on; from the beginning where it has ended."""
+        with self._lock:
+            if self.position_s >= self.duration_s and self._led_to is None:
+                self._led_to = 0.0
+            self.playing = True
+
+    def pause(self) -> None:
+        """Stay at this moment."""
+        self.playing = False
+
+    def seek(self, seconds: float) -> None:
+        """Show this moment, and go on from there if it plays."""
+        with self._lock:
+            self._led_to = min(max(0.0, seconds), self.duration_s)
+
+    def step(self) -> None:
+        """Wait for the next turn, and follow what came up to its moment."""
+        left = TURN_S - (self._clock() - self._turned_s)
+        if left > 0:
+            time.sleep(left)
+        now = self._clock()
+        passed, self._turned_s = now - self._turned_s, now
+        with self._lock:
+            led_to, self._led_to = self._led_to, None
+            if led_to is not None:
+                self.position_s = led_to
+                self._items = self.begin(max(0.0, led_to - BEFORE_S))
+                self._next = next(self._items, None)
+            elif self.playing:
+                self.position_s = min(self.duration_s, self.position_s + passed * self.speed)
+            until_s = self.position_s
+        self._take(until_s, now + 5 * TURN_S)
+        if self._next is None:
+            self.playing = False
+        elif self._next[0] <= until_s:  # slower than asked: it goes on from where it is
+            self.position_s = self._next[0]
+
+    def _take(self, until_s: float, deadline: float) -> None:
+        """What there is up to that moment, until the deadline at least one."""
+        while self._next is not None and self._next[0] <= until_s:
+            self.follow(*self._next)
+            self._next = next(self._items, None)
+            if self._clock() > deadline:
+                break
+
+    def close(self) -> None:
+        """Let the recording go."""
+        self._items = iter(())

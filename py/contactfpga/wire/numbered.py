@@ -1,0 +1,113 @@
+"""Packets of a numbered sheet: several sheets share one FPGA and its line (docs/protocol.md).
+
+Such a packet is an ordinary one with two bytes after its stuffed bytes, which the check covers too. Where the check is
+right after they are taken out and the CRC is run backward over them, it was right before, and the other way round. So
+whoever sorts packets by sheets need not know what the check covers besides, and hands on what a board of that one
+sheet would send.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from contactfpga.skin.widths import CHECK_BYTES
+from contactfpga.wire import framing
+from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
+
+KIND_NUMBERED = 11
+_BLOCK = 2
+"""A stuffed zero ends the packet itself; the block after it is one byte long."""
+_MARKS = (0x80, 0x80, 0xFC)
+"""Bits of the check bytes that are none of the CRC's."""
+_BITS = (DIGIT_BITS, DIGIT_BITS, 16 - 2 * DIGIT_BITS)
+_POLYNOMIAL = 0x8408
+
+
+class Place(NamedTuple):
+    """Where a sheet stands among those of its FPGA."""
+
+    number: int
+    """From 0 on."""
+    sheets: int
+
+
+def closing(number: int) -> bytes:
+    """The two bytes that come after a packet's stuffed bytes."""
+    return bytes([_BLOCK, framing.last_byte(KIND_NUMBERED, number)])
+
+
+def sheet_of(packet: bytes) -> int | None:
+    """The number that a packet, without delimiters, says; None: it says none. Its check is not looked at."""
+    if len(packet) < framing.SHORTEST_PACKET + 2:
+        return None
+    block, last = packet[-CHECK_BYTES - 2 : -CHECK_BYTES]
+    return last & (1 << FLAG_BITS) - 1 if block == _BLOCK and last >> FLAG_BITS == KIND_NUMBERED else None
+
+
+def unnumbered(packet: bytes) -> bytes:
+    """The ordinary packet within a numbered one, both without delimiters."""
+    stuffed, closed, check = packet[: -CHECK_BYTES - 2], packet[-CHECK_BYTES - 2 : -CHECK_BYTES], packet[-CHECK_BYTES:]
+    return stuffed + _moved(check, closed[::-1], _back)
+
+
+def numbered(packet: bytes, number: int) -> bytes:
+    """An ordinary packet as that of a numbered sheet, both without delimiters."""
+    stuffed, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
+    return stuffed + closing(number) + _moved(check, closing(number), _on)
+
+
+def numbered_requests(data: bytes, number: int) -> bytes:
+    """The same for whole requests and commands with their delimiters, as bytes or as pulses."""
+    return b"".join(_numbered_request(packet, pulsed, number) for packet, pulsed in _requests(data))
+
+
+def _numbered_request(packet: bytes, pulsed: bool, number: int) -> bytes:
+    delimiter = bytes([DELIMITER])
+    whole = delimiter + numbered(packet, number) + delimiter
+    return framing.pulses(whole) if pulsed else whole
+
+
+def _requests(data: bytes) -> Iterator[tuple[bytes, bool]]:
+    """Each packet without delimiters, and whether it came as pulses."""
+    while data:
+        pulsed = data[0] != DELIMITER
+        end = data.index(data[0], 1)
+        yield _of_pulses(data[1:end]) if pulsed else data[1:end], pulsed
+        data = data[end + 1 :]
+
+
+def _of_pulses(bits: bytes) -> bytes:
+    """Undo :func:`contactfpga.wire.framing.pulses` for bytes that are no delimiters."""
+    levels = [bit & 1 for bit in bits]
+    return bytes(sum(levels[at + place] << place for place in range(8)) for at in range(0, len(levels), 8))
+
+
+def _moved(check: bytes, data: bytes, step: Callable[[int, int], int]) -> bytes:
+    crc = offset = 0
+    for byte, bits in zip(check, _BITS, strict=True):
+        crc |= (byte & (1 << bits) - 1) << offset
+        offset += bits
+    for byte in data:
+        crc = step(crc, byte)
+    moved = bytearray()
+    for byte, marks, bits in zip(check, _MARKS, _BITS, strict=True):
+        moved.append(byte & marks | crc & (1 << bits) - 1)
+        crc >>= bits
+    return bytes(moved)
+
+
+def _on(crc: int, byte: int) -> int:
+    """The CRC with a byte more."""
+    crc ^= byte
+    for _ in range(8):
+        crc = crc >> 1 ^ _POLYNOMIAL * (crc & 1)
+    return crc
+
+
+def _back(crc: int, byte: int) -> int:
+    """The CRC before its last byte."""
+    for _ in range(8):
+        fed = crc >> 15
+        crc = (crc ^ _POLYNOMIAL * fed) << 1 | fed
+    return crc ^ byte

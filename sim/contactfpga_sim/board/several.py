@@ -1,0 +1,156 @@
+"""The virtual board of several sheets at one FPGA: compiled gateware in simulated time, behind the interface of a
+serial port."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contactfpga.errors import BoardClosed
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.skin.several import Several, sheets_of
+from contactfpga_sim.board import native
+from contactfpga_sim.board.compiled import EVENT, initializer
+from contactfpga_sim.scenes.cells import to_words
+from contactfpga_sim.scenes.scene import Source
+from contactfpga_sim.scenes.scene import scene as make_scene
+
+LOOK_S = 0.2e-3
+"""Simulated time between two looks at the scenes and at the line."""
+
+CAPTURED = ("line", "contact", "received")
+"""Changes of the transmit and of the contact pin, and bytes decoded from the line, in the order of the driver."""
+
+
+class CompiledSheets:
+    """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on."""
+
+    def __init__(self, several: Several):
+        self.several = several
+        self._library = native.load(model_of(several))
+        self._library.board_new.restype = ctypes.c_void_p
+        self._library.board_cycle.restype = ctypes.c_uint64
+        self._library.board_events.restype = ctypes.c_void_p
+        self._lock = threading.RLock()
+        self._board: ctypes.c_void_p | None = ctypes.c_void_p(self._library.board_new())
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        with self._lock:
+            if self._board is None:
+                raise BoardClosed("the virtual board was closed; make another one")
+            return getattr(self._library, f"board_{name}")(self._board, *arguments)
+
+    @property
+    def cycle(self) -> int:
+        """The cycle that runs next."""
+        return self._call("cycle")
+
+    def press(self, number: int, cells: np.ndarray) -> None:
+        """From the next cycle on these (rows, columns) bool cells of a sheet are pressed."""
+        skin = self.several.skins[number]
+        if cells.shape != (skin.rows, skin.columns):
+            raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
+        words = np.ascontiguousarray(to_words(cells))
+        self._call("press", ctypes.c_uint(number), words.ctypes.data_as(ctypes.c_void_p))
+
+    def run(self, cycles: int) -> None:
+        """Run this many clock cycles."""
+        self._call("run", ctypes.c_uint64(cycles))
+
+    def send(self, data: bytes) -> None:
+        """Put bytes on the receive pin, back to back, the first from the next cycle on."""
+        self._call("send", data, ctypes.c_size_t(len(data)))
+
+    def take(self, boundary: str) -> np.ndarray:
+        """The events of one of :data:`CAPTURED`, dtype ``EVENT``, since they were taken last."""
+        index, count = ctypes.c_uint(CAPTURED.index(boundary)), ctypes.c_size_t()
+        with self._lock:  # the address holds until the model runs on
+            address = self._call("events", index, ctypes.byref(count))
+            events = native.array_at(address, count.value, EVENT)
+            self._call("forget", index)
+        return events
+
+    def close(self) -> None:
+        """Free the model. May be called twice."""
+        with self._lock:
+            if self._board is not None:
+                self._call("free")
+                self._board = None
+
+    def __enter__(self) -> CompiledSheets:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class VirtualSheets:
+    """A board of several sheets in simulated time, which passes only in :meth:`read`.
+
+    several: the sheets; scenes: what touches each of them, as :func:`contactfpga_sim.scenes.scene.scene` takes it.
+    """
+
+    def __init__(self, several: Several, scenes: Sequence[Source]):
+        self.several = several
+        self._scenes = [make_scene(skin, scene) for skin, scene in zip(several.skins, scenes, strict=True)]
+        self._board = CompiledSheets(several)
+        self._chunk = max(1, round(LOOK_S * several.clock_hz))
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board."""
+        self._board.send(data)
+
+    def read(self, seconds: float) -> bytes:
+        """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
+        left = round(seconds * self.several.clock_hz)
+        while True:
+            data = self._board.take("received")["data"].astype(np.uint8).tobytes()
+            if data or left <= 0:
+                return data
+            for number, scene in enumerate(self._scenes):
+                self._board.press(number, scene(self.clock()))
+            cycles = min(left, self._chunk)
+            self._board.run(cycles)
+            left -= cycles
+
+    def clock(self) -> float:
+        """Simulated seconds since power-up."""
+        return self._board.cycle / self.several.clock_hz
+
+    def close(self) -> None:
+        """Free the board."""
+        self._board.close()
+
+
+def model_of(several: Several) -> native.Model:
+    """What the board of several sheets is built from."""
+
+    def elaborate() -> Any:
+        from contactfpga_hdl.several import SeveralTop
+
+        return SeveralTop(several)
+
+    keys = "".join(map(native.skin_key, several.skins))
+    return native.Model(
+        title=f"the board of {sheets_of(several.skins)}",
+        driver="several.cpp",
+        key=hashlib.sha256(keys.encode()).hexdigest(),
+        elaborate=elaborate,
+        defines={
+            "BIT_CLOCKS": Derived(several.skins[0]).bit_clocks,
+            "EACH_SHEET": " ".join(_entry(number, skin) for number, skin in enumerate(several.skins)),
+        },
+    )
+
+
+def _entry(number: int, skin: Skin) -> str:
+    """Of a sheet in the driver's list."""
+    sizes = (number, skin.rows, skin.columns, skin.row_chains, skin.column_chains, int(skin.selects_low))
+    lines = (f"LINES({initializer(line_of)[1:-1]})" for line_of in (skin.line_of_row, skin.line_of_column))
+    return f"SHEET({', '.join((*map(str, sizes), *lines))})"

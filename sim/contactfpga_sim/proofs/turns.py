@@ -1,0 +1,108 @@
+"""Several sheets share a line: packets come one after the other, whole, and each sheet in its turn."""
+
+from functools import partial
+from unittest import mock
+
+from amaranth.hdl import Const, Mux, Signal
+
+from contactfpga.skin import Skin
+from contactfpga.wire import protocol
+from contactfpga.wire.numbered import Place
+from contactfpga_hdl.link.link import Link
+from contactfpga_hdl.link.turns import Turns
+from contactfpga_sim.proofs.bugs import Bug
+from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.proofs.proof import Proof
+
+_SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
+_PLACE = Place(1, 2)
+
+
+def turns_go_round(proof: Proof, sheets: int) -> None:
+    """Free: which sheets hold their turn in each clock.
+
+    Claimed: in each clock it is the turn of one sheet, at first of the first one. It stays while that sheet holds it,
+    and then is the next one's, after the last sheet the first one's. So between two turns of a sheet each other one
+    has one, and who does not hold it keeps nobody waiting.
+    """
+    m = proof.m
+    dut = Turns(sheets)
+    proof.put(dut)
+    holds = proof.free(sheets, "holds")
+    m.d.comb += dut.holds.eq(holds)
+    whose = Signal(range(sheets))
+    with m.If(~holds.bit_select(whose, 1)):
+        m.d.sync += whose.eq(Mux(whose == sheets - 1, 0, whose + 1))
+    proof.claim(dut.turn == (Const(1, sheets) << whose)[:sheets])
+    proof.lemma(whose < sheets)
+
+
+def packets_are_whole(proof: Proof, hello: bytes) -> None:
+    """Free: all that reaches the link of a sheet in each clock, and how long it waits for a turn. Assumed: its turn
+    stays while it is held, as ``turns_go_round`` shows.
+
+    Claimed: it offers bytes in its turn alone, and gives it up only when the last byte that it sent, if any, was a
+    delimiter. Without a turn it takes nothing. When it gives the turn up after a byte it has nothing in hand, so it
+    sends one packet in a turn.
+    """
+    m = proof.m
+    with mock.patch.object(protocol, "encode_hello", return_value=hello):
+        dut = Link(_SKIN, _PLACE)
+        inside = proof.put(dut)
+    for name in ("asked", "epoch", "number", "tag", "summary"):
+        port = getattr(dut, name)
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    frames = dut.frames
+    for port, name in ((frames.write.en, "en"), (frames.write.data, "data"), (frames.write.offset, "offset")):
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    for port, name in ((frames.decide, "decide"), (frames.commit, "commit"), (frames.end, "end")):
+        m.d.comb += port.eq(proof.free(port.shape(), name))
+    m.d.comb += dut.bytes.ready.eq(proof.free(1, "ready"))
+    turn = Signal()
+    m.d.comb += dut.turn.eq(turn)
+    m.d.sync += turn.eq(Mux(turn & dut.holds, 1, proof.free(1, "turn")))
+    moves = dut.bytes.valid & dut.bytes.ready
+    last = Signal(8)  # byte sent; at first as after a delimiter
+    sent = Signal()  # a byte in this turn
+    with m.If(moves):
+        m.d.sync += last.eq(dut.bytes.payload)
+    m.d.sync += sent.eq(turn & dut.holds & (sent | moves))
+    takes = inside["take_frame"] | inside["take_hello"]
+    proof.claim(turn | ~dut.bytes.valid)
+    proof.claim(turn | ~takes)
+    proof.claim(~(sent & takes))
+    with m.If(turn & ~dut.holds):
+        proof.claim(Mux(moves, dut.bytes.payload, last) == 0)
+    proof.lemma(inside["idle"] | turn)
+    with m.If(inside["idle"]):
+        proof.lemma((last == 0) & ~sent)
+
+
+_TURN_BUGS = (
+    Bug("a turn is given up in a packet", Turns, "others", lambda others, inside: inside["turn"]),
+    Bug("the first sheet always has a turn", Turns, "turn", lambda turn, inside: turn | 1),
+)
+_PACKET_BUGS = (
+    Bug("taken without a turn", Link, "take_frame",
+        lambda take, inside: take | inside["idle"] & inside["waits"] & ~inside["take_hello"]),
+    Bug("given up before the delimiter", Link, "holds", lambda holds, inside: holds & (inside["tail"] < 4)),
+    Bug("kept for the next packet", Link, "holds", lambda holds, inside: holds | ~inside["idle"]),
+)  # fmt: skip
+CASES = (
+    Case("turns go round", "2 sheets", partial(turns_go_round, sheets=2), 2, _TURN_BUGS),
+    Case("turns go round", "16 sheets", partial(turns_go_round, sheets=16), 2),
+    Case(
+        "packets of several sheets are whole",
+        "1x2, hello of 3 bytes",
+        partial(packets_are_whole, hello=bytes([0, 2, 0x40, *[0x80] * 3, 0])),
+        2,
+        _PACKET_BUGS,
+        bug_clocks=28,
+    ),
+    Case(
+        "packets of several sheets are whole",
+        "1x2",
+        partial(packets_are_whole, hello=protocol.encode_hello(_SKIN, place=_PLACE)),
+        2,
+    ),
+)

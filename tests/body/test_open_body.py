@@ -1,0 +1,160 @@
+"""An open body, whose boards come and go."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+
+import pytest
+from two_links import Plugged, wait_for
+
+import contactfpga
+from contactfpga.body import Body, NoJoints, NoLinkData, OpenBody
+
+
+def test_joints_that_fail_say_so_where_angles_are_needed(patient):
+    def joints(_):
+        raise KeyError("elbow")
+
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), joints, opened=plugged.opened) as body, body.subscribe() as queue:
+        first = queue.next(10.0)
+        assert queue.next(10.0).host_time_s > first.host_time_s  # its threads go on
+        snapshot = body.read(10.0)
+        assert set(snapshot.answering) == {"arm", "chest"}
+        with pytest.raises(NoJoints, match=r"^link 'arm': the joints given to the body failed: KeyError\('elbow'\)"):
+            snapshot.contacts()
+        assert snapshot.contacts("link") is not None
+
+
+def test_open_body_goes_on_without_a_link_and_takes_it_back(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), lambda _: {"elbow": 0.0}, opened=plugged.opened) as body:
+        assert len(body.read().contacts()) == 2
+        port = plugged.ports.pop("a")
+        port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
+        wait_for(lambda: body.latest().links["arm"].status == "lost")
+        snapshot = body.read(timeout=5)
+        with pytest.raises(NoLinkData, match=r"no data of arm: lost \(.*a is "):
+            snapshot.contacts()
+        assert [one.link for one in snapshot.contacts(links=snapshot.answering)] == ["chest"]
+        plugged.plug("a")
+        wait_for(lambda: body.latest().links["arm"].status == "ok")
+        assert len(body.next().contacts()) == 2
+        plugged.ports["b"].mute = True
+        wait_for(lambda: body.latest().links["chest"].status == "silent")
+        assert body.latest().links["chest"].zones is None
+    with pytest.raises(contactfpga.BoardClosed):
+        body.latest()
+
+
+def test_ids_stay_with_contacts_that_move(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        first = body.read().contacts("link", links=["chest"])
+        plugged.ports["b"].moments = [(4, 11, 6)]
+        moved = body.read().contacts("link", links=["chest"])
+        assert [one.track for one in first] == [one.track for one in moved] == [1]
+        assert moved[0].point_m != first[0].point_m
+
+
+def test_read_waits_for_frames_scanned_after_the_call(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        body.read()
+        for port in plugged.ports.values():
+            port.moments = [(9, 9, 9)]
+        found = body.read()
+        assert [one.zone.area_cells for one in found.contacts("link")] == [9, 9]
+
+
+def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        with body.subscribe(maxsize=8) as queue:
+            times = [queue.next().host_time_s for _ in range(5)]
+            wait_for(lambda: queue.dropped > 3)
+        assert times == sorted(times)
+        with pytest.raises(ValueError, match="maxsize is 0"):
+            body.subscribe(0)
+
+
+def test_it_is_iterated_as_a_board_is(patient):
+    async def first(source, count):
+        found = []
+        async for snapshot in source:
+            found.append(snapshot.host_time_s)
+            if len(found) == count:
+                break
+        return found
+
+    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+        with body.subscribe() as queue:
+            for source in (body, queue):
+                synchronous = [snapshot.host_time_s for snapshot, _ in zip(source, range(5))]
+                assert len(set(synchronous)) == 5
+                found = asyncio.run(first(source, 5))
+                assert found == sorted(set(found))
+
+
+def test_batch_holds_each_frame_of_each_link_once(patient):
+    with OpenBody(Body.load(patient), opened=Plugged().opened) as body:
+        batch = body.batch(0.05)
+    assert len(batch) > 1
+    assert [one.host_time_s for one in batch] == sorted(one.host_time_s for one in batch)
+    assert set(batch.links) == {"arm", "chest"}
+    for name, arrays in batch.links.items():
+        seen = {one.links[name].zones.time_us for one in batch if one.links[name].zones is not None}
+        assert arrays.frames["time_us"].tolist() == sorted(seen)
+        assert len(arrays.zones) == len(seen), "each frame has one zone"
+
+
+def test_batch_of_a_link_without_frames_has_no_arrays_of_it(patient):
+    plugged = Plugged()
+    del plugged.ports["a"]
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        assert set(body.batch(0.05).links) == {"chest"}
+
+
+def test_stats_go_on_where_a_board_comes_back(patient):
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        wait_for(lambda: body.stats.links["arm"].frames > 5)
+        port = plugged.ports.pop("a")
+        port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
+        wait_for(lambda: body.latest().links["arm"].status == "lost")
+        before = body.stats.links["arm"]
+        plugged.plug("a")
+        wait_for(lambda: body.stats.links["arm"].frames > before.frames)
+        assert body.stats.links["arm"].hellos == before.hellos + 1
+        stats = body.stats
+        assert stats.frames == sum(one.frames for one in stats.links.values())
+        assert stats.damaged == {}
+        assert set(json.loads(json.dumps(stats.to_dict()))["links"]) == {"arm", "chest"}
+    assert body.stats.frames >= stats.frames, "as a board's, they stay when it is closed"
+
+
+def test_closing_wakes_who_waits_and_ends_all_threads(patient):
+    plugged = Plugged()
+    before = threading.active_count()
+    body = OpenBody(Body.load(patient), opened=plugged.opened)
+    queue = body.subscribe()
+    body.close()
+    body.close()
+    with pytest.raises(contactfpga.BoardClosed):
+        queue.next(5)
+    assert threading.active_count() == before
+
+
+def test_link_whose_code_fails_is_lost_and_says_why(patient):
+    plugged = Plugged()
+
+    def opened(plan):
+        if plan.name == "arm":
+            raise ZeroDivisionError("of a scene")
+        return plugged.opened(plan)
+
+    with OpenBody(Body.load(patient), opened=opened) as body:
+        assert str(body.latest().links["arm"]) == "lost (no frame yet; of a scene)"
+        assert body.read().answering == ("chest",)

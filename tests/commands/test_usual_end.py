@@ -1,0 +1,104 @@
+"""Commands that run until Ctrl-C: it ends them cleanly, with status 0, and so does the signal TERM."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from fake_board import FakeBoard
+from sample import sample
+from terminals import OnTerminal, environment, wait_for
+
+import contactfpga
+from contactfpga import cli
+from contactfpga.console import interrupt
+
+CELLS = contactfpga.Skin(rows=3, columns=6, report="cells", settle_us=20.0)
+RUNNING = {
+    "zones PORT": "frame at",
+    "zones --json PORT": '"time_us"',
+    "wire PORT": "pressed (row, column)",
+    "view --no-browser PORT": "Ctrl-C ends it",
+    "record FILE PORT": "Ctrl-C ends it",
+    "publish --listen tcp/127.0.0.1:17462 PORT": "zenoh://",
+    "ros --domain 89 PORT": "Ctrl-C ends it",
+}
+"""What each shows once it runs."""
+NEEDS = {"ros": "cyclonedds", "publish": "zenoh", "view": "viser", "record": "mcap"}
+
+
+@pytest.mark.parametrize(
+    ("words", "number"),
+    sample(
+        itertools.product(RUNNING, interrupt.SIGNALS),
+        quick=[(list(RUNNING)[-1], signal.SIGINT), (list(RUNNING)[-2], signal.SIGTERM)],
+    ),
+)
+def test_it_is_the_usual_end(words, number, tmp_path):
+    pytest.importorskip(NEEDS.get(words.split()[0], "rich"))
+    with FakeBoard(CELLS) as board:
+        board.stream = board.frame
+        named = {"PORT": board.path, "FILE": tmp_path / "x.mcap"}
+        arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "30"]]
+        terminal = OnTerminal([sys.executable, "-m", "contactfpga.cli", *arguments], 80)
+        try:
+            wait_for(lambda: terminal.process.poll() is not None or RUNNING[words] in terminal.said, 60)
+            terminal.process.send_signal(number)
+            status, said = terminal.wait(30), terminal.said[-2000:]
+        finally:
+            terminal.process.kill()
+    assert status == 0, said
+    for word in ("Traceback", "Exception", "Error"):
+        assert word not in said, said
+
+
+def test_what_is_asked_to_do_one_thing_is_cut_short(board, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(contactfpga.Board, "next", interrupted)
+    assert cli.main(["zones", "--once", board.path]) == 130
+
+
+def test_term_is_handled_as_before_when_a_command_is_done():
+    before = signal.getsignal(signal.SIGTERM)
+
+    def body():
+        with interrupt.usual_end():
+            os.kill(os.getpid(), signal.SIGTERM)
+            pytest.fail("TERM did not end it")
+        return 7
+
+    assert interrupt.guarded(body) == 7
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+PRINTS = """
+import sys
+from contactfpga.console import interrupt, terminal
+
+def body():
+    terminal.say("shown")
+    terminal.say("shown", sys.stderr)
+
+sys.exit(interrupt.guarded(body))
+"""
+
+
+@pytest.mark.parametrize(
+    ("streams", "status", "errors"),
+    [
+        (">&-", 0, "shown\n"),
+        ("2>&-", 0, ""),
+        (">/dev/full", 1, "contactfpga: there is no room where the output goes: No space left on device\n"),
+    ],
+)
+def test_output_that_goes_nowhere(streams, status, errors):
+    """A shell's `>&-` closes standard output: Python then has none."""
+    if "full" in streams and not os.path.exists("/dev/full"):
+        pytest.skip("this system has no full device")
+    command = ["sh", "-c", f'exec "$@" {streams}', "sh", sys.executable, "-c", PRINTS]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=30, check=False)
+    assert (done.returncode, done.stderr) == (status, errors)

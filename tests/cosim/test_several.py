@@ -1,0 +1,188 @@
+"""Several sheets at one FPGA do what the golden model predicts, cycle for cycle, and share one line without loss."""
+
+import contextlib
+import itertools
+import random
+
+import numpy as np
+import pytest
+
+import contactfpga
+from contactfpga import Skin, examples
+from contactfpga.driver.conversation import Conversation
+from contactfpga.driver.sheets import Sorter
+from contactfpga.skin.several import Several
+from contactfpga_hdl.link.turns import Turns
+from contactfpga_sim.board.several import CompiledSheets
+from contactfpga_sim.cosim import bench_several
+from contactfpga_sim.cosim.compare import Mismatch, compare
+from contactfpga_sim.cosim.covering import CHOICES, pairwise, skin_for
+from contactfpga_sim.golden import Timeline
+from contactfpga_sim.golden.predict import predict_several
+from contactfpga_sim.golden.request import request
+
+REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
+FAST = REGISTERS | {"clock_hz": 24_000_000, "baud": 12_000_000}  # requests come as pulses
+SMALL = Several(
+    (
+        Skin(rows=2, columns=3, settle_us=4.0, labeller="single", name="one", **FAST),
+        Skin(rows=3, columns=2, settle_us=3.0, report="cells", diodes="row2col", row_order=(2, 0, 1), **FAST),
+    )
+)
+CYCLES = 7_500
+EXAMPLE = examples() / "two-sheets.toml"
+
+
+def timelines(several, cycles, seed=0, received=()):
+    """Random cells and stuck columns that come and go."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for skin in several.skins:
+        starts = np.cumsum(rng.integers(50, 700, size=cycles // 300))
+        pieces = [
+            (
+                int(start),
+                rng.random((skin.rows, skin.columns)) < rng.choice([0.1, 0.5]),
+                rng.random(skin.columns) < 0.3 if rng.random() < 0.2 else None,
+            )
+            for start in starts
+        ]
+        found.append(Timeline(pieces, received))
+    return found
+
+
+def asked(cycles, sheets, bit_clocks, seed=0):
+    """Requests of each sheet, of one that is not there and of none, with the cycle at which they begin."""
+    rng = random.Random(seed)
+    sent, cycle, number = [], 600, 129 * 128 + 1
+    while True:
+        of = rng.choice([*range(sheets), sheets, None])
+        closing = b"" if of is None else bytes([2, 0xB0 + of])
+        data = request(number, rng.random() < 0.2, bit_clocks, closing)
+        if cycle + 10 * bit_clocks * len(data) >= cycles:
+            return sent
+        sent.append((cycle, data))
+        cycle += 10 * bit_clocks * len(data) + rng.choice([0, 1, 300])
+        number += 2 if number % 8 == 7 else 1
+
+
+def heard(traces):
+    """What the driver makes of the line: conversations by sheet."""
+    line = bytes(value for _, value in sorted(itertools.chain(*(trace.bytes for trace in traces))))
+    sorter, found = Sorter(), [Conversation(f"sheet {number}") for number in range(len(traces))]
+    for number, packet in sorter.take(line):
+        assert number is not None
+        found[number].receive(packet, 0.0)
+    return found
+
+
+def check(several, lines, cycles, limit_s=60.0):
+    got = bench_several.run(several, lines, cycles, limit_s)
+    want = predict_several(several.skins, lines, cycles)
+    for one, other in zip(want, got, strict=True):
+        assert compare(one, other) > 20
+    return want
+
+
+def test_gateware_and_model_agree_cycle_for_cycle():
+    check(SMALL, timelines(SMALL, 2_400, received=asked(2_400, 2, 2)), 2_400)
+
+
+@pytest.mark.campaign
+def test_gateware_and_model_agree_with_requests_as_pulses():
+    want = check(SMALL, timelines(SMALL, CYCLES, received=asked(CYCLES, 2, 2, seed=9)), CYCLES)
+    one, other = heard(want)
+    assert one.sheet == SMALL.skins[0].sheet
+    assert one.stats.hellos + other.stats.hellos == 3  # one of them was asked for
+    for talk in (one, other):
+        assert talk.stats.frames > 1
+        assert talk.stats.damaged.total() == talk.stats.lost == 0
+    assert one.stats.overwritten + other.stats.overwritten > 0
+
+
+def test_a_fault_of_the_turns_is_seen(monkeypatch):
+    right = Turns.elaborate
+
+    def wrong(turns, platform):
+        m = right(turns, platform)
+        m.d.comb += turns.turn.eq(2)  # always the second sheet's
+        return m
+
+    monkeypatch.setattr(Turns, "elaborate", wrong)
+    with pytest.raises(Mismatch):
+        check(SMALL, timelines(SMALL, 300), 300)
+
+
+def test_a_sheet_waits_for_one_packet_of_each_other_one():
+    """Three sheets that always have something to say, one of them long packets."""
+    big = Skin(rows=16, columns=16, report="cells", settle_us=5.0, **REGISTERS)
+    skins = [skin.replace(clock_hz=12_000_000, baud=1_000_000) for skin in (*SMALL.skins, big)]
+    several = Several(tuple(skins))
+    traces = predict_several(skins, timelines(several, 120_000), 120_000)
+    ends = sorted((cycle, number) for number, trace in enumerate(traces) for cycle, value in trace.bytes if value == 0)
+    order = [number for _, number in ends]
+    assert order[:6] == [0, 0, 1, 1, 2, 2]  # a hello has a delimiter at either end
+    assert order[6:] == ([0, 1, 2] * len(order))[: len(order) - 6]
+    assert len(order) > 30
+    for talk in heard(traces):
+        assert talk.stats.overwritten > 0
+        assert talk.stats.damaged.total() == talk.stats.lost == 0
+
+
+def test_the_compiled_board_agrees_at_the_pins():
+    cycles, several = 60_000, Several.load(EXAMPLE)
+    sent = asked(cycles, 2, 4)
+    lines = [Timeline([(at, cells, None) for at, cells, _ in line.pieces], sent) for line in timelines(several, cycles)]
+    pressed = [(at, number, cells) for number, line in enumerate(lines) for at, cells, _ in line.pieces if at < cycles]
+    with CompiledSheets(several) as board:
+        for at, number, what in sorted([*pressed, *((at, None, data) for at, data in sent)], key=lambda one: one[0]):
+            board.run(at - board.cycle)
+            board.send(what) if number is None else board.press(number, what)
+        board.run(cycles - board.cycle)
+        want = predict_several(several.skins, lines, cycles)
+        for boundary in ("line", "contact"):
+            events = board.take(boundary)
+            assert list(zip(events["cycle"].tolist(), events["data"].tolist(), strict=True)) == want[0].events(boundary)
+    for number, talk in enumerate(heard(want)):
+        assert talk.hello.place == (number, 2)
+        assert talk.stats.hellos > 1  # asked for
+        assert talk.stats.frames > 5
+        assert talk.stats.damaged.total() == talk.stats.lost == 0
+
+
+def test_the_virtual_board_serves_both_sheets():
+    port, skins = f"sim://?sheets={EXAMPLE}&scene=palm", Several.load(EXAMPLE).skins
+    with contextlib.ExitStack() as stack:
+        boards = [stack.enter_context(contactfpga.open(f"{port}#{number}", skin)) for number, skin in enumerate(skins)]
+        assert [board.name for board in boards] == ["chest", "back"]
+        for _ in range(20):
+            for board in boards:
+                before = board.clock()
+                assert len(board.read()) == 1
+                assert board.clock() - before < 0.01
+        for board in boards:
+            assert board.stats.damaged.total() == board.stats.lost == 0
+    with pytest.raises(contactfpga.OnlyNoise, match=r"serves several sheets; open one of them: .*#0"):
+        contactfpga.open(port, timeout=0.01)
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("seed", range(30))
+def test_sheets_of_all_kinds_agree(seed):
+    rng = random.Random(seed)
+    kinds = [choice for choice in pairwise(CHOICES, seed) if choice["row_chains"] and choice["column_chains"]]
+    first = rng.choice(kinds)
+    same = [first, *rng.choices(kinds, k=rng.randrange(1, 4))]
+    skins = [skin_for(choice | {"link": first["link"]}) for choice in same]
+    several = Several(tuple(skins))
+    bit_clocks = round(skins[0].clock_hz / skins[0].baud)
+    lines = timelines(several, 6_000, seed, asked(6_000, len(skins), bit_clocks, seed))
+    check(several, lines, 6_000, limit_s=600.0)
+
+
+def test_requests_are_for_one_sheet():
+    for closing, hellos in ((b"", [1, 1]), (b"\x02\xb0", [2, 1]), (b"\x02\xb1", [1, 2]), (b"\x02\xb2", [1, 1])):
+        received = [(4_000, request(9, True, 2, closing))]
+        traces = predict_several(SMALL.skins, timelines(SMALL, 9_000, received=received), 9_000)
+        assert [talk.stats.hellos for talk in heard(traces)] == hellos

@@ -1,0 +1,91 @@
+"""A robot whose boards are on other machines: `zenoh://` ports in robot.toml."""
+
+import json
+
+import pytest
+from fake_board import wait_until
+from net_processes import free_endpoint
+from small_port import SmallPort, published
+
+import contactfpga
+from contactfpga import cli
+from contactfpga.body import Body, NoLinkData
+from contactfpga.net import session
+
+pytest.importorskip("zenoh")
+
+SKIN = contactfpga.Skin()
+LONG = 60.0
+LINK = """
+[[links]]
+name = "{name}"
+skin = "skin.toml"
+port = "zenoh://robot/{name}?connect={endpoint}"
+late_s = 1.0
+silent_s = 1.5
+"""
+
+
+@pytest.fixture
+def endpoint():
+    return free_endpoint()
+
+
+@pytest.fixture
+def robot(tmp_path, endpoint):
+    (tmp_path / "skin.toml").write_text(SKIN.to_toml())
+    path = tmp_path / "robot.toml"
+    path.write_text("".join(LINK.format(name=name, endpoint=endpoint) for name in ("left", "right")))
+    return path
+
+
+def board(skin=SKIN):
+    source = SmallPort(skin)
+    source.go(100.0)
+    return source
+
+
+def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, capsys):
+    """And what one of them does is nothing to the others."""
+    with session.listening(endpoint) as network, published(board(), network, "robot/right"):
+        with published(board(), network, "robot/left"):
+            assert cli.main(["body", str(robot), "--json", "--timeout", "60"]) == 0
+            shown = json.loads(capsys.readouterr().out)
+            assert [one["link"] for one in shown["contacts"]] == ["left", "right"]
+            opened = Body.load(robot).open(timeout=LONG)
+            assert set(opened.read(LONG).answering) == {"left", "right"}
+        with opened:
+            wait_until(lambda: opened.latest().links["left"].status == "lost", LONG)
+            snapshot = opened.read(LONG)
+            assert snapshot.answering == ("right",)
+            with pytest.raises(NoLinkData, match=r"left.*(is gone: its publisher ended|nobody publishes it)"):
+                snapshot.contacts("link")
+            assert [one.link for one in snapshot.contacts("link", links=snapshot.answering)] == ["right"]
+            with published(board(), network, "robot/left"):
+                wait_until(lambda: opened.latest().links["left"].status == "ok", LONG)
+                assert [one.link for one in opened.latest().contacts("link")] == ["left", "right"]
+            with published(board(SKIN.replace(pitch_x_mm=20.0)), network, "robot/left"):
+                wait_until(lambda: opened.latest().links["left"].status == "mismatch", LONG)
+                assert "was built from" in opened.latest().links["left"].reason
+            assert opened.latest().links["right"].status == "ok"
+
+
+def test_links_that_nobody_publishes_are_lost_and_leave_nothing_behind(robot, endpoint, monkeypatch):
+    """They are tried again and again: what a try leaves open would run out one day."""
+    psutil = pytest.importorskip("psutil")
+    monkeypatch.setattr("contactfpga.net.port.FOUND_S", 0.02)
+    monkeypatch.setattr("contactfpga.body.reader.RETRY_S", 0.02)
+    tries = []
+    with session.listening(endpoint):
+        opened = Body.load(robot).open()
+        states = opened.latest().links
+        assert {one.status for one in states.values()} == {"lost"}
+        assert all("is `contactfpga publish` running with this key?" in one.reason for one in states.values())
+        connected = session.connected
+        monkeypatch.setattr(session, "connected", lambda *names: tries.append(names) or connected(*names))
+        with opened:
+            counts = []
+            for number in (4, 24):
+                wait_until(lambda number=number: len(tries) >= number, LONG)
+                counts.append(psutil.Process().num_fds())
+    assert counts[1] < counts[0] + 10

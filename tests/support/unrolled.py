@@ -1,0 +1,109 @@
+"""Zones of closed sheets by scipy, on many turns of the sheet side by side; shapes that go around; labellers to try."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from contactfpga import Skin
+from contactfpga.choices.labellers import LABELLERS
+from contactfpga_sim.scenes.shapes import variants
+
+CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
+RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
+RING, WOUND = -1, -2
+"""In place of the sum of the columns."""
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+def skin_of(rows, columns, connectivity, labeller):
+    return Skin(
+        rows=rows,
+        columns=columns,
+        connectivity=connectivity,
+        labeller=labeller,
+        surface="cylinder",
+        radius_mm=20.0,
+        closed=True,
+        settle_us=100,
+        zone_capacity=1,
+    )
+
+
+def zones(frames, connectivity, turns=7):
+    """(n, 4) int64, sorted: frame, area, sum of the columns counted on past the seam, sum of the rows, of each zone in
+    (N, R, C) frames. Where a zone may not fit on as many turns, its frame is looked at again on twice as many."""
+    count, _, columns = frames.shape
+    structure = np.zeros((3, 3, 3), bool)
+    structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
+    labels, pieces = ndimage.label(np.tile(frames, turns), structure)
+    frame, y, x = np.nonzero(labels)
+    label, turn, x = labels[frame, y, x], x // columns, x % columns
+    cell, middle = y * columns + x, turns // 2
+    # Each zone is there many times. It is looked at where its first cell, by rows, lies on the middle turn.
+    first = np.full(pieces + 1, frames.size)
+    np.minimum.at(first, label, cell)
+    chosen = (turn == middle) & (cell == first[label])
+    number = np.full(pieces + 1, -1)
+    number[label[chosen]] = np.arange(chosen.sum())
+    ring = labels[frame[chosen], y[chosen], x[chosen] + (middle + 1) * columns] == label[chosen]
+    zone = number[label]
+    counts = (zone >= 0) & (~ring[zone] | (turn == middle))  # a ring's cells repeat on each turn
+    of_frame, y, x, turn, zone = frame[chosen], y[counts], x[counts], turn[counts], zone[counts]
+    lowest, highest = np.full(len(ring), turns), np.full(len(ring), -1)
+    np.minimum.at(lowest, zone, turn)
+    np.maximum.at(highest, zone, turn)
+    area = np.bincount(zone, minlength=len(ring))
+    total = np.bincount(zone, x + columns * (turn > lowest[zone]), len(ring)).astype(int)
+    place = np.where(ring, RING, np.where(highest - lowest > 1, WOUND, total % (columns * np.maximum(area, 1))))
+    found = np.stack([of_frame, area, place, np.bincount(zone, y, len(ring)).astype(int)], axis=1)
+    tight = np.isin(np.arange(count), of_frame[~ring & ((lowest == 0) | (highest == turns - 1))])
+    if tight.any():
+        again = zones(frames[tight], connectivity, 2 * turns + 1)
+        again[:, 0] = np.nonzero(tight)[0][again[:, 0]]
+        found = np.concatenate([found[~tight[found[:, 0]]], again])
+    return in_order(found)
+
+
+def of_records(frame, records, columns):
+    """The same of (n, 4) records (area, sum x, sum y, turned) and their (n,) frames."""
+    area, sum_x, sum_y, turned = np.asarray(records).reshape(-1, 4).T
+    place = (sum_x + columns * turned) % (columns * area)
+    place = np.where(turned == area, RING, np.where(turned > area, WOUND, place))
+    return in_order(np.stack([np.broadcast_to(frame, area.shape), area, place, sum_y], axis=1))
+
+
+def in_order(found):
+    return found[np.lexsort(found.T[::-1])]
+
+
+def every_frame(rows, columns, first=0, count=None):
+    cells = rows * columns
+    numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
+    return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
+
+
+def hard_frames(rows, columns):
+    """(n, R, C) bool: shapes that break labellers, shifted over the seam and sheared around the cylinder; helices."""
+    frames = []
+    for _, cells in variants(rows, columns):
+        for lean in (-3, -1, 0, 1, 2):
+            sheared = np.stack([np.roll(row, y * lean // 2) for y, row in enumerate(cells)])
+            frames += [np.roll(sheared, shift, axis=1) for shift in (0, columns // 3, columns - 1)]
+    y, x = np.indices((rows, columns))
+    for step in range(1, columns):
+        for wide in sorted({1, step, columns // 2}):
+            frames += [(x - sign * y * step) % columns < wide for sign in (-1, 1)]
+    for gap in range(2, max(3, columns // 2)):  # a spiral of two rows per turn, and its seam of one cell
+        turn = (x - y // 2 * gap) % columns
+        frames += [np.where(y % 2 == 0, turn != 0, turn == 1), np.where(y % 2 == 0, turn > 1, turn == columns - 1)]
+    return np.unique(np.array(frames, bool), axis=0)
+
+
+def recorded(name):
+    path = DATA / f"{name}.dev.npz"
+    if not path.exists():
+        pytest.skip(f"the recordings are not part of the project: {path.name} is not there")
+    with np.load(path, allow_pickle=False) as file:
+        return file["pressed"]

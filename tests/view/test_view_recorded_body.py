@@ -1,0 +1,161 @@
+"""Recordings of a robot in the view: all links together, by the files that the recording holds."""
+
+import shutil
+
+import numpy as np
+import pytest
+from fake_board import wait_until
+from recorded_stream import StreamPort
+from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
+
+pytest.importorskip("viser")
+
+from contactfpga.body import Body, BodyError, packed
+from contactfpga.body.contact import on_link
+from contactfpga.recordings import Recording, Session
+from contactfpga.view import opening, picture
+from contactfpga.view import playback as playing
+from contactfpga.view.bodies import pushes
+from contactfpga.view.player import Player
+from contactfpga.view.recorded_body import BodyPlayer
+
+TIMES = "[[links]]\nlate_s = 0.2\nsilent_s = 0.4"
+
+
+def record(folder, about=None):
+    """The chest sends for 0.2 s, the arm for a second."""
+    path = write_robot(folder)
+    path.write_text(ROBOT.replace("[[links]]", TIMES))
+    ports = {"arm": StreamPort(ROUND, frames=1000), "chest": StreamPort(FLAT, frames=200)}
+    with Session(folder / "x.mcap", bytes_only=True, about={"robot": about or packed.pack(path)}) as session:
+        for name, port in ports.items():
+            session.add(port, name=name)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not any(port.left for port in ports.values()))
+    return path
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Recorded in a folder that is gone."""
+    folder = tmp_path_factory.mktemp("recorded")
+    (folder / "away").mkdir()
+    record(folder / "away")
+    shutil.move(folder / "away" / "x.mcap", folder / "x.mcap")
+    shutil.rmtree(folder / "away")
+    return folder / "x.mcap"
+
+
+@pytest.fixture
+def player(file, monkeypatch):
+    now = [10.0]
+    monkeypatch.setattr(playing.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    player = BodyPlayer(Recording(file), clock=lambda: now[0])
+    yield player
+    player.close()
+
+
+def test_all_links_play_together(file, player):
+    every = list(Recording(file).frames())
+    for _ in range(5):
+        states = player.states()
+        for name, state in states.items():
+            wanted = [(t_s, zones) for t_s, link, zones in every if link == name and t_s <= player.position_s][-1]
+            assert state.status == "ok"
+            assert state.zones.to_dict() == wanted[1].to_dict()
+            assert state.age_s == pytest.approx(player.position_s - wanted[0])
+    assert player.position_s == pytest.approx(0.08)
+
+
+@pytest.mark.parametrize(("seconds", "status"), [(0.1, "ok"), (0.44, "late"), (0.8, "silent")])
+def test_a_link_of_which_nothing_came_has_no_data(player, seconds, status):
+    player.states()
+    player.pause()
+    player.seek(seconds)
+    states = player.states()
+    assert (states["arm"].status, states["chest"].status) == ("ok", status)
+    assert (states["chest"].zones is None) == (status == "silent")
+
+
+def test_a_board_of_another_skin_is_a_mismatch(player):
+    player.states()
+    player.pause()
+    player._newest["chest"] = player._newest["arm"]
+    assert player.states()["chest"].status == "mismatch"
+
+
+def test_where_sheets_lie_is_in_the_recording(file, player, tmp_path):
+    (tmp_path / "again").mkdir()
+    body = Body.load(write_robot(tmp_path / "again"))
+    for name, plan in body.links.items():
+        assert player.body.links[name].place(30.0, 50.0) == plan.place(30.0, 50.0)
+    assert player.body.kinematics.joint_names == ("elbow",)
+
+
+def test_tables_and_units_are_kept_too(tmp_path):
+    path = with_units(write_robot(tmp_path))
+    (tmp_path / "there").mkdir()
+    body = packed.unpack(packed.pack(path), tmp_path / "there")
+    np.testing.assert_array_equal(body.links["chest"].units.matrix, Body.load(path).links["chest"].units.matrix)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda texts: texts.pop("links.1.skin"), "does not hold the robot's file 'links.1.skin'"),
+        (lambda texts: texts.update(urdf="no base64!"), "the recording's robot cannot be read"),
+        (lambda texts: texts.update(toml="= 3"), "the recording's robot cannot be read"),
+        (lambda texts: texts.update(toml="links = [3]"), "the recording's robot cannot be read"),
+    ],
+)
+def test_a_robot_that_is_not_whole_is_refused_in_one_line(tmp_path, change, says):
+    texts = packed.pack(write_robot(tmp_path))
+    change(texts)
+    with pytest.raises(BodyError, match=says):
+        packed.unpack(texts, tmp_path)
+
+
+def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
+    with opening.opened(opening.Named(str(file)), http_port=0) as shown:
+        assert isinstance(shown.source, BodyPlayer)
+        shown.source.seek(0.1)
+        for _ in range(10):
+            shown.view.turn()
+        text = shown.view._facts.content
+        assert "**arm** ok (0.00" in text
+        assert "1 zone" in text
+        chest = shown.view.stage.stages["chest"]
+        assert chest._points.visible
+        assert (chest._colors != picture.UNKNOWN).all()
+        shown.source.seek(0.8)
+        for _ in range(3):
+            shown.view.turn()
+        assert not chest._points.visible, "what touched then is not drawn where nothing is known"
+        assert (chest._colors == picture.UNKNOWN).all()
+        assert shown.view._timeline._player is shown.source
+    source, _ = opening._source(opening.Named(str(file), link="chest"))
+    assert isinstance(source, Player)
+    assert source.title == "x.mcap, chest"
+    source.pause()
+    source.seek(0.1)
+    shown = source.turn().zones
+    wanted = [zones for t_s, _, zones in Recording(file).frames(link="chest") if t_s <= 0.1]
+    assert shown.to_dict() == wanted[-1].to_dict()
+
+
+def test_a_recording_with_the_table_alone_shows_a_link(tmp_path):
+    record(tmp_path, about={"toml": "links = []"})
+    source, _ = opening._source(opening.Named(str(tmp_path / "x.mcap")))
+    assert source.title == "x.mcap, arm"
+
+
+def test_an_arrow_ends_at_its_contact_and_shows_its_force(tmp_path):
+
+    plan = Body.load(write_robot(tmp_path)).links["arm"]
+    state = state_of(ROUND, 3, 5, 10.0)
+    (contact,) = on_link(plan, state)
+    assert pushes(plan, [contact]).shape == (0, 2, 3)
+    object.__setattr__(contact, "force_n", (1.0, 0.5, -5.0))
+    ((tail, tip),) = pushes(plan, [contact])
+    np.testing.assert_allclose(plan.pose.apply(tip), contact.point_m)
+    np.testing.assert_allclose(plan.pose.turn(tip - tail), 0.004 * np.array([1.0, 0.5, -5.0]))
