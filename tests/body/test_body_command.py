@@ -48,6 +48,7 @@ def test_robot_that_cannot_be_is_refused_in_one_line(robot, capsys, old, new, sa
     assert printed.startswith("contactfpga: ")
 
 
+@pytest.mark.campaign  # compiles the boards of four links
 def test_example_prints_contacts_in_the_base_frame(capsys):
     """Of four virtual links of a humanoid from a package."""
     pytest.importorskip("jvrc_description")

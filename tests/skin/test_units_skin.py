@@ -1,4 +1,4 @@
-"""Pressure units in the Skin: your own converter, and the clocks that follow. What is refused: test_skin_refused."""
+"""Pressure units in the Skin: a converter of one's own, and the clocks that follow. Refusals: test_skin_refused."""
 
 import pytest
 import toy_converter

