@@ -10,7 +10,7 @@ quoted = '$(subst ','\'',$(value $(1)))'
 
 # Passed on: make sim ARGS="--help", make test ARGS="-k labeller -x"
 ARGS ?=
-# Processes that `make test` uses; `auto` is one a core, 0 runs the tests in one process.
+# Processes that `make test` uses; `auto` is one more than there are cores, 0 runs the tests in one process.
 JOBS ?= auto
 
 # The shell that called make may have another environment active, or settings that would send pip or Python elsewhere,

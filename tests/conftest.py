@@ -3,6 +3,7 @@
 What only some computers have is imported where it is used: the tests in host.txt also run on Windows, without Amaranth.
 """
 
+import os
 import random
 
 import pytest
@@ -42,9 +43,17 @@ def _closed_ports():
         driver._forget(port)
 
 
-LONGEST_FIRST = (
+FIRST = (
     "test_formal",
+    # These need no Yosys. On a new machine its first use takes a minute, which other processes would spend as well.
     "test_bad_inputs",
+    "test_net_access",
+    "test_publish",
+    "test_net_stops",
+    "test_header",
+    "test_net_congestion",
+    "test_freshness",
+    # The longest of the others, so that at the end of a run no process works alone.
     "test_label_volume",
     "test_label",
     "test_cosim",
@@ -55,10 +64,14 @@ LONGEST_FIRST = (
     "test_terminal",
     "test_demo",
 )
-"""Files that take longest: begun first, so that at the end of a run no process works alone. The second and the fourth
-need no Yosys: on a new machine its first use takes a minute, which two processes would spend twice."""
+"""Files that are begun first, in this order."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    ranks = {name: rank for rank, name in enumerate(LONGEST_FIRST)}
+    ranks = {name: rank for rank, name in enumerate(FIRST)}
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: tests of ports and processes wait more than they compute."""
+    return (os.cpu_count() or 1) + 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from typing import Protocol
@@ -101,9 +100,6 @@ def _run(arguments: Sequence[str] | None) -> int:
     command = COMMANDS[args.command]
     try:
         return command.run(args)
-    except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nor is what is left to flush at exit
-        return 0
     except ModuleNotFoundError as error:
         return interrupt.failed(_missing(args.command, command.EXTRA, error))
     except MissingExtra as error:  # of a part that does not know which command it serves

@@ -48,6 +48,7 @@ def test_what_nothing_disturbs_is_as_stated():
     assert 0.91 < np.mean([trial.holds for trial in trials]) < 0.99
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("setting", felt.SETTINGS[1:2])
 def test_a_place_asked_once_is_that_of_asking_again_and_again(setting):
     """So that the campaign may ask at the end alone, which takes half the time."""

@@ -38,14 +38,20 @@ def guarded(body: Callable[[], int | None]) -> int:
     terminal.prepare()
     with _listening():
         try:
-            return body() or 0
+            status = body() or 0
+            sys.stdout.flush()
+            return status
         except KeyboardInterrupt as interrupt:
             if str(interrupt):
                 terminal.say(f"contactfpga: {interrupt}", sys.stderr, hang=2)
             return STATUS
         except ContactFPGAError as error:
             return failed(error)
+        except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
+            terminal.drop_unwritable()
+            return 0
         except OSError as error:
+            terminal.drop_unwritable()
             return failed(_told(error))
 
 

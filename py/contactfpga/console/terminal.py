@@ -107,6 +107,14 @@ def prepare() -> None:
             stream.reconfigure(errors=_ERRORS)
 
 
+def drop_unwritable() -> None:
+    """Drop what standard output does not take, or Python tries again at its exit and ends with status 120."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _nowhere() -> TextIO:
     return open(os.devnull, "w", encoding="utf-8")
 

@@ -80,7 +80,7 @@ def _yosys(script: str, folder: Path, limit_s: float) -> str:
         text=True,
         timeout=limit_s,
     )
-    return result.stdout
+    return result.stdout if result.returncode == 0 else f"{result.stdout}\nyosys ended with status {result.returncode}"
 
 
 def _outcome(said: str) -> str:
