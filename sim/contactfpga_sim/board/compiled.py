@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from contactfpga.errors import BoardClosed
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board import native
+from contactfpga_sim.board.running import Running
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.sheet.converter import check_simulated
 from contactfpga_sim.sheet.line import Line, RowLine
@@ -24,14 +23,9 @@ CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "
 the transmit, the contact and the alive pin, of the rows that are driven to the selecting level and of the columns that
 are driven, and bytes decoded from the line. The order is that of the driver."""
 
-EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
-"""An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the
-wire, the byte, the level or the driven lines, the 65th of which is the mark; and for a row whether it is the frame's
-last, for a record or an item whether it is the end mark."""
 
-
-class CompiledBoard:
-    """A compiled board, stepped by the clock. Cycle 0 is the first after power-up, as in docs/timing.md.
+class CompiledBoard(Running):
+    """A compiled board of one sheet.
 
     ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, by default what
     :func:`model_of` says. The first board of a Skin takes some seconds to build
@@ -40,23 +34,11 @@ class CompiledBoard:
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
         self.skin = skin
-        self._library = _library(model or model_of(skin))
-        self._lock = threading.RLock()  # a call of another thread would free or run the model under this one's feet
-        self._board: ctypes.c_void_p | None = ctypes.c_void_p(self._library.board_new())
+        super().__init__(model or model_of(skin), CAPTURABLE)
+        for name in ("broken", "fights"):
+            getattr(self._library, f"board_{name}").restype = ctypes.c_uint64
         captured = sum(1 << CAPTURABLE.index(name) for name in set(capture))
         self._call("capture", ctypes.c_uint(captured))
-
-    def _call(self, name: str, *arguments: Any) -> Any:
-        """The driver's function of this name; raises :class:`BoardClosed` where there is no model any more."""
-        with self._lock:
-            if self._board is None:
-                raise BoardClosed("the virtual board was closed; make another one")
-            return getattr(self._library, f"board_{name}")(self._board, *arguments)
-
-    @property
-    def cycle(self) -> int:
-        """The cycle that runs next."""
-        return self._call("cycle")
 
     @property
     def broken(self) -> int:
@@ -135,8 +117,8 @@ class CompiledBoard:
         self._call("load", codes.ctypes.data_as(ctypes.c_void_p))
 
     def run(self, cycles: int) -> None:
-        """Run this many clock cycles. Other Python threads run meanwhile; calls of this board wait."""
-        self._call("run", ctypes.c_uint64(cycles))
+        """As :meth:`Running.run`; raises :class:`Contention` where a column was driven against a row."""
+        super().run(cycles)
         self._check_pins()
 
     def hold(self, frames: np.ndarray, cycles: int | None = None) -> None:
@@ -156,40 +138,9 @@ class CompiledBoard:
         if clocks := self._call("fights"):
             raise Contention(f"in {clocks} clocks a column was driven against a row")
 
-    def send(self, data: bytes) -> None:
-        """Put bytes on the board's receive pin, back to back, the first from the next cycle on."""
-        self._call("send", data, ctypes.c_size_t(len(data)))
-
     def pull_low(self, cycles: int) -> None:
         """Hold the board's receive pin low for this many cycles from the next one on, as noise or a break does."""
         self._call("pull_low", ctypes.c_uint64(cycles))
-
-    def take(self, boundary: str) -> np.ndarray:
-        """The events of a boundary, dtype :data:`EVENT`, since they were taken last."""
-        index = ctypes.c_uint(CAPTURABLE.index(boundary))
-        count = ctypes.c_size_t()
-        with self._lock:  # the address holds until the model runs on
-            address = self._call("events", index, ctypes.byref(count))
-            events = native.array_at(address, count.value, EVENT)
-            self._call("forget", index)
-        return events
-
-    def receive(self) -> bytes:
-        """The bytes decoded from the line since they were taken last."""
-        return self.take("received")["data"].astype(np.uint8).tobytes()
-
-    def close(self) -> None:
-        """Free the model; every later call raises :class:`BoardClosed`. May be called twice."""
-        with self._lock:
-            if self._board is not None:
-                self._call("free")
-                self._board = None
-
-    def __enter__(self) -> CompiledBoard:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
@@ -233,13 +184,3 @@ def model_of(skin: Skin, netlist: native.Netlist | None = None) -> native.Model:
 def initializer(numbers: Iterable[int]) -> str:
     """Of a C++ array."""
     return "{" + ",".join(map(str, numbers)) + "}"
-
-
-def _library(model: native.Model) -> ctypes.CDLL:
-    library = native.load(model)
-    library.board_new.restype = ctypes.c_void_p
-    library.board_cycle.restype = ctypes.c_uint64
-    library.board_broken.restype = ctypes.c_uint64
-    library.board_fights.restype = ctypes.c_uint64
-    library.board_events.restype = ctypes.c_void_p
-    return library

@@ -5,18 +5,17 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import threading
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from contactfpga.errors import BoardClosed
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several, sheets_of
 from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import EVENT, initializer
+from contactfpga_sim.board.compiled import initializer
+from contactfpga_sim.board.running import Running
 from contactfpga_sim.scenes.cells import to_words
 from contactfpga_sim.scenes.scene import Source
 from contactfpga_sim.scenes.scene import scene as make_scene
@@ -28,28 +27,12 @@ CAPTURED = ("line", "contact", "received")
 """Changes of the transmit and of the contact pin, and bytes decoded from the line, in the order of the driver."""
 
 
-class CompiledSheets:
+class CompiledSheets(Running):
     """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on."""
 
     def __init__(self, several: Several):
         self.several = several
-        self._library = native.load(model_of(several))
-        self._library.board_new.restype = ctypes.c_void_p
-        self._library.board_cycle.restype = ctypes.c_uint64
-        self._library.board_events.restype = ctypes.c_void_p
-        self._lock = threading.RLock()
-        self._board: ctypes.c_void_p | None = ctypes.c_void_p(self._library.board_new())
-
-    def _call(self, name: str, *arguments: Any) -> Any:
-        with self._lock:
-            if self._board is None:
-                raise BoardClosed("the virtual board was closed; make another one")
-            return getattr(self._library, f"board_{name}")(self._board, *arguments)
-
-    @property
-    def cycle(self) -> int:
-        """The cycle that runs next."""
-        return self._call("cycle")
+        super().__init__(model_of(several), CAPTURED)
 
     def press(self, number: int, cells: np.ndarray) -> None:
         """From the next cycle on these (rows, columns) bool cells of a sheet are pressed."""
@@ -58,36 +41,6 @@ class CompiledSheets:
             raise ValueError(f"cells of {cells.shape}; sheet {number} is {skin.rows}x{skin.columns}")
         words = np.ascontiguousarray(to_words(cells))
         self._call("press", ctypes.c_uint(number), words.ctypes.data_as(ctypes.c_void_p))
-
-    def run(self, cycles: int) -> None:
-        """Run this many clock cycles."""
-        self._call("run", ctypes.c_uint64(cycles))
-
-    def send(self, data: bytes) -> None:
-        """Put bytes on the receive pin, back to back, the first from the next cycle on."""
-        self._call("send", data, ctypes.c_size_t(len(data)))
-
-    def take(self, boundary: str) -> np.ndarray:
-        """The events of one of :data:`CAPTURED`, dtype ``EVENT``, since they were taken last."""
-        index, count = ctypes.c_uint(CAPTURED.index(boundary)), ctypes.c_size_t()
-        with self._lock:  # the address holds until the model runs on
-            address = self._call("events", index, ctypes.byref(count))
-            events = native.array_at(address, count.value, EVENT)
-            self._call("forget", index)
-        return events
-
-    def close(self) -> None:
-        """Free the model. May be called twice."""
-        with self._lock:
-            if self._board is not None:
-                self._call("free")
-                self._board = None
-
-    def __enter__(self) -> CompiledSheets:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class VirtualSheets:
@@ -110,7 +63,7 @@ class VirtualSheets:
         """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
         left = round(seconds * self.several.clock_hz)
         while True:
-            data = self._board.take("received")["data"].astype(np.uint8).tobytes()
+            data = self._board.receive()
             if data or left <= 0:
                 return data
             for number, scene in enumerate(self._scenes):
