@@ -11,21 +11,10 @@ import pytest
 from fake_board import FakeBoard
 from terminals import OnTerminal
 
-from contactfpga import Skin, cli
+from contactfpga import Skin
 
 SKIN = Skin(rows=4, columns=4, report="cells", settle_us=20.0, precharge_us=0.5)
 RATE_HZ = 2500.0
-
-
-@pytest.fixture
-def run(capsys):
-    """Runs a command in this process; returns status, output and errors."""
-
-    def run(*arguments):
-        status = cli.main([str(argument) for argument in arguments])
-        return status, *capsys.readouterr()
-
-    return run
 
 
 @pytest.fixture
