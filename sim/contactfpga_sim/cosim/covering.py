@@ -86,7 +86,8 @@ def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[st
     }
     rows = []
     while open_pairs:
-        candidates = [_candidate(choices, names, open_pairs, pick) for _ in range(20)]
+        firsts = sorted(open_pairs)
+        candidates = [_candidate(choices, names, open_pairs, pick.choice(firsts), pick) for _ in range(20)]
         best = max(candidates, key=lambda row: len(_pairs(row) & open_pairs))
         open_pairs -= _pairs(best)
         rows.append({name: choices[name][value] for name, value in zip(names, best, strict=True)})
@@ -94,11 +95,11 @@ def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[st
 
 
 def _candidate(
-    choices: dict[str, tuple[Any, ...]], names: list[str], open_pairs: set[Pair], pick: random.Random
+    choices: dict[str, tuple[Any, ...]], names: list[str], open_pairs: set[Pair], first: Pair, pick: random.Random
 ) -> list[int]:
-    """One open pair, then value by value what closes most of the rest."""
+    """One open pair, the first, then value by value what closes most of the rest."""
     row: list[int | None] = [None] * len(names)
-    a, i, b, j = pick.choice(sorted(open_pairs))
+    a, i, b, j = first
     row[a], row[b] = i, j
     for place in pick.sample(range(len(names)), len(names)):
         if row[place] is not None:
@@ -108,12 +109,15 @@ def _candidate(
     return row  # type: ignore[return-value]
 
 
-def _pairs(row: Sequence[Any], place: int | None = None, value: int | None = None) -> set[Pair]:
+def _pairs(row: Sequence[Any], place: int | None = None, value: int = 0) -> set[Pair]:
     """The pairs in a row, or those that ``value`` at ``place`` would add."""
     if place is None:
         return {(a, row[a], b, row[b]) for a, b in itertools.combinations(range(len(row)), 2)}
-    given = [(other, chosen) for other, chosen in enumerate(row) if chosen is not None]
-    return {tuple(itertools.chain(*sorted([(place, value), pair]))) for pair in given}
+    return {
+        (other, chosen, place, value) if other < place else (place, value, other, chosen)
+        for other, chosen in enumerate(row)
+        if chosen is not None
+    }
 
 
 def pairs_in(rows: list[list[int]]) -> set[Pair]:
