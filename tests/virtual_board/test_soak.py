@@ -15,7 +15,6 @@ def test_some_seconds_of_it(capsys):
     assert last.endswith(" 0 faults")
 
 
-@pytest.mark.campaign
 def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
     first = []
 
