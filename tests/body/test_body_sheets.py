@@ -1,4 +1,7 @@
-"""Two links of a body whose sheets are at one FPGA."""
+"""Sheets at one FPGA as links of a body, and over the network."""
+
+import pytest
+from net_processes import free_endpoint, publish
 
 import contactfpga
 from contactfpga.body import Body
@@ -13,6 +16,7 @@ port = "sim://?scene=palm&sheets={folder}/two-sheets.toml#{number}"
 late_s = 60.0
 silent_s = 90.0
 """
+PORT = f"sim://?scene=palm&sheets={SHEETS}#{{}}"
 
 
 def test_two_links_share_a_port(tmp_path):
@@ -24,3 +28,14 @@ def test_two_links_share_a_port(tmp_path):
         snapshot = body.read(timeout=60.0)
     found = {name: (link.status, len(link.zones)) for name, link in snapshot.links.items()}
     assert found == {"chest": ("ok", 1), "back": ("ok", 1)}
+
+
+def test_one_publisher_has_both_sheets():
+    pytest.importorskip("zenoh")
+    endpoint = free_endpoint()
+    with publish(PORT.format(0), "--listen", endpoint, others=[PORT.format(1)]) as publisher:
+        lines = [publisher.line, publisher.process.stdout.readline().strip()]
+        assert lines == [f"zenoh://contactfpga/{name}?connect={endpoint}" for name in ("chest", "back")]
+        for line, rows in zip(lines, (16, 12), strict=True):
+            with contactfpga.open(line, timeout=60) as board:
+                assert (board.sheet.rows, len(board.read(timeout=60))) == (rows, 1)

@@ -90,7 +90,10 @@ def test_certificates_and_users_as_in_the_example(keys, monkeypatch):
     other.mkdir()
     subprocess.run(AUTHORITY.split(), cwd=other, check=True, capture_output=True, timeout=60)
     shutil.copy(other / "authority.pem", keys.folder / "other.pem")
-    with Streaming(SKIN) as streaming, publish(streaming, "--config", keys.config("publish"), "--key", "left") as one:
+    with (
+        Streaming(SKIN) as streaming,
+        publish(streaming.path, "--config", keys.config("publish"), "--key", "left") as one,
+    ):
         assert one.line.startswith("zenoh://left"), one.end()
         assert_loopback_alone(one.process.pid)
         with contactfpga.open(keys.port(), timeout=LONG) as board, session.connected(config=keys.config("read")) as bad:
@@ -175,7 +178,7 @@ def test_commands_and_what_no_host_sends_do_not_reach_the_board(endpoint):
 
 def test_commands_pass_where_that_was_asked_for(endpoint):
     with FakeBoard(SKIN.replace(report="cells")) as source:
-        with publish(source, "--listen", endpoint, "--allow-commands") as one:
+        with publish(source.path, "--listen", endpoint, "--allow-commands") as one:
             with contactfpga.open(one.line, timeout=LONG) as board:
                 board.sample_at(0, LONG)
     assert source.commanded == [(2, 0)]

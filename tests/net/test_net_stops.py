@@ -62,7 +62,7 @@ def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted():
     with (
         Streaming(SKIN, every_s=0.01) as board,
         router(endpoint) as one_router,
-        publish(board, "--connect", endpoint) as publisher,
+        publish(board.path, "--connect", endpoint) as publisher,
         Reader(port, MOST_S) as reader,
     ):
         board.stream = settle(board, reader)
@@ -86,7 +86,7 @@ def test_random_histories_of_processes(seed):
     rng, endpoint = random.Random(seed), free_endpoint()
     with Streaming(SKIN, every_s=0.01) as board, Relay(endpoint) as cable, contextlib.ExitStack() as stack:
         routing = stack.enter_context(router(endpoint))
-        publishing = stack.enter_context(publish(board, "--connect", endpoint))
+        publishing = stack.enter_context(publish(board.path, "--connect", endpoint))
         port = f"zenoh://contactfpga/left-forearm?connect={cable.endpoint}&wait=600"
         reader = stack.enter_context(Reader(port, MOST_S))
         board.stream = settle(board, reader)
@@ -96,7 +96,7 @@ def test_random_histories_of_processes(seed):
             what = rng.choice(["publisher", "router", "cable", "stop", "stop"])
             if what == "publisher":
                 publishing.end()
-                publishing = stack.enter_context(publish(board, "--connect", endpoint))
+                publishing = stack.enter_context(publish(board.path, "--connect", endpoint))
                 publishers += 1
             elif what == "router":
                 routing.end()

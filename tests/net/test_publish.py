@@ -53,7 +53,7 @@ def take_until(board, condition, sent_us):
 
 def test_a_published_board_is_a_board(streaming):
     endpoint = free_endpoint()
-    with publish(streaming, "--listen", endpoint) as publisher:
+    with publish(streaming.path, "--listen", endpoint) as publisher:
         assert publisher.line == port(endpoint)
         with contactfpga.open(publisher.line, SKIN, timeout=LONG) as board:
             assert board.name == "left forearm"
@@ -73,9 +73,27 @@ def test_a_published_board_is_a_board(streaming):
         assert publisher.end() == ""
 
 
+def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming):
+    endpoint = free_endpoint()
+    other = FakeBoard(contactfpga.Skin(name="chest", rows=9))
+    with other, publish(streaming.path, "--listen", endpoint, others=[other.path]) as publisher:
+        lines = [publisher.line, publisher.process.stdout.readline().strip()]
+        assert lines == [port(endpoint), f"zenoh://contactfpga/chest?connect={endpoint}"]
+        with contactfpga.open(lines[0], timeout=LONG) as board, contactfpga.open(lines[1], timeout=LONG) as chest:
+            assert chest.sheet.rows == 9
+            other.unplug()
+            assert "is gone" in (said := publisher.process.stderr.readline())
+            assert said.endswith("; the others go on\n")
+            with pytest.raises(contactfpga.PortLost):
+                collections.deque((chest.next(LONG) for _ in itertools.count()), maxlen=0)
+            assert len(take(board, 0.5, streaming.sent_us)) > 5
+        publisher.process.send_signal(signal.SIGINT)
+        assert publisher.process.wait(LONG) == 1
+
+
 def test_a_killed_publisher_shows_within_a_second(streaming):
     endpoint = free_endpoint()
-    with router(endpoint), publish(streaming, "--connect", endpoint) as publisher:
+    with router(endpoint), publish(streaming.path, "--connect", endpoint) as publisher:
         with contactfpga.open(publisher.line, timeout=LONG) as board:
             take(board, 0.3, streaming.sent_us)
             os.kill(publisher.process.pid, signal.SIGKILL)
@@ -90,12 +108,12 @@ def test_a_killed_publisher_shows_within_a_second(streaming):
 def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(streaming):
     endpoint = free_endpoint()
     with router(endpoint):
-        with publish(streaming, "--connect", endpoint) as publisher:
+        with publish(streaming.path, "--connect", endpoint) as publisher:
             board = contactfpga.open(port(endpoint, wait_s=60), timeout=LONG)
             take(board, 0.3, streaming.sent_us)
         publisher.end()
         frames = board.stats.frames
-        with board, publish(streaming, "--connect", endpoint):
+        with board, publish(streaming.path, "--connect", endpoint):
             take_until(board, lambda: board.stats.frames > frames + 20, streaming.sent_us)
             assert board.stats.net.publishers == 2
             assert board.stats.lost > 0
@@ -104,7 +122,7 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
 
 def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming):
     endpoint = free_endpoint()
-    with router(endpoint) as first, publish(streaming, "--connect", endpoint):
+    with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):
         with contactfpga.open(port(endpoint, wait_s=60), timeout=LONG) as board:
             take(board, 0.3, streaming.sent_us)
             first.end()
@@ -119,7 +137,7 @@ def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming):
 
 def test_a_link_that_flaps_loses_frames_and_counts_them(streaming):
     endpoint = free_endpoint()
-    with publish(streaming, "--listen", endpoint), Relay(endpoint) as relay:
+    with publish(streaming.path, "--listen", endpoint), Relay(endpoint) as relay:
         with contactfpga.open(port(relay.endpoint, wait_s=60), timeout=LONG) as board:
             for pause_s in (0.1, 1.0):
                 take(board, 0.3, streaming.sent_us)
@@ -146,6 +164,7 @@ def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys)
     for arguments, said in (
         (["replay://x"], "publish a board, not a recording or what is published already"),
         ([streaming.path, "--key", "a/**"], "key is 'a/**'"),
+        ([streaming.path, "/dev/null", "--key", "a"], "--key a names one board, and there are 2; leave it out"),
         ([streaming.path, "--listen", "x", "--connect", "y"], "give --listen or --connect, not both"),
         ([streaming.path, "--config", "/nowhere.json5"], "there is no such file"),
     ):
@@ -164,7 +183,7 @@ def test_an_endpoint_that_zenoh_cannot_read_is_one_line(opened):
 
 def test_a_board_that_is_unplugged_ends_its_publisher():
     endpoint = free_endpoint()
-    with FakeBoard(SKIN) as board, publish(board, "--listen", endpoint) as publisher:
+    with FakeBoard(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
         board.unplug()
         said = publisher.process.communicate(timeout=LONG)[1]
     assert publisher.process.returncode == 1

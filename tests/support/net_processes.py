@@ -85,9 +85,9 @@ def router(endpoint):
     return Child("-c", ROUTER, endpoint)
 
 
-def publish(board, *options, wait=True):
-    """``contactfpga publish`` of a board."""
-    return Child("-m", "contactfpga", "publish", board.path, "--timeout", 60, *options, wait=wait)
+def publish(port, *options, others=(), wait=True):
+    """``contactfpga publish`` of a port and others."""
+    return Child("-m", "contactfpga", "publish", port, *others, "--timeout", 60, *options, wait=wait)
 
 
 class Sight(NamedTuple):

@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import queue
 import sys
 import threading
+from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.driver import driver
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.net import address
-from contactfpga.wire.hello import Hello
 
-HELP = "Publish a board over the network (Eclipse Zenoh); zenoh://KEY reads it."
+if TYPE_CHECKING:
+    from contactfpga.net.publisher import Publisher
+
+HELP = "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one."
 EXTRA = "net"
 
-PORT = (
-    "Device path, name:NAME or usb:SERIAL of a board, or sim:// (default: the one supported board that is plugged in, "
-    "with --skin the one of that Skin)."
+PORTS = (
+    "Device path, name:NAME or usb:SERIAL of a board (PORT#1: sheet 1 of several at one board), or sim://. Several of "
+    "them publish several boards (default: the one supported board plugged in, with --skin the one of that Skin)."
 )
+SHOWN_S = 0.2
+"""How often is looked which boards are still there."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    flags.connection(parser, PORT)
-    key = "Name of the board on the network (default: contactfpga/ and its name, or its fingerprint)."
+    parser.add_argument("ports", nargs="*", metavar="PORT", help=PORTS)
+    flags.reading(parser)
+    key = "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint)."
     parser.add_argument("--key", help=key)
     listen = f"Listen there, such as tcp/0.0.0.0:7447 for all (default: {address.ENDPOINT}, this machine only)."
     parser.add_argument("--listen", metavar="ENDPOINT", help=listen)
@@ -40,37 +48,77 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command until Ctrl-C."""
+    """Run the command until Ctrl-C, or until every board is gone."""
     if args.listen and args.connect:
         raise ContactFPGAError("give --listen or --connect, not both")
+    if args.key is not None and len(args.ports) > 1:
+        raise ContactFPGAError(f"--key {args.key} names one board, and there are {len(args.ports)}; leave it out")
     from contactfpga.net import session
     from contactfpga.net.publisher import Publisher
 
     key = None if args.key is None else address.checked_key(args.key)
-    hello, device = _look(args)
-    key = key or address.key_of(hello.name, hello.fingerprint)
+    boards = _look(args, key)
     here = args.connect or args.listen or address.ENDPOINT
-    transport = connect(device, args.baud or hello.baud)
-    try:
+    batch_s, block = args.batch_ms / 1000, args.congestion == "block"
+    with contextlib.ExitStack() as ending:
         open_session = session.connected if args.connect else session.listening
-        with open_session(args.connect or args.listen, args.config) as network:
-            batch_s, block = args.batch_ms / 1000, args.congestion == "block"
-            publisher = Publisher(transport, network, key, batch_s=batch_s, block=block, commands=args.allow_commands)
-            with interrupt.usual_end():
-                print(f"{address.SCHEME}{key}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
-                _warn(args, here)
-                publisher.run(threading.Event())
+        network = ending.enter_context(open_session(args.connect or args.listen, args.config))
+        publishers = []
+        for of, (device, baud) in boards.items():
+            transport = connect(device, baud)
+            ending.callback(transport.close)
+            options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
+            publishers.append(Publisher(transport, network, of, **options))
+        for of in boards:
+            print(f"{address.SCHEME}{of}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
+        _warn(args, here)
+        return _publish(publishers)
+
+
+def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int]]:
+    """Device and baud rate of each board, by its key."""
+    found: dict[str, tuple[str, int]] = {}
+    for port in args.ports or [None]:
+        if port is not None and port.startswith(("replay:", address.SCHEME)):
+            raise ContactFPGAError(f"port is {port!r}; publish a board, not a recording or what is published already")
+        with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
+            of = key or address.key_of(board.hello.name, board.hello.fingerprint)
+            if of in found:
+                first = found[of][0]
+                raise ContactFPGAError(f"{first} and {board.port} would both be {of}; give their Skins different names")
+            found[of] = board.port, args.baud or board.hello.baud
+    return found
+
+
+def _publish(publishers: list[Publisher]) -> int:
+    """One thread each. If a board is gone, the others go on."""
+    stop = threading.Event()
+    ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
+    failures: list[Exception] = []
+    threads = [threading.Thread(target=_run, args=(one, stop, ended), daemon=True) for one in publishers]
+    try:
+        with interrupt.usual_end():
+            for thread in threads:
+                thread.start()
+            while len(failures) < len(publishers):
+                with contextlib.suppress(queue.Empty):
+                    failures.append(ended.get(timeout=SHOWN_S))
+                    if len(failures) < len(publishers):
+                        interrupt.failed(f"{failures[-1]}; the others go on")
     finally:
-        transport.close()
-    return 0
+        stop.set()
+        for thread in threads:
+            thread.join()
+    if len(failures) == len(publishers):
+        raise failures[-1]
+    return 1 if failures else 0
 
 
-def _look(args: argparse.Namespace) -> tuple[Hello, str]:
-    """What the board says of itself, and the device it is on."""
-    if args.port is not None and args.port.startswith(("replay:", address.SCHEME)):
-        raise ContactFPGAError(f"port is {args.port!r}; publish a board, not a recording or what is published already")
-    with driver.open(args.port, args.skin, baud=args.baud, timeout=args.timeout) as board:
-        return board.hello, board.port
+def _run(publisher: Publisher, stop: threading.Event, ended: queue.SimpleQueue[Exception]) -> None:
+    try:
+        publisher.run(stop)
+    except Exception as error:
+        ended.put(error)
 
 
 def _warn(args: argparse.Namespace, here: str) -> None:

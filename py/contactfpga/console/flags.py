@@ -19,6 +19,11 @@ SKIN = "Require a board built from this Skin, and use its baud rate."
 def connection(parser: argparse.ArgumentParser, port: str = PORT, skin: str = SKIN) -> None:
     """What :func:`opened` takes; ``port``, ``skin``: the help of these."""
     parser.add_argument("port", nargs="?", metavar="PORT", help=port)
+    reading(parser, skin)
+
+
+def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
+    """How a port is opened; ``skin``: the help of this option."""
     parser.add_argument("--skin", metavar="FILE", help=skin)
     parser.add_argument(
         "--baud", type=numbers.BAUD, metavar="N", help="Bits per second (default: the Skin's, or 3000000)."
