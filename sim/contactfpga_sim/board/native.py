@@ -13,6 +13,7 @@ import dataclasses
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import multiprocessing
 import os
 import platform
@@ -156,7 +157,8 @@ def find_compiler() -> list[str]:
 
 def _cache_key(model: Model, compiler: list[str]) -> str:
     digest = hashlib.sha256(model.key.encode())
-    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver):
+    own = [Path(inspect.getfile(model.places))] if model.places else []
+    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver, *own):
         digest.update(path.read_bytes())
     # A compiler's file tells its versions apart without starting it.
     stat = Path(compiler[0]).resolve().stat()

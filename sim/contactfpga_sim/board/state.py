@@ -12,7 +12,7 @@ from contactfpga.skin import Skin
 from contactfpga_sim.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.board.native import Model
 
-_WIRE = re.compile(r"^\twire<\d+> (\w+);", re.MULTILINE)
+_WIRE = re.compile(r"^\t(?:/\*output\*/ )?wire<\d+> (\w+);", re.MULTILINE)
 _MEMORY = re.compile(r"^\tmemory<\d+> (\w+) \{ (\d+)u };", re.MULTILINE)
 
 
