@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from slow_skin import SLOW
 
 import contactfpga
 from contactfpga import cli
@@ -12,11 +13,8 @@ from contactfpga.driver.ports import Candidate
 from contactfpga.driver.sim_address import SimAddress
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
-from contactfpga.skin import Skin
 from contactfpga_sim.board import native
 from contactfpga_sim.board.pty_board import PtyBoard
-
-SLOW = Skin(rows=2, columns=2, clock_hz=1_000_000, baud=100_000, settle_us=1000.0)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +55,9 @@ def test_what_is_no_address_is_told(address, message):
 def test_files_of_any_name_make_a_board(tmp_path):
     skin, scene = tmp_path / "50%&+#.toml", tmp_path / "a b%41.npy"
     skin.write_text(SLOW.to_toml())
-    np.save(scene, np.array([[[0, 9], [0, 8]]], np.uint8))
+    values = np.zeros((1, 4, 4), np.uint8)
+    values[0, :2, 1] = 9, 8
+    np.save(scene, values)
     quoted = [str(path).replace("%", "%25").replace("&", "%26") for path in (skin, scene)]
     with contactfpga.open(f"sim://?skin={quoted[0]}&scene={quoted[1]}&threshold=8") as board:
         assert board.next().pressed == 1

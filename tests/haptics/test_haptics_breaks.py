@@ -90,6 +90,7 @@ def test_places_limit_the_forces_of_two_fingers():
     assert known < 0.8 * coarse
 
 
+@pytest.mark.campaign  # which has a board of its own to compile
 def test_two_contacts_60_mm_apart_are_felt_apart():
     found = felt.two(60.0, 0)
     assert found.zones == 2

@@ -145,6 +145,7 @@ def test_a_column_rises_and_falls_as_the_closed_form_says():
     assert read(1e-9, 0.49, 1e-9) == [0, 0]  # a level that stays below the threshold
 
 
+@pytest.mark.campaign  # test_settling.py has an image of settle times
 def test_a_compiled_board_settles_when_its_circuit_does():
     """A row is missed where the model needs more than the settle time, by how many of its switches are pressed."""
     skin = Skin(rows=2, columns=1, settle_us=5.0, release_us=1.0)

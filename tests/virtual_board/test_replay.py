@@ -127,7 +127,7 @@ def run(capsys):
     return run
 
 
-def test_json_lines(tmp_path, run):
+def test_json_lines_have_the_names_of_zones(tmp_path, run, capsys):
     values = np.zeros((3, 4, 5), np.uint8)
     values[1, 1:3, 2] = 40
     values[1, 3, 0] = 31
@@ -147,27 +147,12 @@ def test_json_lines(tmp_path, run):
     assert lines[1]["cycles"]["last_row_to_first_record"] == 3
     assert lines[1]["cycles"]["last_row_to_last_record"] == 4
     assert lines[1]["flags"] == []
+    assert cli.main(["zones", "sim://?scene=two_fingers", "--once", "--json"]) == 0
+    live = json.loads(capsys.readouterr().out)
+    assert list(lines[1]) == ["frame", *live, "cycles"]
+    assert [*lines[1]["zones"][0]] == [*live["zones"][0]]
     _, out, _ = run(path, "--threshold", 30, "--pitch-mm", 2.5)
     assert "3 of 4x5" in out
-
-
-@pytest.mark.parametrize("bits", sample([None, 3], quick=[None]))
-def test_replay_and_zones_print_the_same_names(tmp_path, capsys, bits):
-    cells = np.zeros((1, 16, 16), bool)
-    cells[0, 3, 5:7] = True
-    np.save(tmp_path / "frames.npy", cells)
-    assert (
-        cli.main(["replay", str(tmp_path / "frames.npy"), "--json", *([f"--barycenter-bits={bits}"] if bits else [])])
-        == 0
-    )
-    replayed = json.loads(capsys.readouterr().out)
-    skin = tmp_path / "skin.toml"
-    skin.write_text('report = "barycenter"\nbarycenter_bits = 3\n' if bits else "")
-    port = f"sim://?scene={tmp_path / 'frames.npy'}&skin={skin}"
-    assert cli.main(["zones", port, "--once", "--json"]) == 0
-    live = json.loads(capsys.readouterr().out)
-    assert list(replayed) == ["frame", *live, "cycles"]
-    assert replayed["zones"] == live["zones"] != []
 
 
 @pytest.mark.parametrize(

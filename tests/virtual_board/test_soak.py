@@ -1,6 +1,7 @@
 """The soak's own run, for a few seconds, and that it sees what it looks for."""
 
 import pytest
+from slow_skin import SLOW
 
 from contactfpga.driver.board import Board
 from contactfpga_sim.board import soak
@@ -23,6 +24,7 @@ def test_frames_that_come_twice_are_seen(capsys, monkeypatch):
         return first[0]
 
     monkeypatch.setattr(Board, "read", same)
+    monkeypatch.setattr(soak, "SKIN", SLOW)
     assert soak.main(["--seconds", "1"]) == 1
     assert "asked for a new frame" in capsys.readouterr().err
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from decoded import decoded
+from slow_skin import SLOW
 
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
@@ -23,9 +24,6 @@ from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.cosim import bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict, requests
-
-SLOW = Skin(rows=4, columns=4, clock_hz=3_000_000, baud=750_000, settle_us=19.0)
-"""A board that holds real time on a busy machine."""
 
 
 def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property):
@@ -50,7 +48,7 @@ def test_time_passes_only_while_it_is_read():
             data += board.read(0.001)
         assert 0.02 <= board.clock() < 0.022
         frames = decoded(data, SLOW)[0]
-        assert len(frames) > 50
+        assert len(frames) > 40
         assert {frame.cells for frame in frames} == {16}
         assert [frame.sequence for frame in frames] == list(range(len(frames)))
 
@@ -70,7 +68,7 @@ def test_a_scene_is_asked_for_the_time():
     pressed = [(frame.time_us, frame.cells) for frame in decoded(data, SLOW)[0]]
     assert {0, 16} <= {cells for _, cells in pressed}
     first = min(time_us for time_us, cells in pressed if cells)
-    assert 2000 <= first <= 2400
+    assert 2000 <= first <= 2700
 
 
 def test_cells_of_another_size_are_refused():
