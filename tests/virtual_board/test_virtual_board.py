@@ -15,8 +15,10 @@ import pytest
 from decoded import decoded
 from slow_skin import SLOW
 
+import contactfpga
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 from contactfpga_sim.board import native, pty_board
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.board.pty_board import PtyBoard
@@ -104,6 +106,14 @@ def test_a_pty_board_keeps_real_time_and_outlives_its_clients():
     assert board.failure is None
     assert not Path(board.port).exists() or board._master < 0
     board.stop()
+
+
+def test_several_sheets_share_the_pseudo_terminal():
+    with PtyBoard(Several.load(contactfpga.examples() / "two-sheets.toml"), "full") as board:
+        with contactfpga.open(f"{board.port}#1", timeout=60) as back:
+            assert (back.sheet.rows, back.sheet.columns) == (12, 24)
+            assert [zone.area_cells for zone in back.read(timeout=60)] == [12 * 24]
+    assert board.failure is None
 
 
 def test_what_nobody_reads_is_dropped_and_counted():

@@ -11,7 +11,7 @@ from typing import Any
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
 from contactfpga.circuit import load_checked
-from contactfpga.console import numbers, outputs
+from contactfpga.console import flags, numbers, outputs
 from contactfpga.console.wiring import Table
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
@@ -26,8 +26,7 @@ BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec.
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     parser.add_argument("board", metavar="BOARD", help=BOARD)
-    parser.add_argument("--skin", metavar="FILE", help="Skin to build (default: one that fits the board).")
-    parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
+    flags.design(parser, "Skin to build (default: one that fits the board).")
     parser.add_argument("--output", metavar="DIR", help="Folder for the results (default: build/BOARD).")
     start = "Seed of place and route (default: 1)."
     parser.add_argument("--seed", type=numbers.whole(0, 2**31 - 1), default=1, metavar="N", help=start)
@@ -40,11 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_hdl.board import sites
 
     board = find(args.board)
-    if args.skin and args.sheets:
-        raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
-    design: Skin | Several = board.skin
-    if args.skin or args.sheets:
-        design = Skin.load(args.skin) if args.skin else Several.load(args.sheets)
+    design = flags.designed(args, board.skin)
     circuit = load_checked(args.skin, design) if isinstance(design, Skin) and args.skin else None
     board.check(design)
     table = Table(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))

@@ -8,6 +8,8 @@ from contactfpga.console import numbers
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 PORT = (
     "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "
@@ -30,6 +32,21 @@ def reading(parser: argparse.ArgumentParser, skin: str = SKIN) -> None:
     )
     wait = "Seconds to wait for the board (default: 1)."
     parser.add_argument("--timeout", type=numbers.SECONDS, default=1.0, metavar="S", help=wait)
+
+
+def design(parser: argparse.ArgumentParser, skin: str) -> None:
+    """A Skin or several of them; ``skin``: the help of this option."""
+    parser.add_argument("--skin", metavar="FILE", help=skin)
+    parser.add_argument("--sheets", metavar="FILE", help="Several sheets at this one FPGA (docs/several.md).")
+
+
+def designed(args: argparse.Namespace, usual: Skin) -> Skin | Several:
+    """What the options of :func:`design` name, or the usual Skin."""
+    if args.skin and args.sheets:
+        raise ContactFPGAError("give --skin or --sheets, not both; the Skins of several sheets are in their file")
+    if args.sheets:
+        return Several.load(args.sheets)
+    return Skin.load(args.skin) if args.skin else usual
 
 
 def seconds(parser: argparse.ArgumentParser) -> None:

@@ -21,6 +21,8 @@ from contactfpga.circuit import Circuit
 from contactfpga.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin, SkinError
+from contactfpga.skin.several import Several, sheets_of
+from contactfpga_sim.board.several import VirtualSheets
 from contactfpga_sim.board.virtual import VirtualBoard
 from contactfpga_sim.scenes.scene import Source
 
@@ -44,18 +46,20 @@ class PtyBoard:
 
     The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
     ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
-    skin, scene, cover and circuit: as for :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a
-    symbolic link to the port. What no client reads is dropped, the oldest first, and counted.
+    skin: of the board's sheet, or of several, which the scene touches alike; scene, cover and circuit: as for
+    :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. What no client
+    reads is dropped, the oldest first, and counted.
     """
 
     def __init__(
         self,
-        skin: Skin | None = None,
+        skin: Skin | Several | None = None,
         scene: Source = None,
         link: str | Path | None = None,
         cover: Cover | None = None,
         circuit: Circuit | None = None,
     ):
+        self.skins = skin.skins if isinstance(skin, Several) else (skin or Skin(),)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         # The board keeps its own end of the slave open: without it, a client that leaves would end the terminal.
@@ -75,14 +79,14 @@ class PtyBoard:
         try:
             if self._link:
                 self._make_link(self._link)
-            self._board = VirtualBoard(skin, scene, cover, circuit)
+            self._board = (
+                VirtualSheets(skin, [scene] * len(skin.skins))
+                if isinstance(skin, Several)
+                else VirtualBoard(skin, scene, cover, circuit)
+            )
         except BaseException:
             self._close_port()
             raise
-
-    @property
-    def skin(self) -> Skin:
-        return self._board.skin
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""
@@ -120,8 +124,8 @@ class PtyBoard:
         """Run in the foreground until SIGINT or SIGTERM: the port on stdout, everything else on stderr."""
         shown = self._link or self.port
         print(shown, flush=True)
-        cells = f"{self.skin.rows}x{self.skin.columns} cells"
-        _say(f"virtual board of {cells}; try: contactfpga zones {shlex.quote(str(shown))}")
+        first = str(shown) if len(self.skins) == 1 else f"{shown}#0"
+        _say(f"virtual board of {sheets_of(self.skins)} cells; try: contactfpga zones {shlex.quote(first)}")
         _say("Ctrl-C ends it")
         started = time.monotonic()
         try:
@@ -144,7 +148,7 @@ class PtyBoard:
             self.stop()  # its client finds the port gone, and does not wait for a board that says nothing
 
     def _run(self) -> None:
-        cycles = max(1, round(CHUNK_S * self.skin.clock_hz))
+        cycles = max(1, round(CHUNK_S * self.skins[0].clock_hz))
         begin = time.monotonic() - self._board.clock()  # when simulated time was 0, slip taken out
         window, window_slip = time.monotonic(), self.slip
         while not self._stopping.is_set():
@@ -164,7 +168,7 @@ class PtyBoard:
     def _report_slip(self, share: float) -> None:
         if share > SLIP_LIMIT and not self._slip_told:
             self._slip_told = True  # again and again would fill the terminal; the end sums it up
-            _say(slip_told(self.skin, share))
+            _say(slip_told(self.skins[0], share))
 
     def _listen(self, seconds: float) -> None:
         """Wait at most ``seconds`` for a client's bytes, and hand them to the board."""

@@ -66,11 +66,15 @@ class VirtualSheets:
             data = self._board.receive()
             if data or left <= 0:
                 return data
-            for number, scene in enumerate(self._scenes):
-                self._board.press(number, scene(self.clock()))
             cycles = min(left, self._chunk)
-            self._board.run(cycles)
+            self.advance(cycles)
             left -= cycles
+
+    def advance(self, cycles: int) -> None:
+        """Run clock cycles with the scenes as they are now."""
+        for number, scene in enumerate(self._scenes):
+            self._board.press(number, scene(self.clock()))
+        self._board.run(cycles)
 
     def clock(self) -> float:
         """Simulated seconds since power-up."""
