@@ -93,12 +93,12 @@ class Watch:
 
     @property
     def stuck(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were told as ``stuck`` and did not change since."""
+        """(row, column) of the switches that were reported as ``stuck`` and have not changed since."""
         return () if self._sheet is None else tuple(sorted(self._history.stuck))
 
     @property
     def fluttering(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were told to ``flutter``."""
+        """(row, column) of the switches that were reported to ``flutter``."""
         return () if self._sheet is None else tuple(sorted(self._history.flutters))
 
     @property
