@@ -23,7 +23,7 @@ EXTRA = "net"
 
 PORTS = (
     "Device path, name:NAME or usb:SERIAL of a board (PORT#1: sheet 1 of several at one board), or sim://. Several of "
-    "them publish several boards (default: the one supported board plugged in, with --skin the one of that Skin)."
+    "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
 """How often is looked which boards are still there."""

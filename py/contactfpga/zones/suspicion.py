@@ -22,11 +22,11 @@ class Suspicion:
 
     kind: Literal["stuck", "held", "flutter"]
     """``stuck``: one to three switches side by side read pressed without a change, while others came and went;
-    ``held``: the same of more, which is rather something that lies there; ``flutter``: a switch that changes faster
+    ``held``: the same for more switches, so more likely something lies there; ``flutter``: a switch that changes faster
     than a hand can."""
     sentence: str
     cells: tuple[Cell, ...]
-    """(row, column) of the switches; () where the frames do not tell them."""
+    """(row, column) of the switches; () if the frames do not show which."""
     time_us: int
     """Device time at which it was noticed, in us."""
 

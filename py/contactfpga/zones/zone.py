@@ -40,14 +40,15 @@ class Zones(Sequence[Zone]):
         self.frame = frame
         """The frame as it came over the wire."""
         self.sheet = sheet
-        """The sheet, as the board's hello tells it."""
+        """The sheet, from the board's hello."""
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, since power-up."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
-        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
-        ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
-        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
-        the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
+        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test they have names:
+        ``row 3 open``, ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open``
+        (all columns are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; or
+        ``unnamed fault`` if the name has not come yet. Otherwise there is only ``stuck``; ``board.hello.stuck`` says
+        how many columns are."""
         self._before = before
         self._line = line
         self._history = history
@@ -55,7 +56,7 @@ class Zones(Sequence[Zone]):
 
     @property
     def arrived_s(self) -> float | None:
-        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
+        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` except for ``sim://``;
         None in a recording."""
         return None if self._line is None else self._line.arrived_s
 
@@ -73,18 +74,19 @@ class Zones(Sequence[Zone]):
     @property
     def units(self) -> UnitSamples | None:
         """What the pressure units read at :attr:`time_us`, interpolated between their samples before and after it. None
-        for a board without units, and until both have come: as a frame arrives the later one is mostly still on its
-        way. So ask again some sweeps later, or take the newest readings, with their own time, from
-        :meth:`Board.events`. It is kept once it was found; after about a second nobody knows it any more."""
+        for a board without units, and until both samples have come: when a frame arrives, the later one is usually
+        still on its way. So ask again a few sweeps later, or take the newest readings, with their own time, from
+        :meth:`Board.events`. Once found, the readings are kept; if you first ask after more than about a second, they
+        are gone."""
         if self._units is None and self._history is not None:
             self._units = self._history.at(self.time_us)
         return self._units
 
     @functools.cached_property
     def flags(self) -> frozenset[str]:
-        """Names from :data:`contactfpga.wire.protocol.FLAGS`; `ghost` where a sheet without diodes may show pressed
-        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to; and `motion`
-        where a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`. Also ``ghost`` if a sheet without diodes may show cells
+        as pressed that are not, as a zone of their own (:attr:`Zone.ghost`) or added to another zone; and ``motion`` if
+        a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
         found = set()
         if self.sheet.ghosts and self._has_ghosts():
             found.add("ghost")
@@ -112,7 +114,7 @@ class Zones(Sequence[Zone]):
 
     @property
     def total_zones(self) -> int:
-        """Zones on the sheet, also those the frame had no room for."""
+        """Zones on the sheet, including those that the frame had no room for."""
         return self.frame.zones if self.frame.bitmap is None else len(self)
 
     @property
@@ -122,13 +124,13 @@ class Zones(Sequence[Zone]):
 
     @property
     def cells(self) -> np.ndarray | None:
-        """(rows, columns) bool with ``report = "cells"``, else None: then the board sends zones only."""
+        """(rows, columns) bool with ``report = "cells"``; None for a board that sends only zones."""
         return self.frame.bitmap
 
     @property
     def ghost_cells(self) -> np.ndarray | None:
-        """(rows, columns) bool with ``report = "cells"``, else None: cells that other pressed ones may have made, which
-        takes a sheet without diodes (:mod:`contactfpga.zones.ghosts`)."""
+        """Cells that other pressed cells may have made, on a sheet without diodes (:mod:`contactfpga.zones.ghosts`):
+        (rows, columns) bool with ``report = "cells"``, otherwise None."""
         return None if self.frame.bitmap is None else self._ghost_cells
 
     @functools.cached_property
@@ -157,8 +159,8 @@ class Zones(Sequence[Zone]):
 
     @property
     def rounding_mm(self) -> tuple[float, float]:
-        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``, else
-        0."""
+        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``,
+        otherwise 0."""
         if self.sheet.report != "barycenter":
             return 0.0, 0.0
         steps = 2 << self.sheet.barycenter_bits
@@ -167,7 +169,7 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def array(self) -> np.ndarray:
         """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones. It has no ``sum_x`` and
-        ``sum_y`` with ``report = "barycenter"``. Where a zone has None it has NaN."""
+        ``sum_y`` with ``report = "barycenter"``. It has NaN where a zone has None."""
         dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
         array = np.zeros(len(self), dtype)
         for row, zone in zip(array, self._zones):
