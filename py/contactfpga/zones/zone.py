@@ -90,8 +90,11 @@ class Zones(Sequence[Zone]):
             found.add("ghost")
         before = self._before
         if before is not None and motion.adjacent(self.frame, before):
-            earlier = records_of(before, self.sheet)
-            if motion.moved(self.records, earlier, self.sheet):
+            if self.sheet.closed:
+                moved = motion.moved(self.closed_records, closed_records(before, self.sheet), self.sheet)
+            else:
+                moved = motion.moved(self.records, records_of(before, self.sheet), self.sheet)
+            if moved:
                 found.add("motion")
         return self.frame.flags | found
 
