@@ -172,8 +172,7 @@ def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
             kept.clear()
             continue
         x, y = zones[0].x_mm, zones[0].y_mm
-        if zones.sheet.closed:
-            around_mm = zones.sheet.columns * zones.sheet.pitch_x_mm
+        around_mm = zones.sheet.around_mm
         if kept:
             x = kept[0][1] + across(x - kept[0][1], around_mm)  # counted on past the seam
             if zones.time_us < kept[-1][0] or math.hypot(x - kept[0][1], y - kept[0][2]) > skin_pitch_mm:
