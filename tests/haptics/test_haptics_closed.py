@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from bumpers import flat
 
-from contactfpga.haptics import Center, Closing, ClosingWatch, HapticsError, LoadCells, Locator, Place, Plane
+from contactfpga.haptics import (
+    Center,
+    Closing,
+    ClosingWatch,
+    HapticsError,
+    LoadCells,
+    Locator,
+    Place,
+    Plane,
+    contacts,
+    felt,
+)
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.units import UnitSamples
@@ -95,3 +106,18 @@ def test_three_in_a_row_are_not_taken_for_three_in_a_column(shift):
     for number, columns in enumerate([[], [5], [4, 5, 6]]):
         watch.take(frame([(3, column + shift) for column in columns], number, "moments"))
     assert not watch.complete
+
+
+def test_a_zone_around_the_sheet_leaves_the_forces_unknown():
+    """Whoever grips the sheet pushes as well: the finger beside the hand does not exert it all."""
+    cells = LoadCells(flat().units, surface=Plane())
+    finger, ring = (4, 12, 4, 0), (COLUMNS, sum(range(COLUMNS)), 5 * COLUMNS, COLUMNS)
+    for records, known in (([finger], True), ([finger, ring], False), ([ring], False)):
+        pressed = sum(record[0] for record in records)
+        sent = Frame(0, 0, frozenset(), 0, 0, len(records), pressed, np.array(records, np.int64), None)
+        zones = Zones(sent, SKIN.sheet)
+        zones._units = UnitSamples(0, (3.0,) * 3, (0.0,) * 3, (False,) * 3)
+        assert (felt(cells, zones) is not None) is known
+        if not known:
+            with pytest.raises(HapticsError, match=r"a zone at y 25\.0 mm is a ring"):
+                contacts(cells.wrench(zones.units.readings), zones, cells.surface)
