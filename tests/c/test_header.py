@@ -409,9 +409,9 @@ def test_a_zone_without_cells_has_no_place(tmp_path):
     """Which a frame flagged mismatch may hold."""
     mm = compiled_mm(tmp_path)
     around = Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True)
-    for skin, moments in ((around, (0, 0, 0, 0)), (around, (0, 9, 3, 2)), (Skin(), (0, 9, 3))):
+    for skin, record in ((around, (0, 0, 0, 0)), (around, (0, 9, 3, 2)), (Skin(), (0, 9, 3))):
         board = ModelBoard(skin)
-        board.moments = [moments]
+        board.moments = [record]
         data = board.hello() + board.frame(cells=3, flags=["mismatch"])
         assert [line.replace("-", "") for line in by_c(mm, data)] == ["nan nan"]
 
