@@ -8,8 +8,9 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking import joins
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, across, place
+from contactfpga.tracking.spot import Member, Spot, place
 from contactfpga.tracking.tracks import Event, Kind, Tracks
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
 
 LIMITS = {

@@ -9,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from contactfpga.skin.sheet import Sheet
+
 Cell = tuple[int, int]
 """(row, column)"""
 
@@ -45,11 +47,13 @@ class Limits:
         return min(self.others, max(1, int(elsewhere.sum()) // 2))
 
 
-def away_from(cells: Iterable[Cell], reach: int, shape: tuple[int, int]) -> np.ndarray:
+def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
     """(rows, columns) bool: the cells farther than ``reach`` from all of these, so that no contact joins them."""
-    away = np.ones(shape, bool)
+    away = np.ones((sheet.rows, sheet.columns), bool)
     for row, column in cells:
-        away[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1] = False
+        columns = np.arange(column - reach, column + reach + 1)
+        columns = columns % sheet.columns if sheet.closed else columns.clip(0, sheet.columns - 1)
+        away[max(0, row - reach) : row + reach + 1, columns] = False
     return away
 
 

@@ -92,8 +92,11 @@ class Zones(Sequence[Zone]):
             found.add("ghost")
         before = self._before
         if before is not None and motion.adjacent(self.frame, before):
-            earlier = records_of(before, self.sheet)
-            if motion.moved(self.records, earlier, self.sheet):
+            if self.sheet.closed:
+                moved = motion.moved(self.closed_records, closed_records(before, self.sheet), self.sheet)
+            else:
+                moved = motion.moved(self.records, records_of(before, self.sheet), self.sheet)
+            if moved:
                 found.add("motion")
         return self.frame.flags | found
 
@@ -262,12 +265,14 @@ class Zones(Sequence[Zone]):
 
     def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
         """The same as a picture."""
+        sheet = self.sheet
         circles = [
             (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
             for zone in self
             if zone.x_mm is not None and zone.y_mm is not None
         ]
-        sheet = self.sheet
+        if sheet.around_mm is not None:
+            circles = notebook.over_the_seam(circles, sheet.around_mm, sheet.pitch_x_mm)
         pitch_mm = (sheet.pitch_x_mm, sheet.pitch_y_mm)
         return notebook.sheet(
             (sheet.rows, sheet.columns), pitch_mm, "\n".join(self._head), circles, self.cells, width_px
