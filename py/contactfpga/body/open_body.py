@@ -46,6 +46,7 @@ class OpenBody:
         self._changed = threading.Condition()
         self._changes = self._given = 0
         self._closing = False
+        self._ending = threading.Event()  # of its own, so that no change of a link wakes the other links' threads
         self._queues: list[SnapshotQueue] = []
         opener, together = opened or self._open_board, Together(self.clock)
         self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
@@ -75,8 +76,7 @@ class OpenBody:
             if now != before or not reader.tried:
                 before = now
                 self._tell()
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing, min(pause_s, RETRY_S))
+            self._ending.wait(min(pause_s, RETRY_S))
 
     def _tell(self) -> None:
         with self._changed:
@@ -189,6 +189,7 @@ class OpenBody:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
+        self._ending.set()
         for thread in self._threads:
             thread.join()
         for reader in self._readers.values():
