@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from contactfpga.body.joints import Joints
+from contactfpga.body.known import States
 from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
 from contactfpga.body.queue import SnapshotQueue
@@ -88,8 +89,9 @@ class OpenBody:
             self._changed.notify_all()
 
     def _snapshot(self) -> Snapshot:
-        states = {name: reader.state() for name, reader in self._readers.items()}
-        return Snapshot(self.body, self.clock(), states, self._joints)
+        seen = {name: reader.seen() for name, reader in self._readers.items()}
+        now = self.clock()
+        return Snapshot(self.body, now, States(self.body.links, seen, now), self._joints)
 
     # ---- snapshots
 
