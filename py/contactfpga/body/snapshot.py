@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
@@ -59,13 +60,18 @@ class Snapshot:
     def __init__(self, body: Body, host_time_s: float, links: Mapping[str, LinkState], joints: Joints | None = None):
         self.host_time_s = host_time_s
         """When it was taken, on the body's clock."""
-        self.links = dict(links)
+        self._links = links
         self._body = body
         self._angles: dict[str, Known] = {}
         self._beside: dict[str, Known] = {}  # a standard deviation of the frame's time earlier or later
         if joints is not None:  # looked up now, as a history is short
             for name in self.answering:
                 self._look_up(name, joints)
+
+    @functools.cached_property
+    def links(self) -> dict[str, LinkState]:
+        """The state of each link, by its name."""
+        return dict(self._links)
 
     def _look_up(self, name: str, joints: Joints) -> None:
         state = self.links[name]

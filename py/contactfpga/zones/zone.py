@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import overload
@@ -147,15 +148,14 @@ class Zones(Sequence[Zone]):
         """:attr:`Zone.ghost` of each of :attr:`records`."""
         if not self.sheet.ghosts:
             return [False] * len(self)
-        if self._labels is None:
+        if self.frame.bitmap is None:
             return ghosts.zones(self.frame, self._before)
         return ghosts.labelled(self.frame, self._before, self._labels)
 
     @functools.cached_property
-    def _labels(self) -> np.ndarray | None:
-        """(rows, columns) int with ``report = "cells"``, else None: the number of each cell's zone, from 1."""
-        if self.frame.bitmap is None:
-            return None
+    def _labels(self) -> np.ndarray:
+        """(rows, columns) int with ``report = "cells"``: the number of each cell's zone, from 1."""
+        assert self.frame.bitmap is not None
         if self.sheet.closed:
             return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
         return labels.label(self.frame.bitmap, self.sheet.connectivity)
@@ -186,9 +186,9 @@ class Zones(Sequence[Zone]):
     def _zones(self) -> tuple[Zone, ...]:
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
         make = self._exact if self.frame.barycenters is None else self._divided
-        both = zip(self.records.tolist(), self.suspects)
-        zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
-        for index, winding in enumerate(self.windings):
+        suspects = self.suspects if self.sheet.ghosts else itertools.repeat(False)
+        zones = [make(area, x, y, ghost) for (area, x, y), ghost in zip(self.records.tolist(), suspects)]
+        for index, winding in enumerate(self.windings if self.sheet.closed else ()):
             if winding:
                 zones[index] = dataclasses.replace(zones[index], x_mm=None, point_mm=None, normal=None, winding=winding)
         zones.sort(key=order)
@@ -208,12 +208,8 @@ class Zones(Sequence[Zone]):
         if place is None:
             return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
         x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
-        point_mm, normal = self._surface.place(x_mm, y_mm)
+        point_mm, normal = surfaces.of(self.sheet).place(x_mm, y_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
-
-    @functools.cached_property
-    def _surface(self) -> surfaces.Surface:
-        return surfaces.of(self.sheet)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -230,9 +226,9 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def records(self) -> np.ndarray:
         """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
-        if self._labels is not None and not self.sheet.closed:
-            return labels.moments(self._labels)
-        return records_of(self.frame, self.sheet)
+        if self.frame.bitmap is None or self.sheet.closed:
+            return records_of(self.frame, self.sheet)
+        return labels.moments(self._labels)
 
     @functools.cached_property
     def windings(self) -> list[str]:
