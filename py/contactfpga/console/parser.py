@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import Any
 
 
@@ -13,7 +12,7 @@ class Parser(argparse.ArgumentParser):
 
     _within = False
 
-    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> tuple[Any, list[str]]:
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As that of argparse."""
         topics = any(action.nargs == argparse.PARSER for action in self._get_positional_actions())
         if self._within or topics:
