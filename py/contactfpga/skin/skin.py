@@ -159,6 +159,9 @@ class Skin:
         known = [field.name for field in dataclasses.fields(cls)]
         unknown = sorted(set(values) - set(known))
         if unknown:
+            if unknown == ["sheets"]:
+                steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
+                raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             tables = "and the tables [cover] and [circuit]"
             raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, {tables}")
         return cls(**values)
