@@ -6,9 +6,11 @@ import collections
 import contextlib
 import math
 import threading
+import time
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.silence import Silence
+from contactfpga.driver.subscription import Events
 from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinMismatch, VersionMismatch
 from contactfpga.haptics import WithReadings
 from contactfpga.recordings.link_messages import LinkMessages
@@ -20,6 +22,9 @@ QUEUE = 1 << 16
 """Frames that wait to be written as messages; what they were made of is written first."""
 TURN_S = 0.01
 """How often bytes are written."""
+END_S = 1.0
+"""How long frames that wait at the end are written as messages."""
+AT_ONCE_S = 1e-6
 BATCH_BYTES = 2048
 """Of which so many are written at once: about 100 frames with a zone each."""
 
@@ -56,10 +61,19 @@ class Buffer:
 
 
 class LinkRecorder:
-    """Writes what a board says until it is stopped, the recording that it plays ends, or the port is lost. Without
-    ``said`` it writes the bytes alone. ``late``: a frame is taken once its readings of pressure units have come."""
+    """Writes what a board says until it is stopped, the recording that it plays ends, or the port is lost. ``events``:
+    of the board, from the first one on. Without ``said`` it writes the bytes alone. ``late``: a frame is taken once its
+    readings of pressure units have come."""
 
-    def __init__(self, board: Board, buffer: Buffer, link: LinkFile, said: LinkMessages | None, late: bool = False):
+    def __init__(
+        self,
+        board: Board,
+        events: Events,
+        buffer: Buffer,
+        link: LinkFile,
+        said: LinkMessages | None,
+        late: bool = False,
+    ):
         self.board = board
         self.name = link.name
         self.frames = 0
@@ -70,6 +84,7 @@ class LinkRecorder:
         """What a user should hear of."""
         self.error: ContactFPGAError | None = None
         """Why it ended before it was stopped."""
+        self._events = events
         self._buffer = buffer
         self._link = link
         self._said = said
@@ -80,7 +95,7 @@ class LinkRecorder:
     def run(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Record, in a thread of its own."""
         try:
-            with self.board.events(QUEUE) as self._events:
+            with self._events:
                 frames = WithReadings(self) if self._late else self
                 self._take(self.board.next())  # the answer to the first hello came before there were events
                 while not stop.is_set() and (seconds is None or self.seconds < seconds):
@@ -90,9 +105,10 @@ class LinkRecorder:
                         self._pause()
                     except (SkinMismatch, VersionMismatch) as told:
                         self.notes.append(str(told))
-                if dropped := self._events.dropped:
+                left = self._take_rest(frames) if self.board.live else 0
+                if left := left + self._events.dropped:
                     self.notes.append(
-                        f"{self.name}: {dropped} frames came faster than messages could be written of them; their "
+                        f"{self.name}: {left} frames came faster than messages could be written of them; their "
                         "bytes are in the file. Leave messages out with --bytes-only"
                     )
         except ReplayEnded:
@@ -124,6 +140,18 @@ class LinkRecorder:
         if self._said is not None:
             self._said.frame(zones, clock_s)
         self._drain()
+
+    def _take_rest(self, frames: WithReadings | LinkRecorder) -> int:
+        """Frames that wait at the end, for a while; how many are left."""
+        until, left = time.monotonic() + END_S, 0
+        with contextlib.suppress(ReadTimeout):
+            while True:
+                zones = frames.next(AT_ONCE_S)
+                if time.monotonic() < until:
+                    self._take(zones)
+                else:
+                    left += 1
+        return left
 
     def _pause(self) -> None:
         self._clock_s()

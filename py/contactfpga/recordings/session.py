@@ -12,11 +12,12 @@ from types import TracebackType
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.driver.mcap_part import SUFFIX
+from contactfpga.driver.subscription import Events
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.recordings.link_messages import LinkMessages
-from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
+from contactfpga.recordings.link_recorder import QUEUE, Buffer, LinkRecorder
 from contactfpga.recordings.mount import Mount
 from contactfpga.recordings.recorder import Recorder, Split, link_name
 from contactfpga.recordings.whole_file import RecordingFailed
@@ -30,6 +31,7 @@ class _Opened:
 
     name: str
     board: Board
+    events: Events
     buffer: Buffer
     mount: Mount | None
     felt: Felt | None
@@ -90,12 +92,15 @@ class Session:
             raise ContactFPGAError("this recording has begun; add all boards before start()")
         buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
+        events = board.events(QUEUE)  # at once: what comes before start() is recorded as well
         try:
             force = None if felt is None else felt(board)
         except BaseException:
             board.close()
             raise
-        self._opened.append(_Opened(link_name(board.hello) if name is None else name, board, buffer, mount, force))
+        self._opened.append(
+            _Opened(link_name(board.hello) if name is None else name, board, events, buffer, mount, force)
+        )
 
     def start(self, seconds: float | None = None) -> None:
         """Make the file, and record for so long, or until :meth:`stop`. Raises ValueError, and
@@ -122,7 +127,7 @@ class Session:
             for one in self._opened:
                 file = self._recorder.add(one.name, one.board)
                 said = None if self._bytes_only else LinkMessages(one.board, file, one.mount, one.felt)
-                self.links.append(LinkRecorder(one.board, one.buffer, file, said, one.felt is not None))
+                self.links.append(LinkRecorder(one.board, one.events, one.buffer, file, said, one.felt is not None))
         except BaseException as error:
             self._failure = error
         else:
