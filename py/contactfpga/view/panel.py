@@ -125,7 +125,7 @@ def scales(zones: np.ndarray, area_cm2: np.ndarray) -> dict[str, Any]:
 def _top(values: np.ndarray, least: int) -> int:
     """1, 2 or 5 times a power of ten."""
     wanted = max(least, math.ceil(values.max()))
-    power = 10 ** (len(str(wanted)) - 1)
+    power = int(10 ** (len(str(wanted)) - 1))
     return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
 
 
