@@ -40,8 +40,8 @@ class Stimulus(NamedTuple):
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan, where
-    ends meet also around the sheet. With guard lines or a self-test also a sheet at rest with lines that break and
+    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan, on a
+    closed sheet also shapes around it. With guard lines or a self-test also a sheet at rest with lines that break and
     touch."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, options.least_cycles(skin)))
