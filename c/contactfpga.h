@@ -195,8 +195,9 @@ static inline bool contactfpga_column_open(const contactfpga_reader *reader, uin
 static inline bool contactfpga_column_stuck(const contactfpga_reader *reader, uint8_t column);
 static inline bool contactfpga_lines_joined(const contactfpga_reader *reader);
 
-/* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Its area must not be 0. On a closed
- * sheet x lies from 0 to the circumference, and is not a number for a zone that is a ring or wound. */
+/* Barycenter of a zone in mm on the sheet laid flat; column 0 and row 0 lie at 0. Not a number for a zone without cells,
+ * which a frame flagged CONTACTFPGA_MISMATCH may hold. On a closed sheet x lies from 0 to the circumference, and is not a
+ * number for a zone that is a ring or wound. */
 static inline void contactfpga_barycenter_mm(
     const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm);
 
@@ -915,14 +916,12 @@ static inline bool contactfpga_lines_joined(const contactfpga_reader *reader) {
 static inline void contactfpga_barycenter_mm(
     const contactfpga_reader *reader, const contactfpga_zone *zone, double *x_mm, double *y_mm) {
     bool divided = reader->hello.report == CONTACTFPGA_BARYCENTER;
-    double steps = divided ? (double)(1u << reader->hello.fraction_bits) : (double)zone->area;
+    double zero = 0.0, steps = divided ? (double)(1u << reader->hello.fraction_bits) : (double)zone->area;
+    *x_mm = *y_mm = zero / zero;
+    if (!zone->area) return;
     uint32_t around = reader->hello.columns * zone->area, x = divided ? zone->x : zone->sum_x;
     if (reader->hello.closed) x = (x + reader->hello.columns * zone->turned) % around;
-    *x_mm = x / steps * reader->hello.pitch_x_mm;
-    if (zone->winding != CONTACTFPGA_PLAIN) {
-        double zero = 0.0;
-        *x_mm = zero / zero;
-    }
+    if (zone->winding == CONTACTFPGA_PLAIN) *x_mm = x / steps * reader->hello.pitch_x_mm;
     *y_mm = (divided ? zone->y : zone->sum_y) / steps * reader->hello.pitch_y_mm;
 }
 

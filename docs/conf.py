@@ -1,13 +1,16 @@
 """Sphinx configuration."""
 
+from typing import Any
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon import Config, GoogleDocstring
 from sphinx.writers.html5 import HTML5Translator
 
 project = "contactfpga"
 copyright = "the contactfpga authors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
@@ -35,5 +38,13 @@ def block_math(translator: HTML5Translator, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def read_sections(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Arguments of functions and classes. Docstrings of attributes are sentences: napoleon would take what comes before
+    their first colon for a type, and show it last."""
+    if what not in ("attribute", "data", "property"):
+        lines[:] = GoogleDocstring(list(lines), Config(), None, what, name, obj, options).lines()
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("autodoc-process-docstring", read_sections)
     app.add_html_math_renderer("mathml", (inline_math, None), (block_math, None))

@@ -36,6 +36,7 @@ from contactfpga.commands import (
     zones,
 )
 from contactfpga.console import interrupt
+from contactfpga.console.parser import Parser
 from contactfpga.errors import MissingExtra
 
 
@@ -122,7 +123,7 @@ def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> Mis
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="contactfpga",
         description="Contact zones of a switch-matrix skin.",
         epilog="Without a board, try: contactfpga zones sim://",

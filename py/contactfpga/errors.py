@@ -33,7 +33,7 @@ class ReadTimeout(ContactFPGAError, TimeoutError):
 
 
 class NoData(ReadTimeout):
-    """No frame came for longer than the reader allows; ``silence`` tells how long, and what came last."""
+    """No frame came for longer than the reader allows; ``silence`` says how long, and what came last."""
 
     def __init__(self, message: str, silence: Any):
         super().__init__(message)

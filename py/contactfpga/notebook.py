@@ -12,6 +12,9 @@ from contactfpga import picture_style as style
 
 WIDTH_PX = 320
 LINE_PX = 16
+Circle = tuple[float, float, float]
+"""x, y and radius of a zone in mm."""
+
 SMALLEST_PX = 3.0
 """Of a cell's side: the lines between smaller ones are left out."""
 
@@ -20,12 +23,12 @@ def sheet(
     shape: tuple[int, int],
     pitch_mm: tuple[float, float],
     caption: str,
-    circles: Iterable[tuple[float, float, float]] = (),
+    circles: Iterable[Circle] = (),
     cells: np.ndarray | None = None,
     width_px: int = WIDTH_PX,
 ) -> str:
-    """A sheet laid flat as SVG, row 0 at the bottom. ``shape``: rows and columns; ``circles``: x, y and radius of each
-    zone in mm; ``cells``: (rows, columns) bool where pressed cells are known."""
+    """A sheet laid flat as SVG, row 0 at the bottom. ``shape``: rows and columns; ``cells``: (rows,
+    columns) bool where pressed cells are known."""
     (rows, columns), (pitch_x, pitch_y) = shape, pitch_mm
     width_mm, height_mm = columns * pitch_x, rows * pitch_y
     scale = width_px / width_mm
@@ -70,6 +73,17 @@ def _grid(rows: int, columns: int, pitch_x: float, pitch_y: float, width: float)
     upright = "".join(f"M{left + column * pitch_x:g} {low:g}V{high:g}" for column in range(1, columns))
     across = "".join(f"M{left:g} {low + row * pitch_y:g}H{right:g}" for row in range(1, rows))
     return f'<path d="{upright}{across}" stroke="{style.CARD}" stroke-width="{width:.3f}" fill="none"/>'
+
+
+def over_the_seam(circles: Iterable[Circle], around_mm: float, pitch_mm: float) -> list[Circle]:
+    """On a sheet whose ends meet, a circle that leaves it at one end is drawn at the other one, too."""
+    left, right = -pitch_mm / 2, around_mm - pitch_mm / 2
+    return [
+        (x + turn, y, radius)
+        for x, y, radius in circles
+        for turn in (-around_mm, 0.0, around_mm)
+        if left - radius < x + turn < right + radius
+    ]
 
 
 def radius_mm(area_mm2: float) -> float:

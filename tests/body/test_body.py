@@ -109,6 +109,19 @@ def test_ring_on_a_closed_sheet_is_a_contact_without_a_place(robot):
     assert seam.point_m == pytest.approx((0.04 * math.cos(angle), 0.04 * math.sin(angle), 0.0))
 
 
+def test_a_closed_sheet_is_not_laid_on_a_cone(robot):
+    """Bent around one, its ends lie apart."""
+    skin = contactfpga.Skin(rows=6, columns=8, surface="cylinder", radius_mm=40.0, closed=True)
+    (robot.parent / "flat.toml").write_text(skin.to_toml())
+    robot.write_text(ROBOT.replace("mirrored = true", "surface = {radius_mm = 40.0, slope = 0.15}"))
+    with pytest.raises(BodyError) as error:
+        Body.load(robot)
+    assert str(error.value).endswith(
+        "link 'chest': surface is a cone, around which the ends of a closed sheet do not meet; leave it out, or "
+        "make a table of the link's shape with `contactfpga surface`"
+    )
+
+
 def test_angles_are_those_of_the_frames_time(robot):
     history = JointHistory(gap_s=1.0)
     history.add(10.0, {"elbow": 0.0})

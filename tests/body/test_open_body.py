@@ -11,6 +11,7 @@ from two_links import Plugged, wait_for
 
 import contactfpga
 from contactfpga.body import Body, NoJoints, NoLinkData, OpenBody
+from contactfpga.body.known import States
 
 
 def test_joints_that_fail_say_so_where_angles_are_needed(patient):
@@ -78,6 +79,29 @@ def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient
         assert times == sorted(times)
         with pytest.raises(ValueError, match="maxsize is 0"):
             body.subscribe(0)
+
+
+def test_a_snapshot_that_waited_tells_of_its_moment_and_is_made_when_it_is_looked_at(patient, monkeypatch):
+    made, make = [], States.__getitem__
+    monkeypatch.setattr(States, "__getitem__", lambda self, name: made.append(name) or make(self, name))
+    plugged = Plugged()
+    with OpenBody(Body.load(patient), opened=plugged.opened) as body:
+        body.read()
+        with body.subscribe() as queue:
+            changes = body._changes
+            wait_for(lambda: body._changes > changes + 20)
+            assert made == []
+            waited = queue.next()
+            plugged.ports["b"].mute = True
+            wait_for(lambda: body.latest().links["chest"].status == "silent")
+        made.clear()
+        assert {state.status for state in waited.links.values()} == {"ok"}
+        assert made == ["arm", "chest"]
+        for state in waited.links.values():
+            assert 0 <= state.age_s == pytest.approx(waited.host_time_s - state.frame_s, abs=1e-9)
+        newest = body.latest()
+        assert newest.links["chest"].zones is None
+        assert newest.links["arm"].zones.time_us > waited.links["arm"].zones.time_us
 
 
 def test_it_is_iterated_as_a_board_is(patient):

@@ -16,6 +16,8 @@ from contactfpga.body import BodyError, registration
 from contactfpga.body.plan import read
 from contactfpga.body.pose import Pose
 from contactfpga.body.registration import Press
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
 
 ROUND = contactfpga.Skin(surface="cylinder", radius_mm=40.0)
 FLAT = contactfpga.Skin()
@@ -87,6 +89,24 @@ def test_points_that_do_not_tell_are_refused(tmp_path, places, normals, says):
     with pytest.raises(BodyError) as error:
         registration.register(plan_of(tmp_path, FLAT), presses)
     assert str(error.value).startswith(says)
+
+
+@pytest.mark.parametrize("columns", [[5], [5, 6], [15], [0, 15]])
+def test_a_point_may_be_pressed_on_the_seam(columns):
+    """The barycenter falls now on one side of it and now on the other."""
+    skin = contactfpga.Skin(surface="cylinder", radius_mm=40.0, closed=True)
+    frames = []
+    for number in range(40):
+        left = columns[number % len(columns)]
+        record = np.array([[2, left + (left + 1) % 16, 8, int(left == 15)]], np.int64)
+        frame = Frame(number, 10_000 * number, frozenset(), 0, 0, 1, 2, record, None)
+        frames.append(Zones(frame, skin.sheet))
+    x, y = registration.held(frames, 1.01 * skin.pitch_x_mm)
+    middle = {(5,): 5.5, (5, 6): 6.0, (15,): 15.5, (0, 15): 0.0}[tuple(columns)]
+    off = (x / skin.pitch_x_mm - middle + 8) % 16 - 8
+    assert off == pytest.approx(0, abs=0.05)
+    assert 0 <= x < 16 * skin.pitch_x_mm
+    assert y == 40.0
 
 
 class Pressing(DirectPort):

@@ -405,6 +405,17 @@ def test_a_zone_over_the_seam_has_a_place_and_a_ring_has_none(tmp_path):
     assert sorted(found) == sorted(wanted)
 
 
+def test_a_zone_without_cells_has_no_place(tmp_path):
+    """Which a frame flagged mismatch may hold."""
+    mm = compiled_mm(tmp_path)
+    around = Skin(rows=5, columns=7, surface="cylinder", radius_mm=30.0, closed=True)
+    for skin, record in ((around, (0, 0, 0, 0)), (around, (0, 9, 3, 2)), (Skin(), (0, 9, 3))):
+        board = ModelBoard(skin)
+        board.moments = [record]
+        data = board.hello() + board.frame(cells=3, flags=["mismatch"])
+        assert [line.replace("-", "") for line in by_c(mm, data)] == ["nan nan"]
+
+
 def test_a_board_of_few_clocks_per_bit_takes_pulses(tmp_path):
     code = """
 #include <stdio.h>

@@ -52,6 +52,22 @@ def test_every_command_explains_itself(name, capsys):
     assert PARSERS[name].description in said
 
 
+@pytest.mark.parametrize(
+    ("typed", "found"),
+    [
+        ("record f.mcap --seconds 2 sim://", {"file": "f.mcap", "port": "sim://", "seconds": 2.0}),
+        ("record --seconds 2 f.mcap --bytes-only sim://", {"file": "f.mcap", "port": "sim://", "bytes_only": True}),
+        ("publish A --batch-ms 5 B --allow-commands C", {"ports": ["A", "B", "C"], "batch_ms": 5.0}),
+        ("publish --batch-ms 5", {"ports": [], "batch_ms": 5.0}),
+        ("body show r.toml --json", {"topic": "show", "robot": "r.toml", "json": True}),
+        ("surface m.stl --rpy 0 -1 0.5 t.npz --skin s.toml", {"mesh": "m.stl", "output": "t.npz", "rpy": [0, -1, 0.5]}),
+    ],
+)
+def test_options_may_stand_between_other_words(typed, found):
+    args = vars(cli._parser().parse_args(typed.split()))
+    assert {name: args[name] for name in found} == found
+
+
 @pytest.mark.parametrize("name", PARSERS)
 def test_every_flag_is_explained_in_a_sentence(name):
     own = {action.dest: action.help for action in PARSERS[name]._actions if action.dest not in ("help", "version")}

@@ -67,6 +67,18 @@ def test_a_circle_that_leaves_the_sheet_is_cut_off_there():
             assert drawing.characters.shape == (4 * scale, 8 * scale)
 
 
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_circle_over_the_seam_goes_on_at_the_other_end(scale):
+    around = Skin(rows=10, columns=12, surface="cylinder", radius_mm=40.0, closed=True)
+    middle = drawn_sheet._circles(zones(around, (12, 5.75, 5)), scale)
+    for column in (11.75, 11.25, 0.25):
+        shown = zones(around, (12, column, 5))
+        turned = np.roll(middle, round((column - 5.75) * scale), axis=1)
+        assert np.array_equal(drawn_sheet._circles(shown, scale), turned) or scale < 4  # whole dots only
+        assert (draw(shown, scale).kinds == CENTER).sum() == 1
+        assert drawn_sheet._circles(shown, scale).sum() == pytest.approx(middle.sum(), abs=3)
+
+
 def test_the_barycenter_stands_where_it_is():
     drawing = draw(zones(Skin(), (1, 3, 5), (1, 10, 12)))
     assert np.argwhere(drawing.kinds == CENTER).tolist() == [[5, 6], [12, 20]]

@@ -2,11 +2,11 @@
 
 import pytest
 from amaranth.hdl import Fragment
+from reversal import never_let_go
 from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
-from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.cosim import bench_unknown
 from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialized
@@ -86,15 +86,7 @@ def test_a_register_without_a_reset_is_seen(monkeypatch):
 
 @with_icarus
 def test_lines_that_are_driven_against_each_other_are_told(monkeypatch):
-    """Columns that are never let go."""
-    elaborate = Precharge.elaborate
-
-    def never_let_go(self, platform):
-        m = elaborate(self, platform)
-        m.d.sync += self.pins.eq(-1)
-        return m
-
-    monkeypatch.setattr(Precharge, "elaborate", never_let_go)
+    never_let_go(monkeypatch)
     cycles = 6 * facts(SMALL).scan_clocks
     skin = SKINS["reversal"]
     with pytest.raises(Contention, match=r"cycle \d+: columns [01]{8} are driven against rows [01]{8}"):

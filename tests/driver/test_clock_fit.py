@@ -9,7 +9,7 @@ import pytest
 from model_board import SCAN_US, ModelBoard
 
 import contactfpga
-from contactfpga.driver.clock_fit import USUAL_PPM, ClockFit
+from contactfpga.driver.clock_fit import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
@@ -54,6 +54,14 @@ def test_a_clock_that_no_crystal_has_is_not_believed():
     for step in range(2000):
         fit.arrived(step * 10_000, step * 0.0101, 0.0)  # off by one percent
     assert abs(fit.line(9e9).rate - 1) <= 200e-6
+
+
+def test_a_clock_that_no_crystal_has_costs_no_more_than_one_that_a_crystal_has():
+    """Each of its frames comes earlier than the bounds let expect: 1,000 of them per second, for a minute."""
+    fit = ClockFit()
+    for step in range(10_000):
+        fit.arrived(step * 1024, step * 0.001, 0.0)
+    assert len(fit._pieces) <= 10.24 / PIECE_S + 2
 
 
 def shifted(frames, after_s, host_s):

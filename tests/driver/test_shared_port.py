@@ -157,6 +157,55 @@ def test_a_board_of_several_sheets_names_their_ports(line, monkeypatch):
         contactfpga.open("fake")
 
 
+@pytest.mark.parametrize("place", [bytes([5, 2]), b"", None])
+def test_a_hello_that_cannot_be_is_counted_as_damaged_and_the_others_go_on(line, place):
+    """As of a board of another release, or of none."""
+    port = line.boards[1]
+    line.say(1, port.frame())
+    facts = port.wire.facts() | ({10: place} if place is not None else {5: b"short"})
+    line.say(1, DirectPort.hello(port, facts=facts))
+    with opened(line, 1) as back, opened(line, 0) as chest:
+        line.say(1, DirectPort.hello(port, facts=facts))
+        assert [board.read()[0].sum_x for board in (chest, back)] == [10, 11]
+        assert [board.stats.damaged.total() for board in (chest, back)] == [0, 2]
+
+
+def test_another_bitstream_at_an_open_port_has_other_sheets(line):
+    """Flashing need not close a port; who opens a sheet then is told what there is now."""
+    with opened(line, 0) as chest:
+        line.out += DirectPort(SKINS[0]).hello()
+        with pytest.raises(PortNotFound, match="one sheet, without a number"):
+            chest.read()
+        with opened(line, 1) as back:
+            assert back.read()[0].sum_x == 11
+            assert chest.read()[0].sum_x == 10
+            line.boards[1].place = bytes([1, 3])
+            line.say(1, line.boards[1].hello())
+            back.read()
+            with pytest.raises(contactfpga.ReadTimeout):
+                opened(line, 2)
+            line.boards[1].place = bytes([1, 2])
+            line.say(1, line.boards[1].hello())
+            back.read()
+            with pytest.raises(PortNotFound, match="fake#2: the board at fake has the sheets 0 to 1"):
+                opened(line, 2)
+
+
+def test_noise_without_an_end_is_noise_and_is_not_kept(line):
+    """A line at another baud rate may have no delimiter."""
+    line.write = lambda data: None
+    line.said_unasked = b"\xaa" * 30_000
+    line.read = lambda seconds, read=line.read: (read(seconds), setattr(line, "seconds", line.seconds + 0.01))[0]
+    with pytest.raises(contactfpga.OnlyNoise):
+        opened(line, 0)
+    port = Board(sheets.share("fake", 0, 3_000_000, lambda port, baud: line))
+    with pytest.raises(contactfpga.ReadTimeout):
+        port.read(1.0)
+    assert len(port._link.transport._shared._sorter._rest) < 100_000
+    port.close()
+    line.closed -= 1
+
+
 def test_another_baud_rate_at_an_open_port_is_refused(line):
     with opened(line, 0), pytest.raises(ContactFPGAError, match=r"fake#1: another sheet.*open at 3000000 baud"):
         opened(line, 1, baud=1_000_000)
@@ -210,6 +259,8 @@ def test_numbers_of_sheets_end_a_port():
     assert sheets.split("sim://?skin=a#b.toml") is None
     with pytest.raises(PortNotFound, match="port#16: sheets have the numbers 0 to 15"):
         sheets.split("port#16")
+    with pytest.raises(PortNotFound, match="port#1#0: it names two sheets; give one number, as in port#0"):
+        contactfpga.open("port#1#0")
 
 
 def test_a_search_finds_each_sheet(monkeypatch):

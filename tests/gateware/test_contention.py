@@ -4,10 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from reversal import FAST, small
+from reversal import FAST, never_let_go, small
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_sim.board import native
 from contactfpga_sim.board.compiled import CompiledBoard, model_of
 from contactfpga_sim.cosim import bench_amaranth
@@ -17,15 +16,7 @@ from contactfpga_sim.sheet.matrix import Contention, Matrix
 
 @pytest.fixture
 def wrong(monkeypatch):
-    """Gateware that never lets go of its columns."""
-    elaborate = Precharge.elaborate
-
-    def never_let_go(self, platform):
-        m = elaborate(self, platform)
-        m.d.sync += self.pins.eq(-1)
-        return m
-
-    monkeypatch.setattr(Precharge, "elaborate", never_let_go)
+    never_let_go(monkeypatch)
 
 
 def touch(skin: Skin) -> Timeline:

@@ -31,6 +31,7 @@ SHAPES = {
     "ring and a dot below it": ("#### .... #..#", [(4, RING, 0), (2, 7, 4)]),
     "nearly a ring": ("#.#. #.#. #.##", [(7, 21, 8)]),
     "ring in the last row": ("#.#. #.#. #.## ####", [(11, RING, 20)]),
+    "ring with a tail of five turns": ("### " + "#.. .#. ..# " * 5, [(18, RING, 120)]),
     "two arms, either side of the seam": (".#..#.# .####.# #.....# #######", [(17, RING, 30)]),
 }  # fmt: skip
 

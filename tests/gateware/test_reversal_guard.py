@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import FAST, any_skin, small, touches
+from reversal import FAST, any_skin, checked_soon, small, touches
 from sample import sample
 
 from contactfpga.skin import Skin
@@ -17,7 +17,6 @@ from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.record import Stimulus
 from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden import reversal as golden
 from contactfpga_sim.golden import reversal_guard as golden_guard
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.trace import Cuts
@@ -68,12 +67,7 @@ def live(bench, skin: Skin, timeline: Timeline, cycles: int) -> Life:
 
 @pytest.fixture
 def soon(monkeypatch):
-    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
-    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
-    monkeypatch.setattr(golden, "RETRY_US", 2**8)
-    for module in (reversal, reversal_guard):
-        monkeypatch.setattr(module, "CHECK_BIT", 5)
-    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+    checked_soon(monkeypatch)
 
 
 def cut_now_and_then(skin: Skin, rng, cycles: int) -> list[tuple[int, Cuts]]:

@@ -5,19 +5,16 @@ import itertools
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import any_skin, small, touches
+from reversal import any_skin, checked_soon, small, touches
 from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.zones.self_test import SelfTest
-from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden import reversal as golden
-from contactfpga_sim.golden import reversal_guard as golden_guard
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import command, request
 from contactfpga_sim.sheet.shift import Sheet
@@ -26,12 +23,7 @@ from contactfpga_sim.sheet.shorts import Shorts
 
 @pytest.fixture
 def soon(monkeypatch):
-    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
-    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
-    monkeypatch.setattr(golden, "RETRY_US", 2**8)
-    for module in (reversal, reversal_guard):
-        monkeypatch.setattr(module, "CHECK_BIT", 5)
-    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+    checked_soon(monkeypatch)
 
 
 def asked(skin: Skin, rng, cycles: int) -> list[tuple[int, bytes]]:

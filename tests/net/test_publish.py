@@ -5,13 +5,16 @@ import itertools
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
-from fake_board import FakeBoard, wait_until
+from fake_board import FakeBoard, background, wait_until
 from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint, publish, router
 
 import contactfpga
 from contactfpga import cli
+from contactfpga.commands import publish as command
+from contactfpga.console import interrupt
 from contactfpga.net import session
 
 psutil = pytest.importorskip("psutil")
@@ -73,6 +76,13 @@ def test_a_published_board_is_a_board(streaming):
         assert publisher.end() == ""
 
 
+def assert_given_back(pid, path):
+    """Else a board that is plugged in again would get another name."""
+    held = Path(f"/proc/{pid}/fd")
+    if held.is_dir():
+        wait_until(lambda: path not in {os.readlink(one).removesuffix(" (deleted)") for one in held.iterdir()})
+
+
 def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming):
     endpoint = free_endpoint()
     other = FakeBoard(contactfpga.Skin(name="chest", rows=9))
@@ -84,6 +94,7 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
             other.unplug()
             assert "is gone" in (said := publisher.process.stderr.readline())
             assert said.endswith("; the others go on\n")
+            assert_given_back(publisher.process.pid, other.path)
             with pytest.raises(contactfpga.PortLost):
                 collections.deque((chest.next(LONG) for _ in itertools.count()), maxlen=0)
             assert len(take(board, 0.5, streaming.sent_us)) > 5
@@ -150,6 +161,41 @@ def test_a_link_that_flaps_loses_frames_and_counts_them(streaming):
             assert board.stats.net.publishers == 1
             assert board.stats.lost > 0
             assert board.stats.restarts == 0
+
+
+def test_boards_that_go_together_are_told_together(capsys):
+    """As the sheets of one FPGA do, which share what became of their port."""
+    of_both, of_one = contactfpga.PortLost("A is gone"), contactfpga.PortLost("B is gone")
+    closed = []
+
+    class Gone:
+        def __init__(self, failure=None):
+            self.failure, self.close = failure, lambda: closed.append(self)
+
+        def run(self, stop):
+            if self.failure is None:
+                stop.wait(LONG)
+            else:
+                raise self.failure
+
+    def publish_all(*failures):
+        assert command._publish({one: one for one in map(Gone, failures)}) == 1
+        return capsys.readouterr().err
+
+    assert publish_all(of_both, of_both) == "contactfpga: A is gone\n"
+    assert publish_all(of_both, of_both, of_one).splitlines() == ["contactfpga: A is gone", "contactfpga: B is gone"]
+    with background(lambda: time.sleep(1) or signal.raise_signal(signal.SIGINT)), interrupt._listening():
+        said = publish_all(of_both, None)
+    assert said == "contactfpga: A is gone; the others go on\n"
+    assert len(closed) == 7
+
+
+def test_a_port_that_is_named_twice_is_told_as_that(streaming, tmp_path, capsys):
+    (link := tmp_path / "left").symlink_to(streaming.path)
+    for again in (streaming.path, link):
+        assert cli.main(["publish", streaming.path, str(again), "--timeout", "60"]) == 1
+        said = f"contactfpga: {again} is the port {streaming.path}, which is named already; name it once\n"
+        assert capsys.readouterr().err == said
 
 
 def test_a_port_that_is_taken_and_other_mistakes_are_one_line(streaming, capsys):

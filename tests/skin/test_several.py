@@ -59,3 +59,10 @@ def test_a_file_that_is_wrong_is_named(tmp_path: Path, text, words):
     (tmp_path / "several.toml").write_text(text)
     with pytest.raises(SkinError, match=words):
         Several.load(tmp_path / "several.toml")
+
+
+def test_a_file_of_sheets_is_no_skin():
+    with pytest.raises(
+        SkinError, match=r"names the Skins of several sheets; name one of them, or give all as --sheets"
+    ):
+        Skin.load(examples() / "two-sheets.toml")

@@ -8,7 +8,11 @@ from scipy import ndimage
 
 from contactfpga import examples
 from contactfpga.skin import Skin
+from contactfpga_hdl.scan import reversal, reversal_guard
+from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_sim.golden import Timeline, requests
+from contactfpga_sim.golden import reversal as golden
+from contactfpga_sim.golden import reversal_guard as golden_guard
 from contactfpga_sim.golden.facts import facts
 
 FAST = Skin.load(examples() / "fast.toml")
@@ -26,6 +30,27 @@ def small(**fields) -> Skin:
     times = {"precharge_us": 0.04, "settle_us": 0.1, "release_us": 0.05, "project_us": 0.2}
     rates = {"clock_hz": 24_000_000, "baud": 12_000_000, "send": "on_change"}
     return Skin(**{"scan": "reversal", "rows": 3, "columns": 4, **times, **rates, **fields})
+
+
+def checked_soon(monkeypatch) -> None:
+    """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
+    monkeypatch.setattr(reversal, "RETRY_BIT", 8)
+    monkeypatch.setattr(golden, "RETRY_US", 2**8)
+    for module in (reversal, reversal_guard):
+        monkeypatch.setattr(module, "CHECK_BIT", 5)
+    monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)
+
+
+def never_let_go(monkeypatch) -> None:
+    """A fault of the gateware: it drives its columns all the time."""
+    elaborate = Precharge.elaborate
+
+    def wrong(self, platform):
+        m = elaborate(self, platform)
+        m.d.sync += self.pins.eq(-1)
+        return m
+
+    monkeypatch.setattr(Precharge, "elaborate", wrong)
 
 
 def any_skin(rng) -> Skin:

@@ -33,7 +33,7 @@ def skin_of(rows, columns, connectivity, labeller):
 def zones(frames, connectivity, turns=7):
     """(n, 4) int64, sorted: frame, area, sum of the columns counted on past the seam, sum of the rows, of each zone in
     (N, R, C) frames. Where a zone may not fit on as many turns, its frame is looked at again on twice as many."""
-    count, _, columns = frames.shape
+    count, rows, columns = frames.shape
     structure = np.zeros((3, 3, 3), bool)
     structure[1] = ndimage.generate_binary_structure(2, 1 if connectivity == 4 else 2)
     labels, pieces = ndimage.label(np.tile(frames, turns), structure)
@@ -49,6 +49,8 @@ def zones(frames, connectivity, turns=7):
     ring = labels[frame[chosen], y[chosen], x[chosen] + (middle + 1) * columns] == label[chosen]
     zone = number[label]
     counts = (zone >= 0) & (~ring[zone] | (turn == middle))  # a ring's cells repeat on each turn
+    repeats = (zone >= 0) & ring[zone]
+    of_ring = np.unique(zone[repeats] * rows * columns + cell[repeats]) // (rows * columns)
     of_frame, y, x, turn, zone = frame[chosen], y[counts], x[counts], turn[counts], zone[counts]
     lowest, highest = np.full(len(ring), turns), np.full(len(ring), -1)
     np.minimum.at(lowest, zone, turn)
@@ -57,7 +59,9 @@ def zones(frames, connectivity, turns=7):
     total = np.bincount(zone, x + columns * (turn > lowest[zone]), len(ring)).astype(int)
     place = np.where(ring, RING, np.where(highest - lowest > 1, WOUND, total % (columns * np.maximum(area, 1))))
     found = np.stack([of_frame, area, place, np.bincount(zone, y, len(ring)).astype(int)], axis=1)
-    tight = np.isin(np.arange(count), of_frame[~ring & ((lowest == 0) | (highest == turns - 1))])
+    # A tail that winds away from a ring may end on another turn than it does on the middle one.
+    cut_off = ring & (np.bincount(of_ring, minlength=len(ring)) != area)
+    tight = np.isin(np.arange(count), of_frame[cut_off | ~ring & ((lowest == 0) | (highest == turns - 1))])
     if tight.any():
         again = zones(frames[tight], connectivity, 2 * turns + 1)
         again[:, 0] = np.nonzero(tight)[0][again[:, 0]]

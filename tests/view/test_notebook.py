@@ -12,6 +12,8 @@ from tracked import frame, pressed
 
 from contactfpga import Skin
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
 
 ROOT = Path(__file__).resolve().parents[2]
 SVG = "{http://www.w3.org/2000/svg}"
@@ -45,6 +47,17 @@ def test_pressed_cells_are_boxes_where_they_are_known():
     zones.frame.__dict__["bitmap"] = cells
     _, boxes, _ = drawn(zones._repr_svg_())
     assert {box[:4] for box in boxes[1:]} == {(12.5, 15.0, 5.0, 10.0), (17.5, 15.0, 5.0, 10.0)}
+
+
+@pytest.mark.parametrize("column", [0.25, 11.25, 11.75])
+def test_a_zone_over_the_seam_is_drawn_at_both_ends(column):
+    skin = Skin(rows=6, columns=12, surface="cylinder", radius_mm=60 / np.pi, closed=True)
+    records = np.array([[4, round(4 * column), 8, 0]], np.int64)
+    circles, _, _ = drawn(Zones(Frame(0, 0, frozenset(), 0, 0, 1, 4, records, None), skin.sheet)._repr_svg_())
+    assert {(round(x, 1), round(y, 1)) for x, y, _ in circles} == {
+        (10 * column, 20.0),
+        (10 * column - 120 if column > 6 else 10 * column + 120, 20.0),
+    }
 
 
 def test_a_large_sheet_stays_light():

@@ -10,6 +10,7 @@ pytest.importorskip("amaranth")
 
 from viewed import Page, camera, click, drag
 
+import contactfpga
 from contactfpga.view import opening
 
 CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circles"
@@ -90,3 +91,22 @@ def test_the_panel_says_how_real_time_is_held(page):
     facts = page.hear(lambda message: "board time" in str(message))
     assert "real time" in str(facts)
     assert "latency" in str(facts)
+
+
+def test_a_sheet_of_several_is_shown():
+    """In real time, with its own latency; the mouse does not reach it."""
+    file = contactfpga.examples() / "two-sheets.toml"
+    source, hand = opening._source(opening.Named(f"sim://?scene=palm&sheets={file}#1", timeout=60))
+    try:
+        (zone,) = next(moment for _ in range(100) if (moment := source.turn())).zones
+        assert (source.sheet.rows, hand, zone.area_cells > 20) == (12, None, True)
+        told = dict(source.told())
+        assert float(told["latency"].split()[0].replace(",", "")) < 2000
+        assert "real time" in told["board time"]
+    finally:
+        source.close()
+
+
+def test_a_virtual_board_of_a_skin_is_no_robot():
+    with pytest.raises(FileNotFoundError, match=r"/no/skin\.toml"):
+        opening._source(opening.Named("sim://?skin=/no/skin.toml"))

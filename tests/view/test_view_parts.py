@@ -103,6 +103,21 @@ def test_clicks_put_fingers_down_and_lift_them():
     assert sheet.fingers == []
 
 
+def test_a_click_over_the_seam_lifts_the_finger_on_the_other_side():
+    sheet = Sheet()
+    skin = Skin(rows=4, columns=12, surface="cylinder", radius_mm=60 / np.pi, closed=True)
+    hand = Hand.on(sheet, skin.sheet)
+    hand.click(1, 10)
+    hand.click(60, 10)
+    hand.click(118, 12)  # 3.6 mm from the first one
+    assert [finger[0] for finger in sheet.fingers] == [60]
+    hand.drag("mouse", 60, 10)
+    hand.drag("mouse", 119, 10)
+    hand.drop("mouse")
+    hand.drag("mouse", 2, 10)
+    assert [finger[0] for finger in sheet.fingers] == [2]
+
+
 def test_a_drag_presses_while_it_lasts_and_several_do_at_once():
     sheet = Sheet()
     hand = Hand(sheet, 9.0)

@@ -8,6 +8,8 @@ from tracked import frame, pressed
 
 from contactfpga import Skin
 from contactfpga.view.touches import STEPS, Touches
+from contactfpga.wire.protocol import Frame
+from contactfpga.zones.zone import Zones
 
 CELLS = Skin(report="cells")
 
@@ -53,6 +55,17 @@ def test_where_and_for_how_long(monkeypatch):
     assert np.flatnonzero(found.rows[:, 0]).tolist() == [4]
     assert np.flatnonzero(found.rows[:, -1]).tolist() == [1, 11]
     assert found.lost.sum() == 0
+
+
+def test_a_barycenter_over_the_seam_lies_in_the_nearer_column():
+    skin = Skin(rows=4, columns=12, surface="cylinder", radius_mm=40.0, closed=True)
+    frames = []
+    for number, sum_x in enumerate((3, 45, 47, 47)):  # columns 0.75, 11.25 and 11.75
+        records = np.array([[4, sum_x, 8, 0]], np.int64)
+        sent = Frame(number, 1000 * number, frozenset(), 0, 0, 1, 4, records, None)
+        frames.append((number / 1000, Zones(sent, skin.sheet)))
+    found = Touches.of(Recording(frames, skin.sheet))
+    assert np.argwhere(found.touched_s).tolist() == [[2, 0], [2, 1], [2, 11]]
 
 
 def test_one_short_touch_in_a_long_recording_shows():

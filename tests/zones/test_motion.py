@@ -111,3 +111,27 @@ def test_a_zone_without_cells_lies_nowhere():
         data = wire.zones([(0, 0, number)], cells=0, time=100 * number + 1, sequence=number, flags=["mismatch"])
         (event,) = host.receive(data, 0.0)
         assert event.zones.flags == {"mismatch"}
+
+
+CLOSED = Skin(rows=16, columns=16, surface="cylinder", radius_mm=25.0, closed=True, settle_us=20.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "moves"),
+    [
+        ((4, 58, 12, 0), (4, 30, 12, 2), False),  # columns 14 and 15, then 15 and 0
+        ((4, 30, 12, 2), (4, 2, 12, 0), False),
+        ((4, 2, 12, 0), (4, 54, 12, 0), True),  # then 13 and 14
+        ((4, 2, 48, 0), (16, 120, 48, 16), False),  # a ring has no place that it could have moved to
+        ((16, 120, 48, 16), (18, 230, 54, 18), False),
+        ((16, 32, 48, 511), (16, 160, 48, 511), False),
+        ((16, 120, 48, 16), (16, 120, 80, 16), True),  # but along the cylinder
+        ((4, 2, 48, 0), (16, 120, 160, 16), False),
+    ],
+)
+def test_over_the_seam_the_short_way_counts_and_an_x_that_is_not_known_does_not(first, second, moves):
+    wire, host = Wire(CLOSED), Conversation("x")
+    host.receive(wire.hello(sent=0), 0.0)
+    frames = [wire.zones([one], time=100 + 200 * number, sequence=number) for number, one in enumerate((first, second))]
+    _, after = [event.zones for data in frames for event in host.receive(data, 0.0)]
+    assert ("motion" in after.flags) is moves

@@ -161,6 +161,19 @@ def test_a_frame_flagged_mismatch_can_be_shown(moments):
     assert "mismatch" in console.file.getvalue()
 
 
+@pytest.mark.parametrize(("turned", "name"), [(16, "ring"), (511, "wound")])
+def test_the_table_says_why_a_zone_has_no_x(turned, name):
+    from contactfpga.console.views import table
+
+    skin = contactfpga.Skin(surface="cylinder", radius_mm=40.0, closed=True)
+    host, wire = Conversation("x"), Wire(skin)
+    host.receive(wire.hello(), 0.0)
+    (event,) = host.receive(wire.zones([(16, 120, 80, turned)]), 0.0)
+    console = Console(file=io.StringIO(), width=200)
+    console.print(table(event.zones))
+    assert console.file.getvalue().splitlines()[-2].split()[1:-1:2] == ["16", "2513.27", name, "50.00"]
+
+
 # ---- cells
 
 

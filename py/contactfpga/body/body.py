@@ -24,13 +24,13 @@ KEYS = ("urdf", "links")
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Body:
-    """The links that have a sheet, and how they hang together."""
+    """The links that have a sheet, and how they are connected."""
 
     links: dict[str, Plan]
     kinematics: Kinematics | None = None
-    """None: no URDF is known, so there is no base frame."""
+    """How the links move; None without a URDF, and then there is no base frame."""
     urdf: Path | None = None
-    """The file that says how they hang together."""
+    """The file that says how the links are connected."""
 
     @classmethod
     def load(cls, path: str | Path) -> Body:
@@ -56,12 +56,12 @@ class Body:
         return cls(_by_name([plan.read(one, folder) for one in tables], kinematics), kinematics, urdf)
 
     def open(self, joints: Joints | None = None, *, timeout: float = 1.0, period_s: float = 0.002) -> OpenBody:
-        """Open every link's board, each in a thread of its own, and return once each was tried; what does not answer is
-        tried again until it does.
+        """Open every link's board, each in its own thread, and return when each was tried once. A board that does not
+        answer is tried again until it does.
 
         Args:
-            joints: from a time on the host's clock to the joint angles then, for instance a :class:`JointHistory`;
-                without it there are contacts in the links' frames alone.
+            joints: a function from a time on the host's clock to the joint angles then, for instance a
+                :class:`JointHistory`; without it there are only contacts in the links' frames.
             timeout: seconds for a board's hello.
             period_s: how often at most a link's newest frame is taken.
         """

@@ -27,33 +27,35 @@ class Contact:
     link: str
     """Name of the link in `robot.toml`."""
     frame: str
-    """In which point, normal and force are: ``base``, or the link's."""
+    """The frame of point, normal and force: ``base``, or the link's."""
     time_us: int
     """Device time of its frame."""
     host_time_s: float
     """The same on the body's clock."""
     time_sigma_s: float | None
-    """Standard deviation of it; None where it is not known."""
+    """Standard deviation of ``host_time_s``; None if it is not known."""
     point_m: Vector | None
-    """None for a zone that has no place: one that goes all the way round a closed sheet, or that has no cells, which
-    only a frame flagged ``mismatch`` can hold."""
+    """Where the contact is. None for a zone that has no place because it goes all the way round a closed sheet, or has
+    no cells, which happens only in a frame flagged ``mismatch``."""
     normal: Vector | None
     """Outward unit normal; None as ``point_m``."""
     covariance_m2: Floats | None
-    """(3, 3) of the point: chance within a cell, along the surface; in the base frame also how far the joints moved the
-    point within ``time_sigma_s``. None as ``point_m``, and where the angles next to the frame's time are not known."""
+    """(3, 3) covariance of the point, from the size of a cell along the surface, and in the base frame also from how
+    far the joints moved the point within ``time_sigma_s``. None as ``point_m``, and if the angles just before and after
+    the frame's time are not known."""
     zone: Zone
     flags: frozenset[str]
-    """Of its frame."""
+    """Flags of its frame."""
     force_n: Vector | None = None
-    """On the link; None where no units are read, or their readings at that time have not come yet."""
+    """Force on the link; None if there are no units, or their readings at that time have not come yet."""
     normal_n: float | None = None
     """Push, 0 or above; None as ``force_n``."""
     track: int | None = None
-    """Id that stays with the contact, of this link; None for a zone without a place, or in frames nobody followed."""
+    """Id that stays with the contact, unique on this link; None for a zone without a place, or in frames that were not
+    tracked."""
     fold: float | None = None
-    """Share of its cells, 0 to 1, that the cover presses when it folds at the joint's angle; 1: perhaps nobody touches.
-    None: nothing was learned for this link, or at this angle, or the angle is not known."""
+    """Share of its cells, 0 to 1, that the folding cover presses at the joint's angle; at 1 perhaps nobody touches.
+    None if nothing was learned for this link or at this angle, or the angle is not known."""
 
     _felt: haptics.Contact | None = dataclasses.field(default=None, repr=False)
 

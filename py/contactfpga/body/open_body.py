@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from contactfpga.body.joints import Joints
+from contactfpga.body.known import States
 from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
 from contactfpga.body.queue import SnapshotQueue
@@ -46,6 +47,7 @@ class OpenBody:
         self._changed = threading.Condition()
         self._changes = self._given = 0
         self._closing = False
+        self._ending = threading.Event()  # of its own, so that no change of a link wakes the other links' threads
         self._queues: list[SnapshotQueue] = []
         opener, together = opened or self._open_board, Together(self.clock)
         self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
@@ -75,8 +77,7 @@ class OpenBody:
             if now != before or not reader.tried:
                 before = now
                 self._tell()
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing, min(pause_s, RETRY_S))
+            self._ending.wait(min(pause_s, RETRY_S))
 
     def _tell(self) -> None:
         with self._changed:
@@ -88,8 +89,9 @@ class OpenBody:
             self._changed.notify_all()
 
     def _snapshot(self) -> Snapshot:
-        states = {name: reader.state() for name, reader in self._readers.items()}
-        return Snapshot(self.body, self.clock(), states, self._joints)
+        seen = {name: reader.seen() for name, reader in self._readers.items()}
+        now = self.clock()
+        return Snapshot(self.body, now, States(self.body.links, seen, now), self._joints)
 
     # ---- snapshots
 
@@ -189,6 +191,7 @@ class OpenBody:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
+        self._ending.set()
         for thread in self._threads:
             thread.join()
         for reader in self._readers.values():

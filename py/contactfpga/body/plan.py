@@ -150,6 +150,11 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone |
     if isinstance(values, dict):
         if set(values) != {"radius_mm", "slope"}:
             raise BodyError(f"surface is {shown(values)}; a cone is {{radius_mm = ..., slope = ...}}")
+        if skin.closed:
+            raise BodyError(
+                "surface is a cone, around which the ends of a closed sheet do not meet; leave it out, or make "
+                "a table of the link's shape with `contactfpga surface`"
+            )
         return surfaces.Cone(**values)
     if not isinstance(values, str):
         raise BodyError(f"surface is {shown(values)}; it must be the name of a table, or a cone's radius_mm and slope")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 import threading
 from collections.abc import Callable
 from typing import Protocol
 
+from contactfpga.body.known import Known, Seen
 from contactfpga.body.plan import Plan
 from contactfpga.body.snapshot import LinkState
 from contactfpga.body.together import Together
@@ -22,14 +24,12 @@ from contactfpga.errors import (
 )
 from contactfpga.inputs.values import shown
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 RETRY_S = 0.5
 """From a failure to open a board to the next try."""
 WAIT_S = 0.1
 """How long a board is waited for at a time."""
-NO_TRACKS = Tracks(0, (), ())
 
 
 class OpenBoard(Protocol):
@@ -78,12 +78,8 @@ class LinkReader:
         self._asked = 0
         self._board: OpenBoard | None = None
         self._retry_at = -math.inf
-        self._down, self._reason = "lost", "it was not tried yet"  # said where no board is open
-        self._zones: Zones | None = None
-        self._tracker, self._tracks = Tracker(), NO_TRACKS
-        self._frame_s = self._open_s = -math.inf
-        self._came_s = -math.inf  # its sample on the board's own clock
-        self._ever = False
+        self._known = Known()
+        self._tracker = Tracker()
         self._before = Stats()  # of all boards that were closed
 
     def ask(self) -> int:
@@ -136,9 +132,8 @@ class LinkReader:
         tracks = self._tracker.update(zones)
         now_s = self._board.clock()
         sampled_s = now_s if zones.host_time_s is None else min(zones.host_time_s, now_s)
-        with self._lock:
-            self._zones, self._tracks = zones, tracks
-            self._came_s, self._frame_s, self._ever = sampled_s, self._clock() - (now_s - sampled_s), True
+        frame_s = self._clock() - (now_s - sampled_s)
+        self._known = Known(True, self._known.open_s, zones, tracks, frame_s, sampled_s)
 
     def _open(self) -> None:
         try:
@@ -150,11 +145,12 @@ class LinkReader:
         except Exception as error:
             self._fail("lost", error)
         else:
+            known = dataclasses.replace(self._known, opened=True, open_s=self._clock())
+            if self._together is not None:
+                known = dataclasses.replace(known, came_s=board.clock())
+                self._together.join(self.plan.name, known.came_s)
             with self._lock:
-                self._board, self._zones, self._open_s = board, None, self._clock()
-                if self._together is not None:
-                    self._came_s = board.clock()
-                    self._together.join(self.plan.name, self._came_s)
+                self._board, self._known = board, known
         self.tried = True
 
     def _drop(self, status: str, error: Exception) -> None:
@@ -178,28 +174,23 @@ class LinkReader:
             self._together.leave(self.plan.name)
         with self._lock:
             self._before = self._total()
-            self._board = self._zones = None
-            self._down, self._reason = status, str(error) or type(error).__name__
+            self._board = None
+            reason = str(error) or type(error).__name__
+            self._known = dataclasses.replace(self._known, opened=False, zones=None, down=status, reason=reason)
             self._retry_at = self._clock() + RETRY_S
 
     def close(self) -> None:
         """Give the port back; the thread that calls :meth:`step` has ended."""
         self._drop("lost", BoardClosed("the body was closed"))
 
+    def seen(self) -> Seen:
+        """What is known now, from which :class:`States` are made."""
+        if self._together is None:
+            return self._known, None
+        with self._lock:  # a board that is open stays so meanwhile
+            return self._known, None if self._board is None else self._board.clock()
+
     def state(self) -> LinkState:
-        """What is known now."""
-        with self._lock:
-            now = self._clock()
-            age_s = now - self._frame_s if self._ever else None
-            if self._board is None:
-                return LinkState(None, age_s, self._down, self._reason)
-            waited_s = now - max(self._frame_s, self._open_s)
-            if self._together is not None:  # nothing happens on the sheet while its time does not pass
-                waited_s = self._board.clock() - self._came_s
-                age_s = None if self._zones is None else waited_s
-            if waited_s > self.plan.silent_s:
-                return LinkState(None, age_s, "silent", f"no frame for {waited_s:.3f} s")
-            if self._zones is None or age_s is None:
-                return LinkState(None, age_s, "late", "no frame since the port was opened")
-            status = "ok" if age_s <= self.plan.late_s else "late"
-            return LinkState(self._zones, age_s, status, "", self._frame_s, self._tracks)
+        """The state now."""
+        known, board_s = self.seen()
+        return known.state(self.plan, self._clock(), board_s)

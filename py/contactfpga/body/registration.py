@@ -17,6 +17,7 @@ from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.surfaces import Surface
 from contactfpga.surfaces.shapes import Floats, Vector
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zones
 
 KEYS = ("point_m", "normal", "pressed_mm")
@@ -165,14 +166,19 @@ def _numbers(values: dict[str, Any], key: str, count: int, where: str) -> Any:
 def held(frames: Iterable[Zones], skin_pitch_mm: float) -> tuple[float, float]:
     """Where a single zone has stayed for :data:`HELD_S`, in mm; frames until then are used up."""
     kept: list[tuple[int, float, float]] = []
+    around_mm: float | None = None
     for zones in frames:
         if len(zones) != 1 or zones[0].x_mm is None or zones[0].y_mm is None:
             kept.clear()
             continue
         x, y = zones[0].x_mm, zones[0].y_mm
-        if kept and (zones.time_us < kept[-1][0] or math.hypot(x - kept[0][1], y - kept[0][2]) > skin_pitch_mm):
-            kept.clear()
+        around_mm = zones.sheet.around_mm
+        if kept:
+            x = kept[0][1] + across(x - kept[0][1], around_mm)  # counted on past the seam
+            if zones.time_us < kept[-1][0] or math.hypot(x - kept[0][1], y - kept[0][2]) > skin_pitch_mm:
+                kept.clear()
         kept.append((zones.time_us, x, y))
         if kept[-1][0] - kept[0][0] >= 1e6 * HELD_S:
-            return float(np.mean([one[1] for one in kept])), float(np.mean([one[2] for one in kept]))
+            x, y = np.mean([one[1:] for one in kept], axis=0).tolist()
+            return x if around_mm is None else x % around_mm, y
     raise BodyError("the frames ended before a point was pressed")

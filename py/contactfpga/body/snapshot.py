@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
@@ -31,12 +32,12 @@ Known = Mapping[str, float] | ContactFPGAError
 
 @dataclasses.dataclass(frozen=True)
 class LinkState:
-    """What is known of a link at a moment."""
+    """What is known about a link at one moment."""
 
     zones: Zones | None
-    """Its newest frame; None unless it is ok or late: what came before a board was lost says nothing of now."""
+    """Its newest frame; None unless it is ok or late, because older frames say nothing about the present."""
     age_s: float | None
-    """How long ago, on the body's clock, the newest frame was scanned that ever came; None: none ever did."""
+    """How long ago, on the body's clock, its newest frame ever was scanned; None if none ever came."""
     status: str
     """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
     open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
@@ -59,13 +60,18 @@ class Snapshot:
     def __init__(self, body: Body, host_time_s: float, links: Mapping[str, LinkState], joints: Joints | None = None):
         self.host_time_s = host_time_s
         """When it was taken, on the body's clock."""
-        self.links = dict(links)
+        self._links = links
         self._body = body
         self._angles: dict[str, Known] = {}
         self._beside: dict[str, Known] = {}  # a standard deviation of the frame's time earlier or later
         if joints is not None:  # looked up now, as a history is short
             for name in self.answering:
                 self._look_up(name, joints)
+
+    @functools.cached_property
+    def links(self) -> dict[str, LinkState]:
+        """The state of each link, by its name."""
+        return dict(self._links)
 
     def _look_up(self, name: str, joints: Joints) -> None:
         state = self.links[name]
@@ -80,15 +86,15 @@ class Snapshot:
 
     @property
     def answering(self) -> tuple[str, ...]:
-        """Links that are ok: those of which is known what touches them."""
+        """Links that are ok, so that it is known what touches them."""
         return tuple(name for name, state in self.links.items() if state.status == "ok")
 
     def contacts(self, frame: str = BASE, links: Collection[str] | None = None) -> list[Contact]:
         """The contacts on all links, or on these.
 
-        Raises :class:`NoLinkData` where one of them is not ok: no data is never no contact.
-        ``links=snapshot.answering`` asks the rest. In the base frame it raises :class:`NoJoints` where the angles at a
-        frame's time are not known.
+        Raises :class:`NoLinkData` if one of them is not ok, because no data is never no contact;
+        ``links=snapshot.answering`` asks only the others. In the base frame it raises :class:`NoJoints` if the angles
+        at a frame's time are not known.
 
         Args:
             frame: ``base``, or ``link`` for each in the frame of its own link.

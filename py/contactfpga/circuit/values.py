@@ -100,9 +100,9 @@ class Circuit:
     """Of the resistor that pulls a row that is read to its untouched level; used by projections alone."""
     supply_v: float = 3.3
     low_v: float = 0.8
-    """VIL: a pin surely reads low at this and less."""
+    """VIL: the highest level that is sure to read low."""
     high_v: float = 2.0
-    """VIH: a pin surely reads high at this and more."""
+    """VIH: the lowest level that is sure to read high."""
     pin_ma: float = 8.0
     """The most that a pin may carry for good: 8 mA is what an iCE40's pin is specified for at 3.3 V, and an ECP5's
     with its usual drive strength. Pulses that charge lines may be higher."""

@@ -38,7 +38,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     above = "Count cells of recordings above this as pressed; needed for numbers."
     parser.add_argument("--threshold", type=numbers.CELL, help=above)
     parser.add_argument("--seed", type=numbers.SEED, help="Seed of the places (default: the file's, or 0).")
-    parser.add_argument("--quick", action="store_true", help="Do not look which of the refused Skins are cheaper.")
+    parser.add_argument("--quick", action="store_true", help="Do not check which of the refused Skins are cheaper.")
     flags.workers(parser)
     parser.add_argument("--output", metavar="FILE", help="Write the Skin to this TOML file.")
     parser.add_argument("--json", action="store_true", help="Print one JSON object.")
@@ -47,7 +47,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def _goal_flags(goals: argparse._ArgumentGroup) -> None:
     far, late = numbers.number(0, 10_000, "mm", above=True), numbers.number(0, 1e9, "us", above=True)
     area = numbers.number(0, 100_000, "%", above=True)
-    _limit(goals, "--miscounted", "PERCENT", PERCENT, 5.0, "Scenes whose number of zones is not that of contacts")
+    _limit(goals, "--miscounted", "PERCENT", PERCENT, 5.0, "Scenes whose numbers of zones and contacts differ")
     _limit(goals, "--missed", "PERCENT", PERCENT, 5.0, "Contacts without a zone")
     _limit(goals, "--barycenter-mm", "MM", far, 5.0, "Mean distance of barycenters from those of the contacts")
     _limit(goals, "--area", "PERCENT", area, None, "Mean error of a contact's area")

@@ -20,7 +20,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--registers", type=count, default=400, metavar="N", help=registers)
     memories = "Flips of memory bits per design (default: 100)."
     parser.add_argument("--memories", type=count, default=100, metavar="N", help=memories)
-    only = "Run nothing: take the results of earlier runs, as many as there are of each design."
+    only = "Run nothing: use the results kept from earlier runs, as many as there are for each design."
     parser.add_argument("--kept", action="store_true", help=only)
     flags.workers(parser)
     page = "Rewrite the tables in this page, with the picture in images and all numbers in flips beside it."

@@ -10,7 +10,7 @@ import re
 from contactfpga.console import numbers, terminal
 from contactfpga.skin import Skin
 
-HELP = "Measure the time from a touch to the last byte about it, on the simulated gateware."
+HELP = "Measure the time from a touch to the last byte that reports it, on the simulated gateware."
 EXTRA = "sim"
 
 CELLS = re.compile(r"([1-9][0-9]?)x([1-9][0-9]?)")

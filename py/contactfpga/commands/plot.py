@@ -19,7 +19,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", metavar="RECORDING", help=what)
     file = "PNG or SVG, by its ending (default: RECORDING.png, in this folder)."
     parser.add_argument("--output", metavar="FILE", help=file)
-    parser.add_argument("--link", metavar="NAME", help="Board to draw, of a recording of several (default: the first).")
+    link = "Board to draw from a recording of several (default: the first)."
+    parser.add_argument("--link", metavar="NAME", help=link)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import queue
 import sys
 import threading
-from typing import TYPE_CHECKING
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NoReturn
 
 from contactfpga.console import flags, interrupt, numbers, terminal
-from contactfpga.driver import driver
+from contactfpga.driver import driver, sheets
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.net import address
 
 if TYPE_CHECKING:
+    from contactfpga.driver.transport import Transport
     from contactfpga.net.publisher import Publisher
 
 HELP = "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one."
@@ -23,10 +27,11 @@ EXTRA = "net"
 
 PORTS = (
     "Device path, name:NAME or usb:SERIAL of a board (PORT#1: sheet 1 of several at one board), or sim://. Several of "
-    "them publish several boards (default: the one supported board plugged in, with --skin the one of that Skin)."
+    "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
-"""How often is looked which boards are still there."""
+"""How often is looked which boards are still there; those that go within this time, as all sheets of one FPGA do, go
+together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -63,12 +68,12 @@ def run(args: argparse.Namespace) -> int:
     with contextlib.ExitStack() as ending:
         open_session = session.connected if args.connect else session.listening
         network = ending.enter_context(open_session(args.connect or args.listen, args.config))
-        publishers = []
+        publishers: dict[Publisher, Transport] = {}
         for of, (device, baud) in boards.items():
             transport = connect(device, baud)
             ending.callback(transport.close)
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
-            publishers.append(Publisher(transport, network, of, **options))
+            publishers[Publisher(transport, network, of, **options)] = transport
         for of in boards:
             print(f"{address.SCHEME}{of}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
         _warn(args, here)
@@ -84,41 +89,71 @@ def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             of = key or address.key_of(board.hello.name, board.hello.fingerprint)
             if of in found:
-                first = found[of][0]
-                raise ContactFPGAError(f"{first} and {board.port} would both be {of}; give their Skins different names")
+                _refuse(found[of][0], board.port, of)
             found[of] = board.port, args.baud or board.hello.baud
     return found
 
 
-def _publish(publishers: list[Publisher]) -> int:
+def _refuse(first: str, second: str, of: str) -> NoReturn:
+    """Two ports would have the same key."""
+    if _place(first) == _place(second) != ("sim", None):
+        raise ContactFPGAError(f"{second} is the port {first}, which is named already; name it once")
+    raise ContactFPGAError(f"{first} and {second} would both be {of}; give their Skins different names")
+
+
+def _place(port: str) -> tuple[str, int | None]:
+    """The device behind a name and the number of the sheet; each ``sim://`` without one is a board of its own."""
+    name, number = sheets.split(port) or (port, None)
+    virtual = name.startswith("sim:")
+    if virtual and number is None:
+        return "sim", None
+    return name if virtual else os.path.realpath(name), number
+
+
+def _publish(publishers: Mapping[Publisher, Transport]) -> int:
     """One thread each. If a board is gone, the others go on."""
     stop = threading.Event()
     ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
-    failures: list[Exception] = []
-    threads = [threading.Thread(target=_run, args=(one, stop, ended), daemon=True) for one in publishers]
+    threads = [threading.Thread(target=_run, args=(*one, stop, ended), daemon=True) for one in publishers.items()]
+    gone = 0
     try:
         with interrupt.usual_end():
             for thread in threads:
                 thread.start()
-            while len(failures) < len(publishers):
-                with contextlib.suppress(queue.Empty):
-                    failures.append(ended.get(timeout=SHOWN_S))
-                    if len(failures) < len(publishers):
-                        interrupt.failed(f"{failures[-1]}; the others go on")
+            while gone < len(publishers):
+                failures = _ended(ended)
+                gone += len(failures)
+                others = "; the others go on" if gone < len(publishers) else ""
+                for failure in dict.fromkeys(failures):  # that of a port is the same for all of its sheets
+                    interrupt.failed(f"{failure}{others}")
     finally:
         stop.set()
         for thread in threads:
             thread.join()
-    if len(failures) == len(publishers):
-        raise failures[-1]
-    return 1 if failures else 0
+    return 1 if gone else 0
 
 
-def _run(publisher: Publisher, stop: threading.Event, ended: queue.SimpleQueue[Exception]) -> None:
+def _ended(ended: queue.SimpleQueue[Exception]) -> list[Exception]:
+    """Why boards are gone, of all those that went together."""
+    try:
+        found = [ended.get(timeout=SHOWN_S)]
+    except queue.Empty:
+        return []
+    time.sleep(SHOWN_S)
+    while not ended.empty():
+        found.append(ended.get())
+    return found
+
+
+def _run(
+    publisher: Publisher, transport: Transport, stop: threading.Event, ended: queue.SimpleQueue[Exception]
+) -> None:
     try:
         publisher.run(stop)
     except Exception as error:
         ended.put(error)
+    finally:
+        transport.close()  # a device that is held keeps its name from the board that is plugged in again
 
 
 def _warn(args: argparse.Namespace, here: str) -> None:

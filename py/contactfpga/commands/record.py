@@ -12,6 +12,7 @@ from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs.files import names_robot
 
 if TYPE_CHECKING:
     from contactfpga.body import Body
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _body(args: argparse.Namespace) -> Body | None:
     """The robot that is to be recorded; None: a board."""
-    if args.port is None or not args.port.endswith(".toml"):
+    if not names_robot(args.port):
         return None
     from contactfpga.body import Body
 

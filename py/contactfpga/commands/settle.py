@@ -30,9 +30,9 @@ WORDS = {
     "column_pull_ohm": "Resistor that pulls or keeps a column at its released level",
     "row_pull_ohm": "Resistor that pulls a row that is read, in a projection",
     "supply_v": "Supply",
-    "low_v": "VIL: a pin surely reads low up to this",
-    "high_v": "VIH: a pin surely reads high from this on",
-    "pin_ma": "What a pin may carry for good",
+    "low_v": "VIL: the highest level that is sure to read low",
+    "high_v": "VIH: the lowest level that is sure to read high",
+    "pin_ma": "Current that a pin may carry permanently",
 }
 DIODE_WORDS = {
     "saturation_a": "IS",
@@ -46,7 +46,7 @@ DIODE_WORDS = {
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    skin = "Skin whose rows, columns, diodes and table [circuit] are taken; flags below replace values of that table."
+    skin = "Skin that gives rows, columns, diodes and the table [circuit]; flags below replace values of that table."
     parser.add_argument("--skin", metavar="FILE", help=skin)
     lines = numbers.whole(1, limits.MAX_LINES, "lines")
     parser.add_argument("--rows", type=lines, metavar="N", help="Number of rows (default: the Skin's, or 16).")
@@ -61,7 +61,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         kind = numbers.number(low, high, unit)
         values.add_argument(flag, dest=name, type=kind, metavar=unit.upper(), help=words)
     diode = parser.add_argument_group("diode, as SPICE describes it (default: schottky)")
-    diode.add_argument("--diode", choices=tuple(DIODES), help="A kind from which the values below start.")
+    diode.add_argument("--diode", choices=tuple(DIODES), help="Kind; it gives the values below that you leave out.")
     for name, (low, high) in DIODE_LIMITS.items():
         kind, words = numbers.number(low, high), f"{DIODE_WORDS[name]} (schottky: {getattr(usual.diode, name):g})."
         diode.add_argument(_flag(f"diode_{name}"), type=kind, metavar=DIODE_WORDS[name], help=words)

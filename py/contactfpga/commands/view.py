@@ -24,11 +24,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--link",
         metavar="NAME",
-        help="Board to show, of a recording of several (default: all of a robot, or the first).",
+        help="Board to show from a recording of several (default: all of a robot, or the first).",
     )
     units = "Pressure units (docs/haptics.md): shows the force at each contact (default: those of sim://)."
     parser.add_argument("--units", metavar="FILE", help=units)
-    host = "Address to listen on (default: 127.0.0.1, which this computer alone can reach)."
+    host = "Address to listen on (default: 127.0.0.1, which only this computer can reach)."
     parser.add_argument("--host", default="127.0.0.1", help=host)
     port = "Port to listen on; 0 is any free one (default: the first free one from 8080 on)."
     parser.add_argument("--http-port", type=numbers.whole(0, 65_535), metavar="N", help=port)

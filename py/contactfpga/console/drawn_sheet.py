@@ -183,6 +183,7 @@ def _circles(zones: Zones, scale: int) -> np.ndarray:
         across, down = scale * radius_mm / sheet.pitch_x_mm, scale * radius_mm / sheet.pitch_y_mm
         angles = np.linspace(0, 2 * math.pi, 8 * math.ceil(max(across, down)) + 8)
         columns = np.floor(x + across * np.cos(angles)).astype(int)
+        columns = columns % wide if sheet.closed else columns
         rows = np.floor(y + down * np.sin(angles)).astype(int)
         inside = (columns >= 0) & (columns < wide) & (rows >= 0) & (rows < high)
         dots[rows[inside], columns[inside]] = True
@@ -203,10 +204,11 @@ def _places(zones: Zones, scale: int) -> list[tuple[float, float]]:
     left, and so is what lies in its middle."""
     sheet = zones.sheet
     middle = (0.5 if scale < SCALES[0] else 0.25) * scale
-    return [
+    found = [
         (scale * x_mm / sheet.pitch_x_mm + middle, scale * y_mm / sheet.pitch_y_mm + scale / 2)
         for x_mm, y_mm, _ in _placed(zones)
     ]
+    return [(x % (sheet.columns * scale), y) for x, y in found] if sheet.closed else found
 
 
 def _placed(zones: Zones) -> list[tuple[float, float, float]]:

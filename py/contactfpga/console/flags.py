@@ -13,7 +13,7 @@ from contactfpga.skin.several import Several
 
 PORT = (
     "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "
-    "replay://FILE (default: the one supported board that is plugged in, with --skin the one of that Skin)."
+    "replay://FILE (default: the one supported board that is plugged in; with --skin, the one with that Skin)."
 )
 SKIN = "Require a board built from this Skin, and use its baud rate."
 

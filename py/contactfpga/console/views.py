@@ -130,9 +130,9 @@ def table(
     for heading in (*before, "cells", "mm²", "x mm", "y mm", *after):
         made.add_column(heading, justify="right", no_wrap=True)
     for zone, push in list(zip(zones, pushes))[:most]:
-        place = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
+        x, y = ("-" if length is None else f"{length:.2f}" for length in (zone.x_mm, zone.y_mm))
         name = [] if tracks is None else [ids.get(id(zone), "-")]
-        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", *place, *push)
+        made.add_row(*name, str(zone.area_cells), f"{zone.area_mm2:g}", zone.winding or x, y, *push)
     return made
 
 

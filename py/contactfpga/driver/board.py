@@ -31,12 +31,11 @@ QUEUE = 16_384
 
 
 class Board:
-    """An open port with a board at its other end: a context manager that iterates every frame.
+    """An open port with a board at its other end: a context manager that iterates over every frame.
 
-    Made by :func:`open`. Safe for several threads; :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
-    thread that wants every frame for itself takes a :meth:`subscribe`. It can be neither copied nor sent to another
-    process. Every method raises :class:`BoardClosed` after
-    :meth:`close`, also where it was waiting.
+    Made by :func:`open`. Safe for several threads. :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
+    thread that wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another
+    process. After :meth:`close` every method raises :class:`BoardClosed`, even one that was already waiting.
     """
 
     def __init__(self, transport: Transport, skin: Skin | None = None):
@@ -70,12 +69,12 @@ class Board:
 
     @property
     def live(self) -> bool:
-        """Whether a board is at the other end, which can be asked; else what comes is a recording."""
+        """Whether a board that answers requests is at the other end; False for a recording."""
         return self._live
 
     @property
     def hello(self) -> Hello:
-        """What the board last said of itself; it does so twice per second."""
+        """What the board last said about itself, which it does twice per second."""
         self._link.check_open()
         if self._link.conversation.hello is None:
             raise ContactFPGAError(f"{self.port}: no hello has come yet")
@@ -83,12 +82,12 @@ class Board:
 
     @property
     def sheet(self) -> Sheet:
-        """Lines, lengths and report of the board's sheet, as its hello tells them."""
+        """Lines, lengths and report of the board's sheet, from its hello."""
         return self.hello.sheet
 
     @property
     def name(self) -> str:
-        """The name that the board's Skin gave it; "" where it has none."""
+        """The name in the board's Skin; "" if it has none."""
         return self.hello.name
 
     @property
@@ -108,10 +107,10 @@ class Board:
 
     @property
     def skin(self) -> Skin:
-        """The board's whole Skin: the one given to :func:`open`, or the reference Skin where the board has its
+        """The board's whole Skin: the one given to :func:`open`, or the reference Skin if the board has its
         fingerprint.
 
-        Raises :class:`ContactFPGAError` for any other board: its hello tells the :attr:`sheet` and no more.
+        Raises :class:`ContactFPGAError` for any other board, whose hello describes only the :attr:`sheet`.
         """
         hello = self.hello
         for skin in (self._expected, Skin()):
@@ -124,20 +123,21 @@ class Board:
 
     @property
     def faults(self) -> Faults | None:
-        """Faults of its lines as the board last told them, which it does within 1 ms of a change and after each hello;
-        also where it sends no frame. None: none were told, or its Skin has neither ``guard`` nor ``self_test``."""
+        """Faults of its lines, as the board last reported them. It does so within 1 ms of a change and after each
+        hello, even when it sends no frame. None if it reported none yet, or its Skin has neither ``guard`` nor
+        ``self_test``."""
         self._link.check_open()
         return self._link.conversation.lines.told
 
     @property
     def unit_history(self) -> UnitHistory | None:
-        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None: it has none."""
+        """The last readings of its pressure units, which are in :attr:`Zones.units`, too; None if it has no units."""
         self._link.check_open()
         return self._link.conversation.units.history
 
     @property
     def silence(self) -> Silence:
-        """How long no frame has come, and which one came last; of a board that is opened, since then."""
+        """How long no frame has come, since the last frame or since the port was opened, and which frame came last."""
         self._link.check_open()
         with self._link.changed:
             return self._link.silence(-math.inf)
@@ -151,7 +151,7 @@ class Board:
         return stats
 
     def clock(self) -> float:
-        """Seconds on the clock that timeouts run on: ``time.monotonic``; of ``sim://`` the simulated one."""
+        """Seconds on the clock that timeouts use: ``time.monotonic``, or simulated time for ``sim://``."""
         return self._link.clock()
 
     # ---- frames
@@ -159,7 +159,7 @@ class Board:
     def read(self, timeout: float = 1.0) -> Zones:
         """Ask the board and return the first complete frame scanned after this call; :meth:`next` goes on after it.
 
-        ``timeout`` in seconds. Of a recording, the next frame. Raises :class:`ReadTimeout`, :class:`PortLost`,
+        ``timeout`` in seconds. A recording gives its next frame. Raises :class:`ReadTimeout`, :class:`PortLost`,
         :class:`SkinMismatch`, :class:`VersionMismatch`.
         """
         timeout = checked(timeout)
@@ -172,16 +172,16 @@ class Board:
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`.
 
-        At most 16,384 frames wait to be taken; beyond, the oldest ones are dropped and counted in ``stats.dropped``.
+        At most 16,384 frames wait to be taken; beyond that, the oldest are dropped and counted in ``stats.dropped``.
         """
         return self._frames.next(timeout)
 
     def latest(self, timeout: float = 1.0, *, max_age_s: float | None = None) -> Zones:
-        """The newest frame: the last of all that wait, or the next one when none does. Older ones are dropped.
+        """The newest frame: the last of all that wait, or the next one if none waits. Older ones are dropped.
 
-        With ``max_age_s`` no frame that came longer ago, in seconds, or that was scanned longer ago and waited on its
-        way, as far as clocks tell; as soon as there can be none it raises :class:`NoData`. Of a recording, the next
-        frame. ``timeout`` and errors as for :meth:`next`.
+        With ``max_age_s``, in seconds, it returns no frame that arrived longer ago, or that was scanned longer ago and
+        was held up on its way, as far as the clocks show. As soon as no such frame can come it raises :class:`NoData`.
+        A recording gives its next frame. ``timeout`` and errors as for :meth:`next`.
         """
         if max_age_s is not None:
             max_age_s = self._checked("max_age_s", max_age_s)
@@ -194,24 +194,24 @@ class Board:
     def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> Batch:
         """All frames that wait after at most ``max_s`` seconds, as numpy arrays (:class:`Batch`).
 
-        The first one is waited for, for ``timeout`` seconds at most. Errors as for :meth:`next`.
+        It waits at most ``timeout`` seconds for the first one. Errors as for :meth:`next`.
         """
         return self._frames.batch(max_s, timeout)
 
     def subscribe(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Subscription:
-        """A queue of its own for every frame from now on; see :class:`Subscription`.
+        """A separate queue for every frame from now on; see :class:`Subscription`.
 
-        With ``deadline_s`` :class:`NoData` is raised where no frame comes for longer. It must be at least what a
-        board that works may need: a scan and a frame on the wire; with ``send = "on_change"`` its keep-alive and
-        a frame. In a recording, which has no times of arrival, it has no effect.
+        With ``deadline_s`` it raises :class:`NoData` when no frame comes for longer than that. The deadline must be at
+        least as long as a working board may need: a scan and a frame on the wire, or with ``send = "on_change"`` its
+        keep-alive and a frame. It has no effect in a recording, which has no times of arrival.
         """
         self._link.check_open()
         deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
         return Subscription(self._link, maxsize, self, deadline_s)
 
     def events(self, maxsize: int = 1024, *, deadline_s: float | None = None) -> Events:
-        """The same for all that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s`` as for
-        :meth:`subscribe`, but silence is an event like the others."""
+        """The same for everything that comes: frames, changes of faults, silence; see :class:`Events`. ``deadline_s``
+        as for :meth:`subscribe`, but silence is an event like the others."""
         self._link.check_open()
         deadline_s = None if deadline_s is None else self._checked("deadline_s", deadline_s)
         return Events(self._link, maxsize, self, deadline_s)
@@ -227,31 +227,31 @@ class Board:
 
     def command(self, what: int, value: int = 0, timeout: float = 1.0) -> Zones:
         """Have the board do something: 1, test its lines; 2, see :meth:`sample_at`. Returns the first complete frame
-        scanned after it took the command; where answers were lost it may have taken it twice.
+        scanned after the board took the command. If answers were lost, the board may have taken it twice.
 
-        ``value`` is the command's, ``timeout`` in seconds. Raises :class:`NoSuchCommand` where the board does not take
-        it, ValueError for numbers that no command has, and as :meth:`read` does.
+        ``value`` belongs to the command, ``timeout`` is in seconds. Raises :class:`NoSuchCommand` if the board does not
+        take it, ValueError for numbers that no command has, and the errors of :meth:`read`.
         """
         return frame_of(self._link.command(Command(what, value), checked(timeout)))
 
     def sample_at(self, clocks: int = 0, timeout: float = 1.0) -> Zones:
-        """From the next frame on sample the columns this many clocks of the board after a row is selected, in place of
-        the settle time, which 0 is: to measure how long the sheet takes (``contactfpga wire --settle``). Returns the
-        first frame that is. Until it is set to 0 again, or the board restarts, what takes longer does not read pressed.
+        """From the next frame on, sample the columns this many clocks of the board after a row is selected; 0 stands
+        for the settle time. This measures how long the sheet takes (``contactfpga wire --settle``). Returns the first
+        frame that was sampled so. Until you set it to 0 again, or the board restarts, slower cells do not read pressed.
 
-        More than the settle time counts as that, and so does what is too early for the board: less than 2 clocks, or
-        than columns on shift registers take. Raises as :meth:`command` does; boards with ``report = "cells"`` and
-        ``scan = "raster"`` or ``"reversal"`` take it.
+        More than the settle time counts as the settle time. So does a value that is too early for the board: less than
+        2 clocks, or than columns on shift registers take. Raises the errors of :meth:`command`; boards with
+        ``report = "cells"`` and ``scan = "raster"`` or ``"reversal"`` take it.
         """
         return self.command(SAMPLE_AT, clocks, timeout)
 
     def self_test(self, timeout: float = 2.0) -> SelfTest:
-        """Have the board drive each of its lines alone, and return what that says of them (:class:`SelfTest`).
+        """Have the board drive each of its lines alone, and return what this shows (:class:`SelfTest`).
 
-        Diodes show only while their switch is pressed: do it again and again, and put the results together with
-        :func:`contactfpga.zones.self_test.merged`. The scan goes on between its slots. ``timeout`` in seconds. Raises
-        :class:`NoSuchCommand` where the board has none, and as :meth:`read` does. Without the board's Skin its mask is
-        not known, so lines that do not rise cannot be told from absent ones.
+        Bridged diodes show only while their switch is pressed: repeat the test, and combine the results with
+        :func:`contactfpga.zones.self_test.merged`. The scan goes on between the slots of the test. ``timeout`` in
+        seconds. Raises :class:`NoSuchCommand` if the board has no self-test, and the errors of :meth:`read`. Without
+        the board's Skin its mask is not known, so lines that do not rise cannot be distinguished from absent ones.
         """
         slots = self_test.run(self._link, checked(timeout))
         try:
@@ -266,11 +266,12 @@ class Board:
         return self.command(*zero_value(self._unit_facts(), unit, reading), timeout=timeout)
 
     def set_threshold(self, unit: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """From this deviation from its zero on, either way, a unit raises ``contact``; 0: never. As :meth:`command`."""
+        """Have a unit raise ``contact`` once it deviates this much from its zero, either way; 0: never. As
+        :meth:`command`."""
         return self.command(*threshold_value(self._unit_facts(), unit, deviation), timeout=timeout)
 
     def set_sum_threshold(self, index: int, deviation: int, timeout: float = 1.0) -> Zones:
-        """The same of a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
+        """The same for a weighted sum of deviations, by its place in the Skin's ``unit_sums``."""
         return self.command(*sum_threshold_value(self._unit_facts(), index, deviation), timeout=timeout)
 
     def _unit_facts(self) -> UnitFacts:

@@ -78,6 +78,8 @@ class ClockFit:
             self._suppose()
             self._fit()
         elif below_s > 0:
+            while self._pieces and _hides(point, self._pieces[-1]):
+                self._pieces.pop()
             self._pieces.append(point)
             self._height_s -= below_s
             self._least_s = max(0.0, self._least_s - below_s)
@@ -152,6 +154,13 @@ class ClockFit:
         base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
         base_us = self._base_us + round(now_s * 1e6)
         return HostLine(arrived_s, base_us, base_s, 1.0 + self._slope, math.sqrt(self._variance))
+
+
+def _hides(point: _Point, earlier: _Point) -> bool:
+    """Whether an earlier point of the same piece bounds no line that a later one leaves open."""
+    if math.floor(earlier.device_s / PIECE_S) < math.floor(point.device_s / PIECE_S):
+        return False
+    return earlier.excess_s - point.excess_s > MOST_PPM * 1e-6 * (point.device_s - earlier.device_s)
 
 
 def _least(points: collections.deque[_Point] | list[_Point], now_s: float, sign: int = 1) -> np.ndarray:

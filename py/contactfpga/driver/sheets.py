@@ -6,6 +6,7 @@ as to one. The port itself is opened once, for as long as one of its sheets is o
 
 from __future__ import annotations
 
+import contextlib
 import re
 import threading
 from collections import deque
@@ -15,10 +16,12 @@ from typing import TYPE_CHECKING
 from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.skin.several import MOST_SHEETS
+from contactfpga.skin.widths import LONGEST_PACKET
 from contactfpga.wire import framing
+from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import Hello, HelloReader
 from contactfpga.wire.hellos import begins_hello
-from contactfpga.wire.numbered import numbered_requests, sheet_of, unnumbered
+from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
 
 if TYPE_CHECKING:
     from contactfpga.driver.transport import Transport
@@ -40,6 +43,8 @@ def split(name: str) -> tuple[str, int] | None:
         return None
     if int(found[2]) >= MOST_SHEETS:
         raise PortNotFound(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
+    if (once := re.fullmatch(r"(.*?)(#\d{1,4})+", found[1])) is not None:
+        raise PortNotFound(f"{name}: it names two sheets; give one number, as in {once[1]}#{int(found[2])}")
     return found[1], int(found[2])
 
 
@@ -48,16 +53,20 @@ class Sorter:
 
     def __init__(self) -> None:
         self.alone = False
-        """The board has one sheet, which has no number."""
+        """The board has one sheet, which has no number, as its last hello shows."""
         self.sheets: int | None = None
-        """As many sheets has the board; None: no hello has come yet."""
+        """As many sheets has the board; None: no hello has said so."""
         self._rest = b""
 
     def take(self, data: bytes) -> list[tuple[int | None, bytes]]:
         """(sheet, packet with its delimiter) of all packets that ``data`` completes. No sheet: nobody knows whose it
         was, and the packet is one that every sheet refuses."""
         *packets, self._rest = (self._rest + data).split(b"\0")
-        return [self._sorted(packet) for packet in packets if packet]
+        found = [self._sorted(packet) for packet in packets if packet]
+        if len(self._rest) > LONGEST_PACKET + NUMBER_BYTES:
+            found.append((None, _DAMAGED))
+            self._rest = b""
+        return found
 
     def _sorted(self, packet: bytes) -> tuple[int | None, bytes]:
         sheet = sheet_of(packet)
@@ -65,9 +74,11 @@ class Sorter:
             self.alone = self.alone or begins_hello(packet)
             return None, _DAMAGED
         packet = unnumbered(packet)
-        if self.sheets is None and begins_hello(packet):
-            hello = HelloReader().take(framing.unseal(packet, b""))
-            self.sheets = hello.place.sheets if hello is not None and hello.place is not None else None
+        if begins_hello(packet):
+            self.alone = False
+            with contextlib.suppress(PacketError):  # who reads the sheet counts it
+                hello = HelloReader().take(framing.unseal(packet, b""))
+                self.sheets = hello.place.sheets if hello is not None and hello.place is not None else self.sheets
         return sheet, packet + b"\0"
 
 
@@ -89,8 +100,9 @@ class SharedPort:
         return [f"{self.inner.name}#{number}" for number in range(self._sorter.sheets or 0)]
 
     def add(self, sheet: SheetPort) -> None:
-        """From now on keep what comes of this sheet."""
+        """From now on keep what comes of this sheet. Perhaps another bitstream was loaded since the last hello."""
         with self._changed:
+            self._sorter.alone = False
             self._waiting[sheet] = deque(maxlen=MOST_WAIT)
 
     def drop(self, sheet: SheetPort) -> bool:

@@ -17,15 +17,15 @@ BETWEEN_BYTES = 160
 
 @dataclasses.dataclass(frozen=True)
 class Silence:
-    """No frame came for longer than allowed. This says nothing of the sheet: it may be touched."""
+    """No frame came for longer than allowed. This says nothing about the sheet, which may be touched."""
 
     port: str
     seconds: float
-    """How long none came."""
+    """How long no frame came."""
     bytes: int
-    """What did come in this time, but was no frame."""
+    """Bytes that came in this time without making a frame."""
     last: Zones | None
-    """The frame that came last; None: none has come yet."""
+    """The frame that came last; None if none has come yet."""
 
     def __str__(self) -> str:
         if self.last is None:

@@ -16,16 +16,16 @@ class Stats:
     frames: int = 0
     """Frames received whole and passed on."""
     lost: int = 0
-    """Frames the board sent that did not arrive whole: from the gaps in their sequence numbers, and exact at each
-    hello, which tells how many frames the board has sent."""
+    """Frames that the board sent and that did not arrive whole. Counted from gaps in the sequence numbers, and exact at
+    each hello, which says how many frames the board has sent."""
     unexplained: int = 0
-    """Frames received whole and not passed on, as their times could not be known before the next hello: those after a
-    pause of the line, or of a board whose restart has not shown yet."""
+    """Frames received whole but not passed on, because their times could not be known before the next hello: after a
+    pause on the line, or when the board restarted and no hello has said so yet."""
     dropped: int = 0
-    """Frames passed on that were taken out of the queue of ``Board.next`` again, the oldest first, because it was
-    full."""
+    """Frames that were dropped from the queue of ``Board.next``, the oldest first, because it was full."""
     overwritten: int = 0
-    """Frames the board replaced by newer ones before it sent them, a gap modulo 2^``Widths.overwritten_bits``."""
+    """Frames that the board replaced by newer ones before it sent them; each gap counts modulo
+    2^``Widths.overwritten_bits``."""
     damaged: Counter[str] = dataclasses.field(default_factory=Counter)
     """Packets refused, by reason: framing, crc, length, kind, content, noise."""
     resynchronized: int = 0
@@ -37,9 +37,10 @@ class Stats:
     sweeps: int = 0
     """Sweeps of the pressure units received."""
     sweeps_lost: int = 0
-    """Sweeps that did not arrive, a gap modulo 256: replaced by newer ones while frames filled the line, or damaged."""
+    """Sweeps that did not arrive, because newer ones replaced them while frames filled the line, or because they were
+    damaged; each gap counts modulo 256."""
     sweeps_unexplained: int = 0
-    """Sweeps received and not passed on, as their times could not be known before the next frame."""
+    """Sweeps received but not passed on, because their times could not be known before the next frame."""
     before_hello: int = 0
     """Packets that came before the first hello, without which they cannot be read."""
     unknown_kinds: int = 0
@@ -47,16 +48,16 @@ class Stats:
     foreign_version: int = 0
     """Packets of protocol 1."""
     foreign_skin: int = 0
-    """Frames of a board built from another Skin than the one asked for."""
+    """Frames of a board that was built from a different Skin than the one asked for."""
     skin_changes: int = 0
-    """Hellos of another Skin than the one before."""
+    """Hellos with a different Skin than the hello before."""
     restarts: int = 0
-    """How often the board was restarted, as its hellos tell."""
+    """How often the board restarted, according to its hellos."""
     bytes: int = 0
     """All bytes received."""
 
     net: Counters | None = None
-    """What happened on the network, of a ``zenoh://`` port; None: there is none between."""
+    """What happened on the network, for a ``zenoh://`` port; None for any other port."""
 
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""

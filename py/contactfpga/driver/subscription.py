@@ -51,7 +51,7 @@ class Listening(Generic[Item]):
         return self._frames.dropped
 
     def next(self, timeout: float = 1.0) -> Item:
-        """What comes next, in order; errors as for :meth:`Board.next`, and as the class says of silence."""
+        """What comes next, in order. Errors as for :meth:`Board.next`; silence as the class describes."""
         timeout = checked(timeout)
         now = self._link.clock()
         silent_at = self._silent_at()
@@ -132,10 +132,10 @@ class Listening(Generic[Item]):
 
 
 class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
-    """All that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
-    :class:`Zones`; :class:`Faults`, first those that there are and then whenever they change, also where no frame is
-    sent; the slots of a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline
-    :class:`Silence`, each time that it passes without a frame.
+    """Everything that comes from a board from a moment on, in order, in ``for``, in ``async for``, or one by one: each
+    :class:`Zones`; :class:`Faults`, first the present ones and then each change, even if no frame is sent; the slots of
+    a self-test; with pressure units each sweep as :class:`UnitSamples`; and with a deadline :class:`Silence`, each time
+    that it passes without a frame.
 
     ``maxsize`` waits at most; beyond, the oldest are dropped, and frames among them counted in :attr:`dropped`.
     """
@@ -155,7 +155,7 @@ class Events(Listening[Zones | Faults | SelfTestSlot | UnitSamples | Silence]):
 class Subscription(Listening[Zones]):
     """Every frame of a board from a moment on: in ``for``, in ``async for``, or one by one.
 
-    ``maxsize`` frames wait at most; beyond, the oldest ones are dropped and counted in :attr:`dropped`. With a deadline
+    At most ``maxsize`` frames wait; beyond that, the oldest are dropped and counted in :attr:`dropped`. With a deadline
     :class:`NoData` is raised each time that it passes without a frame.
     """
 

@@ -10,6 +10,8 @@ from contactfpga.haptics.answer import HapticsError
 from contactfpga.haptics.evidence import Closing
 from contactfpga.haptics.locate import closed
 from contactfpga.haptics.units import LoadCells
+from contactfpga.skin.sheet import Sheet
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zones
 
 Cell = tuple[int, int]
@@ -92,10 +94,11 @@ class ClosingWatch:
             one = closed(before, after)
             return [one] if one else [], []
         _, x, y = (int(number) for number in after.records.sum(axis=0) - before.records.sum(axis=0))
+        around = _around(after.sheet)
         fits = sorted(
-            (_spread([*self._pushes, *some]), list(some))
+            (_spread([*self._pushes, *some], around), list(some))
             for some in itertools.combinations(self._beside(after), count)
-            if sum(row for row, _ in some) == y and sum(column for _, column in some) == x
+            if sum(row for row, _ in some) == y and across(sum(column for _, column in some) - x, around) == 0
         )
         alone = len(fits) == 1 or (len(fits) > 1 and fits[0][0] < fits[1][0])
         return fits[0][1] if alone else [], []
@@ -105,14 +108,14 @@ class ClosingWatch:
         rows, columns = zones.sheet.rows, zones.sheet.columns
         area, x, y = (int(number) for number in zones.records.sum(axis=0))
         known = list(self._pushes) or [(round(y / area), round(x / area))]
-        around = {
-            (row + down, column + right)
+        near = {
+            (row + down, (column + right) % columns if zones.sheet.closed else column + right)
             for row, column in known
             for down in (-1, 0, 1)
             for right in (-1, 0, 1)
-            if 0 <= row + down < rows and 0 <= column + right < columns
         }
-        return sorted(around - self._pushes.keys())
+        inside = {(row, column) for row, column in near if 0 <= row < rows and 0 <= column < columns}
+        return sorted(inside - self._pushes.keys())
 
     def _at(self, before: Zones, after: Zones, row: int) -> float | None:
         """The push in N when the row was scanned: rows are scanned one after the other, from one frame to the next."""
@@ -125,6 +128,11 @@ class ClosingWatch:
         return max(0.0, self._push_before + share * (self.push_n - self._push_before))
 
 
-def _spread(cells: list[Cell]) -> int:
-    """How far cells lie apart, in whole numbers: squares of all distances."""
-    return sum((r - row) ** 2 + (c - column) ** 2 for r, c in cells for row, column in cells)
+def _around(sheet: Sheet) -> int | None:
+    """Columns from the seam to the seam, past which sums count on."""
+    return sheet.columns if sheet.closed else None
+
+
+def _spread(cells: list[Cell], around: int | None) -> float:
+    """How far cells lie apart, in pitches: squares of all distances."""
+    return sum((r - row) ** 2 + across(c - column, around) ** 2 for r, c in cells for row, column in cells)

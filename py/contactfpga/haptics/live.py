@@ -29,13 +29,15 @@ def felt(
     tracks: Tracks | None = None,
     alone: AloneWatch | None = None,
 ) -> Contacts | None:
-    """The force at each zone of a frame, from the units' readings at its moment; None where these are not known (yet).
+    """The force at each zone of a frame, from the units' readings at its moment; None where these are not known (yet),
+    and where a zone leads around the sheet (:attr:`Zone.winding <contactfpga.Zone.winding>`): it pushes as well, at no
+    known place.
 
     Raises :class:`HapticsError` where the cells have no surface, or are not as many as the board's units.
     """
     if cells.surface is None:
         raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
-    if zones.units is None:
+    if zones.units is None or any(zones.windings):
         return None
     wrench = cells.wrench(zones.units.readings, motion)
     return contacts(wrench, zones, cells.surface, friction, sheet_m=cells.sheet_m, tracks=tracks, alone=alone)

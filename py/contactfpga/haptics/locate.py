@@ -77,8 +77,10 @@ class Locator:
         x, spread = center.sheet_m[0], center.covariance_m2
         if self._sheet.radius_mm is not None:
             x, spread = self._inside(center)
-        place = (x - origin_m[0], center.sheet_m[1] - origin_m[1])
-        return Place(*place, posterior.radius_95(spread), spread, "center of pressure")
+        x -= origin_m[0]
+        if self._sheet.closed:
+            x %= self._sheet.columns * self._pitch_x
+        return Place(x, center.sheet_m[1] - origin_m[1], posterior.radius_95(spread), spread, "center of pressure")
 
     def _inside(self, center: Center) -> tuple[float, Floats]:
         """Arc length on the sheet, which lies under the foam, and the covariance there. Of the turns around the link
@@ -124,6 +126,25 @@ class Locator:
             raise HapticsError(
                 "there is no pressed cell; a contact that closes no switch has its center of pressure alone"
             )
+        if not self._sheet.closed:
+            return self._locate(cells, force_n, closings, center)
+        # As if the sheet were cut open far from the contact.
+        columns = self._sheet.columns
+        cut = _cut({column for _, column in cells}, columns)
+        moved = [(row, (column - cut) % columns) for row, column in cells]
+        then = [dataclasses.replace(one, column=(one.column - cut) % columns) for one in closings]
+        found = self._locate(moved, force_n, then, None if center is None else self._turned(center, -cut))
+        return self._turned(found, cut)
+
+    def _turned(self, place: Place, columns: int) -> Place:
+        """So many columns further around."""
+        return dataclasses.replace(
+            place, x_m=(place.x_m + columns * self._pitch_x) % (self._sheet.columns * self._pitch_x)
+        )
+
+    def _locate(
+        self, cells: Sequence[tuple[int, int]], force_n: float, closings: Sequence[Closing], center: Place | None
+    ) -> Place:
         x = self._pitch_x * sum(column for _, column in cells) / len(cells)
         y = self._pitch_y * sum(row for row, _ in cells) / len(cells)
         coarse = self.barycenter(x, y, force_n)
@@ -156,6 +177,14 @@ class Locator:
 def _place(found: Posterior, closings: bool, center: bool) -> Place:
     method = ("closings" if closings else "set") + (" + center of pressure" if center else "")
     return Place(found.x_m, found.y_m, found.radius_m, found.covariance_m2, method)
+
+
+def _cut(taken: set[int], columns: int) -> int:
+    """The column in the middle of the widest gap between these."""
+    wide, left = max((min((other - one - 1) % columns for other in taken), one) for one in taken)
+    if not wide:
+        raise HapticsError("the cells lie all the way round the closed sheet, so that the contact has no x")
+    return left + 1 + wide // 2
 
 
 def closed(before: Zones, after: Zones) -> tuple[int, int] | None:

@@ -93,6 +93,12 @@ def touched(
     sigma = 1e-3 * pitch_mm / math.sqrt(12)
     found = []
     for zone in zones:
+        if zone.winding:
+            name = "a ring" if zone.winding == "ring" else zone.winding
+            raise HapticsError(
+                f"a zone at y {zone.y_mm:.1f} mm is {name}: it pushes as well, at no known place around the sheet, so "
+                "that the forces at the others are not known either"
+            )
         if zone.point_mm is not None:
             x, y, z = zone.point_mm
             along, across = surface.flat((1e-3 * x, 1e-3 * y, 1e-3 * z))

@@ -6,7 +6,7 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeGuard
 
 
 def open_regular(path: str | Path) -> BinaryIO:
@@ -30,6 +30,11 @@ def read_small(path: str | Path, most: int, what: str, refused: type[Exception])
     if len(data) > most:
         raise refused(f"{path}: longer than {most:,} bytes; is it {what}?")
     return data
+
+
+def names_robot(port: str | None) -> TypeGuard[str]:
+    """Whether what stands for a port is the file of a robot's links, not a board as ``sim://?skin=FILE.toml``."""
+    return port is not None and port.endswith(".toml") and "://" not in port
 
 
 def told(error: OSError) -> str:

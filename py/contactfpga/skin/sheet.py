@@ -28,6 +28,11 @@ class Sheet:
     ghosts: bool
     """The sheet has no diodes: pressed switches can make others read pressed."""
 
+    @property
+    def around_mm(self) -> float | None:
+        """From the seam to the seam where the ends meet; None: they do not."""
+        return self.columns * self.pitch_x_mm if self.closed else None
+
     def max_zones(self) -> int:
         """The most zones a frame of this sheet can hold."""
         return max_zones(self.rows, self.columns, self.connectivity, self.closed)

@@ -29,7 +29,7 @@ class Skin:
     """
 
     name: str = ""
-    """What the board calls itself: at most 32 bytes of UTF-8. It tells boards of one Skin apart and is in the
+    """What the board calls itself, at most 32 bytes of UTF-8. It tells boards with the same Skin apart. It is in the
     bitstream, but not in the fingerprint."""
 
     rows: int = 16
@@ -50,20 +50,20 @@ class Skin:
     mask: tuple[tuple[int, int], ...] = ()
     """(row, column) of switches that are absent or broken: never pressed, never stuck."""
     guard: bool = False
-    """One more row and one more column at the far ends, whose switches are closed for good: the board tells a broken
-    line by name (docs/faults.md)."""
+    """One more row and one more column at the far ends, whose crossings are always closed, so that the board can report
+    broken lines by name (docs/faults.md)."""
     row_order: tuple[int, ...] = ()
-    """The line, counted from 0 in the order of the board's pins or the chain's outputs, that each row is soldered to;
-    (): row i to line i. A guard row is the last line."""
+    """The line that each row is soldered to, counted from 0 in the order of the board's pins or the chain's outputs.
+    (): row i is on line i. A guard row is always the last line."""
     column_order: tuple[int, ...] = ()
     """The same for columns."""
     connectivity: int = 8
     """8: cells that share a corner belong to one zone; 4: only cells that share an edge."""
 
     diodes: Literal["col2row", "row2col", "none"] = "col2row"
-    """``col2row``: selected row low, columns pulled up; ``row2col``: selected row high, columns pulled down; ``none``:
-    as ``col2row``, but with no diodes rows float while they are not selected, and three pressed corners of a rectangle
-    make the fourth read pressed: what that may have made is flagged ``ghost``."""
+    """``col2row``: the selected row is low, columns are pulled up. ``row2col``: the selected row is high, columns are
+    pulled down. ``none``: as ``col2row``, but without diodes. Rows float while they are not selected, and three pressed
+    corners of a rectangle make the fourth read pressed; zones that this may have made are flagged ``ghost``."""
     scan: ScanName | Scan = "raster"
     """``raster`` drives one row after the other; ``adaptive`` drives rows together where nothing is touched;
     ``reversal`` drives all columns and reads the rows, and then drives only the rows that are touched."""
@@ -75,7 +75,7 @@ class Skin:
     """How long the board drives the columns to the released level before it drives a row, in us; 0: pulls alone bring
     them there."""
     project_us: float = limits.PROJECT_US
-    """``scan = "reversal"``: how long all columns are driven before the rows are read, in us."""
+    """How long ``scan = "reversal"`` drives all columns before it reads the rows, in us."""
     row_drive: Literal["direct", "74hc595"] = "direct"
     """``direct``: a pin per row; ``74hc595``: rows on shift registers, which a row slot may have to wait for."""
     row_chains: int = 1
@@ -91,46 +91,49 @@ class Skin:
     debounce: DebounceName | Debounce = "none"
     """``none``, ``sym_defer_pk`` or ``asym_eager_defer_pk``, as QMK names them."""
     debounce_press_us: float = 5000.0
-    """sym_defer_pk: how long a press must last to count; asym_eager_defer_pk: how long it then holds; us."""
+    """In us. With ``sym_defer_pk``, how long a press must last to count; with ``asym_eager_defer_pk``, how long a press
+    that has counted holds."""
     debounce_release_us: float = 5000.0
     """How long a release must last to count, in us."""
 
     labeller: LabellerName | Labeller = "run"
-    """How zones are found. Exactly: ``run``, fastest, its work follows the runs of pressed cells; ``serial``, smaller,
-    a cell per clock. ``projection``: from the shadows on the two axes, wrong where these cross. ``single``: all pressed
-    cells are one zone."""
+    """How zones are found. Two labellers are exact: ``run`` is the fastest and takes a run of pressed cells per clock;
+    ``serial`` is smaller and takes a cell per clock. ``projection`` uses the shadows on the two axes and is wrong where
+    these cross. ``single`` takes all pressed cells as one zone."""
     report: ReportName = "moments"
     """``moments``: area, sum x and sum y of each zone; ``barycenter``: area and barycenter, divided on the board and
     rounded; ``cells``: the pressed cells as a bitmap."""
     barycenter_bits: int = limits.BARYCENTER_BITS
-    """``report = "barycenter"``: x and y come in steps of a cell / 2^this, the nearest one, half a step upward."""
+    """With ``report = "barycenter"``, x and y are rounded to the nearest 1 / 2^barycenter_bits of a cell, halves
+    upward."""
     send: Literal["always", "on_change"] = "always"
-    """``always``: every frame; ``on_change``: a frame whose cells differ from the last one, or a keep-alive."""
+    """``always``: the board sends every frame. ``on_change``: it sends a frame whose cells differ from the last one,
+    and keep-alives."""
     keep_alive_ms: float = 100.0
     """Longest pause between frames with ``send = "on_change"``, in ms; at most 100."""
     zone_capacity: int | None = None
-    """Zones a frame can carry. None: the most that can occur up to 32x32, at most 256 above, and with
-    ``report = "barycenter"`` at most 64; then filled in."""
+    """Zones that a frame can carry. None stands for the most that can occur up to 32x32, at most 256 above that, and at
+    most 64 with ``report = "barycenter"``; the Skin replaces it by that number."""
 
     fail_safe: bool = False
     """``contact`` is high while the board knows of a fault."""
     alive: bool = False
-    """A pin that turns every ms, as long as whole frames without a fault come."""
+    """A pin changes its level every ms, as long as whole frames without a fault come."""
     self_test: bool = False
     """The board tests its lines against each other, at start and when the host asks; needs a scan that reads rows."""
     dual: bool = False
-    """Two copies of the gateware are compared in each clock; where they differ nothing passes for a frame, and both
+    """Two copies of the gateware are compared in each clock. If they differ, no wrong packet is completed, and both
     restart."""
 
     units: int = 0
     """Pressure units, read by an SPI converter, 0 to 8 with the MCP3208 (docs/units.md)."""
     converter: ConverterName | Converter = "mcp3208"
-    """What reads them."""
+    """The converter that reads the pressure units."""
     converter_v: float = limits.CONVERTER_V
     """The converter's supply in V, which limits its SPI clock."""
     unit_sums: tuple[tuple[int, ...], ...] = ()
-    """Up to four weighted sums of the units' deviations from their zeros, which have thresholds of their own: a weight
-    from -127 to 127 for each unit."""
+    """Up to four weighted sums of the units' deviations from their zeros, each with its own threshold. A sum has a
+    weight from -127 to 127 for each unit."""
 
     clock_hz: int = 12_000_000
     """Clock of the gateware in Hz, a whole number of MHz."""
@@ -156,6 +159,9 @@ class Skin:
         known = [field.name for field in dataclasses.fields(cls)]
         unknown = sorted(set(values) - set(known))
         if unknown:
+            if unknown == ["sheets"]:
+                steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
+                raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             tables = "and the tables [cover] and [circuit]"
             raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, {tables}")
         return cls(**values)

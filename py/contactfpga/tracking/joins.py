@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import PASSING_S, Member, Spot, across, place, radius_mm
+from contactfpga.tracking.spot import PASSING_S, Member, Spot, place, radius_mm
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone
 
 FASTER = (1.0, 1.5, 2.0)

@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 from contactfpga.tracking.tracks import Track
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone
 
 SETTLING_S, SMOOTH_S = 0.004, 0.015
@@ -118,11 +119,6 @@ def place(zone: Zone) -> tuple[float, float]:
     assert zone.x_mm is not None
     assert zone.y_mm is not None
     return zone.x_mm, zone.y_mm
-
-
-def across(dx_mm: float, around_mm: float | None) -> float:
-    """A distance along x, the shorter way around a cylinder of this circumference."""
-    return dx_mm if around_mm is None else (dx_mm + around_mm / 2) % around_mm - around_mm / 2
 
 
 def radius_mm(area_mm2: float) -> float:

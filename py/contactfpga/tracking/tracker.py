@@ -8,8 +8,9 @@ from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking import joins
 from contactfpga.tracking.assignment import assign
-from contactfpga.tracking.spot import Member, Spot, across, place
+from contactfpga.tracking.spot import Member, Spot, place
 from contactfpga.tracking.tracks import Event, Kind, Tracks
+from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zone, Zones
 
 LIMITS = {
@@ -24,14 +25,14 @@ LIMITS = {
 class Tracker:
     """Gives contacts ids that stay: hand it every frame, in order.
 
-    It neither reads nor waits: time is the frames' own, so a recording gives the same ids as the board did. A contact
-    is taken for the one of the frame before whose place, moved on as it went, is nearest; of all pairs within the gate
-    those with the least total distance. On a cylinder distances run along its surface.
+    It neither reads nor waits: time is the frames' own, so a recording gives the same ids as the board did. The tracker
+    moves each contact on by its speed and pairs contacts with zones so that the sum of distances within the gate is
+    least. On a cylinder distances run along its surface.
 
-    ``gate_mm``: how far from there, or from where it was last seen, a contact may be found. ``hold_ms``: for how long a
-    contact that no frame shows is held, so that it comes through a bounce. ``shared_ms``: for how long a contact is
-    remembered that has a zone with others, while that zone is only as large as theirs. ``move_mm``: how far a contact
-    goes from one ``move`` to the next. Raises ValueError for a setting that cannot be.
+    ``gate_mm``: how far from where its motion puts it, or from where it was last seen, a contact may be found.
+    ``hold_ms``: for how long a contact that no frame shows is held, so that it survives a bounce. ``shared_ms``: for
+    how long a contact that shares a zone is remembered while the zone is only as large as the others. ``move_mm``: how
+    far a contact goes from one ``move`` to the next. Raises ValueError for a setting outside its limits.
     """
 
     def __init__(self, gate_mm: float = 20.0, *, hold_ms: float = 5.0, shared_ms: float = 300.0, move_mm: float = 5.0):
@@ -52,9 +53,9 @@ class Tracker:
         """The contacts after this frame, and what happened to them.
 
         A frame that is flagged ``mismatch`` may be wrong, so it changes nothing; one that is flagged ``overflow`` ends
-        no contact. Frames that were lost end none either: a contact goes on where it is found next. A frame whose time
-        lies before that of the last one, or of another sheet, begins a new history. Raises TypeError for anything but
-        a frame.
+        no contact. Frames that were lost end none either: a contact goes on where it is found next. A frame that is
+        older than the last one, or belongs to another sheet, begins a new history. Raises TypeError for anything but a
+        frame.
         """
         if not isinstance(zones, Zones):
             raise TypeError(f"update() takes a frame of zones, such as board.next() returns; it got {shown(zones)}")

@@ -13,7 +13,7 @@ Kind = Literal["down", "move", "merge", "split", "up"]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Track:
-    """One contact that is there, by the frame it was last seen in."""
+    """One present contact, as of the frame in which it was last seen."""
 
     id: int
     """Stays with the contact; no other contact ever has it."""
@@ -22,9 +22,9 @@ class Track:
     since_us: int
     """When it came, in device time in us."""
     seen_us: int
-    """The frame in which it was last seen."""
+    """Device time of the frame in which it was last seen, in us."""
     vx_mm_s: float
-    """Its speed along x in mm/s, smoothed over some milliseconds."""
+    """Its speed along x in mm/s, smoothed over a few milliseconds."""
     vy_mm_s: float
     held: bool = False
     """This frame does not show it. It bounces, the frame leaves zones out (``overflow``, ``mismatch``), or a zone that
@@ -60,11 +60,11 @@ class Event:
     time_us: int
     """Device time of the frame that showed it, in us."""
     parents: tuple[int, ...]
-    """Ids of the other contacts of a ``merge`` or ``split``, and of a ``down`` by which a contact parted into two."""
+    """Ids of the other contacts in a ``merge`` or ``split``, or in a ``down`` that began as a contact parted in two."""
     zone: Zone
-    """Its zone then; of ``up``, the last one."""
+    """Its zone then; for ``up``, its last zone."""
     seen_us: int
-    """When it was last seen: ``time_us``, but for ``up``, which may come up to ``hold_ms`` later."""
+    """When it was last seen, in us: ``time_us``, except for ``up``, which may come up to ``hold_ms`` later."""
 
     def to_dict(self) -> dict[str, object]:
         """Everything in plain Python values, ready for JSON."""
@@ -84,17 +84,17 @@ class Tracks:
     """What :meth:`Tracker.update` returns."""
 
     time_us: int
-    """Of the frame."""
+    """Device time of the frame, in us."""
     active: tuple[Track, ...]
-    """The contacts that are there, one for each zone, by their ids."""
+    """The present contacts, one for each zone, in order of their ids."""
     events: tuple[Event, ...]
     """What happened since the frame before, in order."""
     unsure: tuple[Zone, ...] = ()
-    """Zones that no contact has: other pressed switches may have made them (:attr:`Zone.ghost`), or they lead around a
-    sheet whose ends meet and have no place along it (:attr:`Zone.winding`). They begin no contact. One that is there
-    goes on in a ghost, and is held while a zone winds."""
+    """Zones without a contact, because other pressed switches may have made them (:attr:`Zone.ghost`), or because they
+    go around a closed sheet and have no x (:attr:`Zone.winding`). They begin no contact. A present contact goes on in a
+    ghost, and is held while a zone winds."""
     restarted: bool = False
-    """The board's time ran backward, or its sheet is another one: all contacts ended, and what is there began."""
+    """The board's time ran backward, or its sheet changed. All contacts ended, and new ones began."""
 
     def _repr_html_(self) -> str:
         """The contacts as a table in a notebook."""

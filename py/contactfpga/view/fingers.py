@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
+from contactfpga.zones.around import across
 
 FINGER = 0.9
 """Radius of the mouse's finger, of the pitch."""
@@ -26,9 +27,10 @@ class Finger:
     radius_mm: float
     force_n: float
 
-    def covers(self, x_mm: float, y_mm: float) -> bool:
-        """Whether this place lies under it."""
-        return (self.x_mm - x_mm) ** 2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
+    def covers(self, x_mm: float, y_mm: float, around_mm: float | None = None) -> bool:
+        """Whether this place lies under it; ``around_mm``: as :attr:`contactfpga.skin.sheet.Sheet.around_mm`."""
+        off_mm = across(self.x_mm - x_mm, around_mm)
+        return off_mm**2 + (self.y_mm - y_mm) ** 2 <= self.radius_mm**2
 
 
 class Touchable(Protocol):
@@ -52,8 +54,9 @@ class Hand:
     :attr:`radius_mm` and :attr:`force_n` are those of the next finger.
     """
 
-    def __init__(self, board: Touchable, radius_mm: float, force_n: float = 5.0):
+    def __init__(self, board: Touchable, radius_mm: float, force_n: float = 5.0, around_mm: float | None = None):
         self.radius_mm, self.force_n = radius_mm, force_n
+        self._around_mm = around_mm
         self.board = board
         self._lock = threading.Lock()
         self._down: list[Finger] = []
@@ -63,7 +66,7 @@ class Hand:
     @classmethod
     def on(cls, board: Touchable, sheet: Sheet) -> Hand:
         """With a finger that suits this board's sheet."""
-        return cls(board, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm))
+        return cls(board, FINGER * max(sheet.pitch_x_mm, sheet.pitch_y_mm), around_mm=sheet.around_mm)
 
     @property
     def fingers(self) -> list[Finger]:
@@ -74,7 +77,7 @@ class Hand:
     def click(self, x_mm: float, y_mm: float) -> None:
         """Put a finger down, or lift those that are there."""
         with self._lock:
-            left = [finger for finger in self._down if not finger.covers(x_mm, y_mm)]
+            left = [finger for finger in self._down if not finger.covers(x_mm, y_mm, self._around_mm)]
             if len(left) == len(self._down):
                 left.append(self._finger(x_mm, y_mm))
             self._down = left
@@ -114,7 +117,7 @@ class Hand:
     def _taken(self, who: object, x_mm: float, y_mm: float) -> Finger:
         """The finger with which a drag begins."""
         for finger in self._down:
-            if finger.covers(x_mm, y_mm):
+            if finger.covers(x_mm, y_mm, self._around_mm):
                 self._down.remove(finger)
                 self._stays.add(who)
                 return finger

@@ -12,11 +12,12 @@ import time
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import TYPE_CHECKING, Any
 
-from contactfpga.driver import driver, sim_address, transport
+from contactfpga.driver import driver, sheets, sim_address, transport
 from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics import LoadCells
+from contactfpga.inputs.files import names_robot
 from contactfpga.skin import Skin
 from contactfpga.view import server
 from contactfpga.view.app import View
@@ -96,7 +97,7 @@ def run(shown: Shown, seconds: float | None = None) -> None:
 def _check(named: Named) -> None:
     """Raises :class:`~contactfpga.ContactFPGAError` for what is named and would be left out."""
     port = named.port
-    is_body = _is_body(port)
+    is_body = names_robot(port)
     recorded = port is not None and not is_body and is_recording(port)
     for name in ("skin", "baud", "units"):
         if getattr(named, name) is not None and (is_body or recorded):
@@ -106,32 +107,32 @@ def _check(named: Named) -> None:
         raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
 
-def _is_body(port: str | None) -> TypeGuard[str]:
-    return port is not None and port.endswith(".toml")
-
-
 def _source(named: Named) -> tuple[Source | BodySource | BodyPlayer, Hand | None]:
-    if _is_body(named.port):
+    if names_robot(named.port):
         return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):
         recorded = load(named.port, named.link, named.timeout)
         if isinstance(recorded, LinkRecording) and not recorded.named and holds_robot(recorded.recording):
             return BodyPlayer(recorded.recording), None
         return Player(recorded), None
-    if named.port is not None and not named.port.startswith("sim:"):
+    if named.port is not None and (not _is_virtual(named.port) or sheets.split(named.port) is not None):
         cells = _cells(named)
         board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)
-        return BoardSource(board, named.port, cells=cells), None
+        return BoardSource(board, named.port, cells=cells, simulated=_is_virtual(named.port)), None
     virtual, cells = _virtual(named), _cells(named)
     board = driver.open(virtual, None if named.port is None else named.skin, timeout=named.timeout)
     source = BoardSource(board, named.port or "a virtual sheet", virtual, cells)
     return source, Hand.on(virtual, board.sheet)
 
 
+def _is_virtual(port: str) -> bool:
+    return port.startswith("sim:")
+
+
 def _cells(named: Named) -> LoadCells | None:
     """Raises :class:`~contactfpga.haptics.HapticsError`."""
     path = named.units
-    if path is None and named.port is not None and named.port.startswith("sim:"):
+    if path is None and named.port is not None and _is_virtual(named.port):
         path = sim_address.parse(named.port).units
     return None if path is None else LoadCells.load(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,6 +40,8 @@ TITLE = 36
 MOST_N = 30.0
 """Of the mouse's finger."""
 CAPTURE_S = 20.0
+WHOLE = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+"""Steps of an axis that counts."""
 
 
 class Panel:
@@ -66,13 +69,14 @@ class Panel:
                 {"label": "zones", "stroke": picture_style.VERMILLION, "width": 2, "scale": "y"},
                 {"label": "cm2", "stroke": picture_style.BLUE, "width": 2, "scale": "cm2"},
             ),
-            scales={"x": {"time": False}, "y": {}, "cm2": {}},
+            scales=scales(none * 0, none * 0),
             axes=(
                 {"label": "s"},
-                {"scale": "y", "label": "zones", "stroke": picture_style.VERMILLION},
+                {"scale": "y", "label": "zones", "stroke": picture_style.VERMILLION, "incrs": WHOLE},
                 {"scale": "cm2", "label": "cm2", "side": 1, "stroke": picture_style.BLUE},
             ),
             aspect=1.8,
+            padding=(12, 0, 0, 0),  # the highest number is not cut
         )
 
     def _add_mouse(self, server: viser.ViserServer, hand: Hand) -> None:
@@ -107,8 +111,22 @@ class Panel:
         strip = self._source.meter.strip
         if len(strip.seconds) > 1:
             self._chart.data = (strip.seconds, strip.zones, strip.area_mm2 / 100)
+            if (wanted := scales(strip.zones, strip.area_mm2 / 100)) != self._chart.scales:
+                self._chart.scales = wanted
         if self._timeline is not None:
             self._timeline.write()
+
+
+def scales(zones: np.ndarray, area_cm2: np.ndarray) -> dict[str, Any]:
+    """Of the chart's axes: from 0 to a round number, so that they change seldom."""
+    return {"x": {"time": False}, "y": {"range": (0, _top(zones, 2))}, "cm2": {"range": (0, _top(area_cm2, 10))}}
+
+
+def _top(values: np.ndarray, least: int) -> int:
+    """1, 2 or 5 times a power of ten."""
+    wanted = max(least, math.ceil(values.max()))
+    power = 10 ** (len(str(wanted)) - 1)
+    return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
 
 
 class Timeline:

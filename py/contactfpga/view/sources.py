@@ -72,9 +72,17 @@ class Source(Protocol):
 
 
 class BoardSource:
-    """A board, or with ``virtual`` one in simulated time, which passes here as real time does."""
+    """A board, or a virtual one in simulated time, which passes here as real time does: with ``virtual`` one that can
+    be touched, and that knows which switches are closed; else with ``simulated``."""
 
-    def __init__(self, board: Board, title: str, virtual: Touchable | None = None, cells: LoadCells | None = None):
+    def __init__(
+        self,
+        board: Board,
+        title: str,
+        virtual: Touchable | None = None,
+        cells: LoadCells | None = None,
+        simulated: bool = False,
+    ):
         self.title, self.sheet = title, board.sheet
         self.cells = cells
         """Where the pressure units are, if they are known."""
@@ -82,7 +90,7 @@ class BoardSource:
         self.meter = Meter()
         self._board, self._virtual = board, virtual
         self._frames = board.subscribe(WAITING)
-        self._pace = Pace(board.clock()) if virtual is not None else None
+        self._pace = Pace(board.clock()) if simulated or virtual is not None else None
         # One frame in many is followed, so a contact may be gone from view for longer than from the board's.
         self._tracker = Tracker(gate_mm=40.0, hold_ms=60.0)
 
@@ -114,7 +122,7 @@ class BoardSource:
         with contextlib.suppress(ReadTimeout):
             batch = self.frames(seconds)
             self.meter.take(batch, self._board.stats, self._frames.dropped)
-            self.meter.take_latency(batch, self._virtual is not None)
+            self.meter.take_latency(batch, self._pace is not None)
             came = True
         if self._pace is not None:
             self._pace.ran(self._board.clock() - began_s, time.monotonic() - began)

@@ -96,7 +96,8 @@ class Touches:
     def _cells_of(self, zones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         sheet = self.sheet
         row = np.clip(np.round(zones["y_mm"] / sheet.pitch_y_mm).astype(int), 0, sheet.rows - 1)
-        return row, np.clip(np.round(zones["x_mm"] / sheet.pitch_x_mm).astype(int), 0, sheet.columns - 1)
+        column = np.round(zones["x_mm"] / sheet.pitch_x_mm).astype(int)
+        return row, column % sheet.columns if sheet.closed else np.clip(column, 0, sheet.columns - 1)
 
 
 def _chunks(frames: Iterable[tuple[float, Zones]]) -> Iterator[list[tuple[float, Zones]]]:

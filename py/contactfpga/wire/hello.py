@@ -57,7 +57,7 @@ _MOST_BYTES = 8192
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Hello:
-    """What the board says of itself."""
+    """What the board says about itself."""
 
     sheet: Sheet
     fingerprint: bytes
@@ -67,13 +67,13 @@ class Hello:
     baud: int
     send: str
     guard: bool
-    """The board has guard lines, and tells faults by name."""
+    """The board has guard lines, and reports faults by name."""
     commands: bytes
     """Numbers of the commands that the board takes; see :meth:`Board.command`."""
     units: UnitFacts | None = None
     """Its pressure units; None: it has none."""
     place: Place | None = None
-    """Of the sheet among several ones at one FPGA; None: it is alone."""
+    """The sheet's number among several at one FPGA, and how many there are; None for a board with one sheet."""
     sent: int
     """Frames sent since power-up."""
     epoch: int

@@ -16,6 +16,8 @@ from contactfpga.wire import framing
 from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 
 KIND_NUMBERED = 11
+NUMBER_BYTES = 2
+"""By which a numbered packet is longer."""
 _BLOCK = 2
 """A stuffed zero ends the packet itself; the block after it is one byte long."""
 _MARKS = (0x80, 0x80, 0xFC)
@@ -39,15 +41,16 @@ def closing(number: int) -> bytes:
 
 def sheet_of(packet: bytes) -> int | None:
     """The number that a packet, without delimiters, says; None: it says none. Its check is not looked at."""
-    if len(packet) < framing.SHORTEST_PACKET + 2:
+    if len(packet) < framing.SHORTEST_PACKET + NUMBER_BYTES:
         return None
-    block, last = packet[-CHECK_BYTES - 2 : -CHECK_BYTES]
+    block, last = packet[-CHECK_BYTES - NUMBER_BYTES : -CHECK_BYTES]
     return last & (1 << FLAG_BITS) - 1 if block == _BLOCK and last >> FLAG_BITS == KIND_NUMBERED else None
 
 
 def unnumbered(packet: bytes) -> bytes:
     """The ordinary packet within a numbered one, both without delimiters."""
-    stuffed, closed, check = packet[: -CHECK_BYTES - 2], packet[-CHECK_BYTES - 2 : -CHECK_BYTES], packet[-CHECK_BYTES:]
+    numbered, check = packet[:-CHECK_BYTES], packet[-CHECK_BYTES:]
+    stuffed, closed = numbered[:-NUMBER_BYTES], numbered[-NUMBER_BYTES:]
     return stuffed + _moved(check, closed[::-1], _back)
 
 

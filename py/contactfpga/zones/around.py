@@ -34,6 +34,11 @@ def flat(records: np.ndarray, columns: int) -> np.ndarray:
     return np.stack([area, np.where(windings(records) > 0, sum_x, unwrapped), sum_y], axis=1)
 
 
+def across(distance: float, around: float | None) -> float:
+    """A distance along x, the shorter way around a cylinder of this circumference; None: there is no way around."""
+    return distance if around is None else (distance + around / 2) % around - around / 2
+
+
 def label(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray]:
     """What :func:`contactfpga.zones.labels.label` finds, and the (n, 4) records of the zones."""
     runs = _runs(cells)

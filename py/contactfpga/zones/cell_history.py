@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from contactfpga.zones import labels
+from contactfpga.zones import around, labels
 from contactfpga.zones.suspicion import FEW_CELLS, Cell, Limits, Suspicion, away_from, named, places, unchanged
 from contactfpga.zones.zone import Zones
 
@@ -26,7 +26,7 @@ class CellHistory:
         """``present``: (rows, columns) bool, False where the Skin's mask has no switch."""
         assert first.cells is not None
         cells, time_us = first.cells, first.time_us
-        self._limits = limits
+        self._sheet, self._limits = first.sheet, limits
         self._present = present
         self._cells = cells.copy()
         self._first_us = time_us
@@ -73,7 +73,7 @@ class CellHistory:
         still = self._cells & self._present & (self._changed_us <= time_us - self._limits.stuck_us)
         if not (still & ~self._stuck).any():
             return
-        groups = labels.label(still, 8)
+        groups = around.label(still, 8)[0] if self._sheet.closed else labels.label(still, 8)
         for number in range(1, int(groups.max()) + 1):
             group = groups == number
             few = int(group.sum()) <= FEW_CELLS
@@ -82,14 +82,14 @@ class CellHistory:
             if not few and (self._stuck | self._held)[group].any():
                 continue  # a contact whose rim comes to rest is not told twice
             since_us = int(self._changed_us[group].max())
-            elsewhere = away_from(places(group), 1, group.shape) & self._present
+            elsewhere = away_from(places(group), 1, self._sheet) & self._present
             others = int((elsewhere & (self._pressed_us > since_us) & (self._released_us > since_us)).sum())
             if others >= self._limits.needed(elsewhere):
                 yield self._told(group, few, since_us, others, time_us)
 
     def _alone(self, group: np.ndarray, time_us: int) -> bool:
         """Whether nothing is pressed beside it, and was not lately: else it may be what is left of a contact."""
-        beside = ~away_from(places(group), 1, group.shape) & ~group
+        beside = ~away_from(places(group), 1, self._sheet) & ~group
         quiet_us = time_us - self._limits.stuck_us // QUIET
         return not (beside & (self._cells | (self._changed_us > quiet_us))).any()
 
@@ -97,11 +97,22 @@ class CellHistory:
         told = self._stuck if few else self._held
         told |= group
         cells = places(group)
-        what = f"{named(cells) if few else f'{len(cells)} cells about {_middle(cells)}'} pressed"
+        what = f"{named(cells) if few else f'{len(cells)} cells about {self._middle(group)}'} pressed"
         changed = f"{others} other{'' if others == 1 else 's'} changed"
         seconds = (time_us - since_us) / SECOND_US
         sentence = unchanged(what, not few, seconds, changed, since_us == self._first_us)
         return Suspicion("stuck" if few else "held", sentence, cells, time_us)
+
+    def _middle(self, group: np.ndarray) -> str:
+        """Row and column of the barycenter; of a group around a sheet whose ends meet the row alone."""
+        if self._sheet.closed:
+            records = around.label(group, 8)[1]
+            area, x, y = around.flat(records, self._sheet.columns)[0].tolist()
+            if around.windings(records)[0]:
+                return f"row {round(y / area)}, around the sheet"
+            return f"({round(y / area)}, {round(x / area) % self._sheet.columns})"
+        row, column = np.mean(places(group), axis=0).round().astype(int).tolist()
+        return f"({row}, {column})"
 
     def _fluttering(self, time_us: int) -> Iterator[Suspicion]:
         rates = self._counts * SECOND_US / (time_us - self._count_from_us)
@@ -115,8 +126,3 @@ class CellHistory:
             yield Suspicion("flutter", sentence, ((row, column),), time_us)
         self._counts[:] = 0
         self._count_from_us = time_us
-
-
-def _middle(cells: tuple[Cell, ...]) -> str:
-    row, column = np.mean(cells, axis=0).round().astype(int).tolist()
-    return f"({row}, {column})"

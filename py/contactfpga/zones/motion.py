@@ -6,12 +6,15 @@ import numpy as np
 
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.protocol import Frame
+from contactfpga.zones import around
 
 LIMIT = 1.0
 """Pitches from one scan to the next that are told: the rows of a frame are sampled one after the other, so that a zone
 may be off by about as much as its contact moves meanwhile."""
 
 _SEQUENCES = 256
+
+Places = list[tuple[float, float]]
 
 
 def adjacent(frame: Frame, before: Frame) -> bool:
@@ -23,23 +26,29 @@ def adjacent(frame: Frame, before: Frame) -> bool:
 def moved(records: np.ndarray, earlier: np.ndarray, sheet: Sheet) -> bool:
     """Whether a zone lies farther than :data:`LIMIT` pitches from each zone of an adjacent frame that has as many.
 
-    Both as :attr:`contactfpga.Zones.records`.
+    Both as :attr:`contactfpga.Zones.records`, and where the ends of the sheet meet as
+    :attr:`contactfpga.Zones.closed_records`. A zone without an x is told by its y, from the others like it.
     """
     if len(records) != len(earlier) or np.array_equal(records, earlier):
         return False
-    old = _places(earlier, sheet)
-    columns = sheet.columns if sheet.closed else None
-    return any(
-        all(_across(x - a, columns) ** 2 + (y - b) ** 2 > LIMIT**2 for a, b in old) for x, y in _places(records, sheet)
-    )
+    if not sheet.closed:
+        return _far(_places(records, sheet), _places(earlier, sheet))
+    here, there = (_around(each, sheet) for each in (records, earlier))
+    return len(here[1]) == len(there[1]) and any(_far(*each, sheet.columns) for each in zip(here, there))
 
 
-def _across(distance: float, columns: int | None) -> float:
-    """Where the ends of the sheet meet the shorter way."""
-    return distance if columns is None else (distance + columns / 2) % columns - columns / 2
+def _far(places: Places, old: Places, columns: int | None = None) -> bool:
+    return any(all(around.across(x - a, columns) ** 2 + (y - b) ** 2 > LIMIT**2 for a, b in old) for x, y in places)
 
 
-def _places(records: np.ndarray, sheet: Sheet) -> list[tuple[float, float]]:
+def _around(records: np.ndarray, sheet: Sheet) -> tuple[Places, Places]:
+    """Of the zones with an x, and of those without, whose places then say 0."""
+    winds = around.windings(records) > 0
+    flat = around.flat(records, sheet.columns)
+    return _places(flat[~winds], sheet), [(0.0, y) for _, y in _places(flat[winds], sheet)]
+
+
+def _places(records: np.ndarray, sheet: Sheet) -> Places:
     """x and y in pitches of the zones that lie somewhere."""
     steps = 1 << sheet.barycenter_bits if sheet.report == "barycenter" else None
     return [(x / (steps or area), y / (steps or area)) for area, x, y in records.tolist() if area]

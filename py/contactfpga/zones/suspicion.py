@@ -9,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from contactfpga.skin.sheet import Sheet
+
 Cell = tuple[int, int]
 """(row, column)"""
 
@@ -22,11 +24,11 @@ class Suspicion:
 
     kind: Literal["stuck", "held", "flutter"]
     """``stuck``: one to three switches side by side read pressed without a change, while others came and went;
-    ``held``: the same of more, which is rather something that lies there; ``flutter``: a switch that changes faster
+    ``held``: the same for more switches, so more likely something lies there; ``flutter``: a switch that changes faster
     than a hand can."""
     sentence: str
     cells: tuple[Cell, ...]
-    """(row, column) of the switches; () where the frames do not tell them."""
+    """(row, column) of the switches; () if the frames do not show which."""
     time_us: int
     """Device time at which it was noticed, in us."""
 
@@ -45,11 +47,13 @@ class Limits:
         return min(self.others, max(1, int(elsewhere.sum()) // 2))
 
 
-def away_from(cells: Iterable[Cell], reach: int, shape: tuple[int, int]) -> np.ndarray:
+def away_from(cells: Iterable[Cell], reach: int, sheet: Sheet) -> np.ndarray:
     """(rows, columns) bool: the cells farther than ``reach`` from all of these, so that no contact joins them."""
-    away = np.ones(shape, bool)
+    away = np.ones((sheet.rows, sheet.columns), bool)
     for row, column in cells:
-        away[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1] = False
+        columns = np.arange(column - reach, column + reach + 1)
+        columns = columns % sheet.columns if sheet.closed else columns.clip(0, sheet.columns - 1)
+        away[max(0, row - reach) : row + reach + 1, columns] = False
     return away
 
 

@@ -20,13 +20,14 @@ LOOKS = 100
 
 
 class Watch:
-    """Tells from a history of frames which switches are stuck, loose or dead; reads nothing, waits for nothing, and its
-    time is that of the frames.
+    """Finds switches that are stuck, loose or dead in a history of frames. It reads no port and waits for nothing, and
+    its time is the frames' time.
 
-    A cell, or a zone where the board sends zones, is suspected once it stayed pressed without a change for ``stuck_s``
-    seconds while at least ``others`` cells elsewhere came and went since its last change. Where nothing else changes
-    nothing is said: an arm may rest on a table. A cell is loose that changes more than ``flutter_hz`` times per second;
-    changes within 10 ms count once, as a switch that bounces is not loose. Cells of ``skin.mask`` are left out.
+    A cell, or a zone if the board sends zones, is suspected once it has stayed pressed without a change for ``stuck_s``
+    seconds while at least ``others`` cells elsewhere came and went since its last change. If nothing else changes, the
+    watch says nothing: an arm may rest on a table. A cell is loose if it changes more than ``flutter_hz`` times per
+    second; changes within 10 ms count once, because a switch that bounces is not loose. Cells of ``skin.mask`` are left
+    out.
 
     Raises ValueError for limits that are not positive, and :class:`SkinMismatch` for frames of another Skin's sheet.
     """
@@ -46,8 +47,8 @@ class Watch:
         self._last_us = self._look_us = -1
 
     def update(self, zones: Zones) -> tuple[Suspicion, ...]:
-        """Take the next frame; returns what is suspected since it, each thing once. A board that starts again, or has
-        another sheet, begins a new history."""
+        """Take the next frame; returns what is newly suspected, each thing once. A board that restarts, or has another
+        sheet, begins a new history."""
         time_us = zones.time_us
         if zones.sheet != self._sheet:
             self._meet(zones.sheet)
@@ -92,12 +93,12 @@ class Watch:
 
     @property
     def stuck(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were told as ``stuck`` and did not change since."""
+        """(row, column) of the switches that were reported as ``stuck`` and have not changed since."""
         return () if self._sheet is None else tuple(sorted(self._history.stuck))
 
     @property
     def fluttering(self) -> tuple[Cell, ...]:
-        """(row, column) of the switches that were told to ``flutter``."""
+        """(row, column) of the switches that were reported to ``flutter``."""
         return () if self._sheet is None else tuple(sorted(self._history.flutters))
 
     @property

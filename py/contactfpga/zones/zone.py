@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import overload
@@ -40,14 +41,15 @@ class Zones(Sequence[Zone]):
         self.frame = frame
         """The frame as it came over the wire."""
         self.sheet = sheet
-        """The sheet, as the board's hello tells it."""
+        """The sheet, from the board's hello."""
         self.time_us = frame.time_us if time_us is None else time_us
         """Device time of the sample of the frame's first row in us, since power-up."""
         self.faults: tuple[str, ...] = faults if "fault" in frame.flags else ()
-        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test by name: ``row 3 open``,
-        ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open`` (all columns
-        are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; ``unnamed fault`` where
-        the name has not come yet. Without them ``stuck`` alone; how many columns are is in ``board.hello.stuck``."""
+        """Faults of the sheet that the board noticed, sorted. With guard lines or a self-test they have names:
+        ``row 3 open``, ``column 7 open``, ``column 2 stuck`` (read pressed while no row was driven), ``guard row open``
+        (all columns are), ``guard column open`` (all rows are), ``guard column stuck``, ``joined lines``; or
+        ``unnamed fault`` if the name has not come yet. Otherwise there is only ``stuck``; ``board.hello.stuck`` says
+        how many columns are."""
         self._before = before
         self._line = line
         self._history = history
@@ -55,7 +57,7 @@ class Zones(Sequence[Zone]):
 
     @property
     def arrived_s(self) -> float | None:
-        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` but for ``sim://``;
+        """When the frame's last byte arrived, on :meth:`Board.clock`, which is ``time.monotonic`` except for ``sim://``;
         None in a recording."""
         return None if self._line is None else self._line.arrived_s
 
@@ -73,25 +75,29 @@ class Zones(Sequence[Zone]):
     @property
     def units(self) -> UnitSamples | None:
         """What the pressure units read at :attr:`time_us`, interpolated between their samples before and after it. None
-        for a board without units, and until both have come: as a frame arrives the later one is mostly still on its
-        way. So ask again some sweeps later, or take the newest readings, with their own time, from
-        :meth:`Board.events`. It is kept once it was found; after about a second nobody knows it any more."""
+        for a board without units, and until both samples have come: when a frame arrives, the later one is usually
+        still on its way. So ask again a few sweeps later, or take the newest readings, with their own time, from
+        :meth:`Board.events`. Once found, the readings are kept; if you first ask after more than about a second, they
+        are gone."""
         if self._units is None and self._history is not None:
             self._units = self._history.at(self.time_us)
         return self._units
 
     @functools.cached_property
     def flags(self) -> frozenset[str]:
-        """Names from :data:`contactfpga.wire.protocol.FLAGS`; `ghost` where a sheet without diodes may show pressed
-        cells that are none, in a zone that is one (:attr:`Zone.ghost`) or in one that they are added to; and `motion`
-        where a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
+        """Names from :data:`contactfpga.wire.protocol.FLAGS`. Also ``ghost`` if a sheet without diodes may show cells
+        as pressed that are not, as a zone of their own (:attr:`Zone.ghost`) or added to another zone; and ``motion`` if
+        a zone moved by more than a pitch since the scan before, so that its place may be off by as much."""
         found = set()
         if self.sheet.ghosts and self._has_ghosts():
             found.add("ghost")
         before = self._before
         if before is not None and motion.adjacent(self.frame, before):
-            earlier = records_of(before, self.sheet)
-            if motion.moved(self.records, earlier, self.sheet):
+            if self.sheet.closed:
+                moved = motion.moved(self.closed_records, closed_records(before, self.sheet), self.sheet)
+            else:
+                moved = motion.moved(self.records, records_of(before, self.sheet), self.sheet)
+            if moved:
                 found.add("motion")
         return self.frame.flags | found
 
@@ -112,7 +118,7 @@ class Zones(Sequence[Zone]):
 
     @property
     def total_zones(self) -> int:
-        """Zones on the sheet, also those the frame had no room for."""
+        """Zones on the sheet, including those that the frame had no room for."""
         return self.frame.zones if self.frame.bitmap is None else len(self)
 
     @property
@@ -122,13 +128,13 @@ class Zones(Sequence[Zone]):
 
     @property
     def cells(self) -> np.ndarray | None:
-        """(rows, columns) bool with ``report = "cells"``, else None: then the board sends zones only."""
+        """(rows, columns) bool with ``report = "cells"``; None for a board that sends only zones."""
         return self.frame.bitmap
 
     @property
     def ghost_cells(self) -> np.ndarray | None:
-        """(rows, columns) bool with ``report = "cells"``, else None: cells that other pressed ones may have made, which
-        takes a sheet without diodes (:mod:`contactfpga.zones.ghosts`)."""
+        """Cells that other pressed cells may have made, on a sheet without diodes (:mod:`contactfpga.zones.ghosts`):
+        (rows, columns) bool with ``report = "cells"``, otherwise None."""
         return None if self.frame.bitmap is None else self._ghost_cells
 
     @functools.cached_property
@@ -142,23 +148,22 @@ class Zones(Sequence[Zone]):
         """:attr:`Zone.ghost` of each of :attr:`records`."""
         if not self.sheet.ghosts:
             return [False] * len(self)
-        if self._labels is None:
+        if self.frame.bitmap is None:
             return ghosts.zones(self.frame, self._before)
         return ghosts.labelled(self.frame, self._before, self._labels)
 
     @functools.cached_property
-    def _labels(self) -> np.ndarray | None:
-        """(rows, columns) int with ``report = "cells"``, else None: the number of each cell's zone, from 1."""
-        if self.frame.bitmap is None:
-            return None
+    def _labels(self) -> np.ndarray:
+        """(rows, columns) int with ``report = "cells"``: the number of each cell's zone, from 1."""
+        assert self.frame.bitmap is not None
         if self.sheet.closed:
             return around.label(self.frame.bitmap, self.sheet.connectivity)[0]
         return labels.label(self.frame.bitmap, self.sheet.connectivity)
 
     @property
     def rounding_mm(self) -> tuple[float, float]:
-        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``, else
-        0."""
+        """How far the board's rounding may have moved x_mm and y_mm: half a step with ``report = "barycenter"``,
+        otherwise 0."""
         if self.sheet.report != "barycenter":
             return 0.0, 0.0
         steps = 2 << self.sheet.barycenter_bits
@@ -167,7 +172,7 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def array(self) -> np.ndarray:
         """(n,) structured array of :data:`DTYPE`, read-only, in the order of the zones. It has no ``sum_x`` and
-        ``sum_y`` with ``report = "barycenter"``. Where a zone has None it has NaN."""
+        ``sum_y`` with ``report = "barycenter"``. It has NaN where a zone has None."""
         dtype = DTYPE if self.frame.barycenters is None else DIVIDED_DTYPE
         array = np.zeros(len(self), dtype)
         for row, zone in zip(array, self._zones):
@@ -181,9 +186,9 @@ class Zones(Sequence[Zone]):
     def _zones(self) -> tuple[Zone, ...]:
         # In plain Python, because most frames hold a zone or two, for which numpy takes forty times as long.
         make = self._exact if self.frame.barycenters is None else self._divided
-        both = zip(self.records.tolist(), self.suspects)
-        zones = [make(area, x, y, ghost) for (area, x, y), ghost in both]
-        for index, winding in enumerate(self.windings):
+        suspects = self.suspects if self.sheet.ghosts else itertools.repeat(False)
+        zones = [make(area, x, y, ghost) for (area, x, y), ghost in zip(self.records.tolist(), suspects)]
+        for index, winding in enumerate(self.windings if self.sheet.closed else ()):
             if winding:
                 zones[index] = dataclasses.replace(zones[index], x_mm=None, point_mm=None, normal=None, winding=winding)
         zones.sort(key=order)
@@ -203,12 +208,8 @@ class Zones(Sequence[Zone]):
         if place is None:
             return Zone(area, sum_x, sum_y, area_mm2, None, None, None, None, ghost)
         x_mm, y_mm = place[0] * self.sheet.pitch_x_mm, place[1] * self.sheet.pitch_y_mm
-        point_mm, normal = self._surface.place(x_mm, y_mm)
+        point_mm, normal = surfaces.of(self.sheet).place(x_mm, y_mm)
         return Zone(area, sum_x, sum_y, area_mm2, x_mm, y_mm, point_mm, normal, ghost)
-
-    @functools.cached_property
-    def _surface(self) -> surfaces.Surface:
-        return surfaces.of(self.sheet)
 
     @overload
     def __getitem__(self, index: int) -> Zone: ...
@@ -225,9 +226,9 @@ class Zones(Sequence[Zone]):
     @functools.cached_property
     def records(self) -> np.ndarray:
         """(n, 3) int64: area and sums, or barycenters, of each zone as they came, in no particular order."""
-        if self._labels is not None and not self.sheet.closed:
-            return labels.moments(self._labels)
-        return records_of(self.frame, self.sheet)
+        if self.frame.bitmap is None or self.sheet.closed:
+            return records_of(self.frame, self.sheet)
+        return labels.moments(self._labels)
 
     @functools.cached_property
     def windings(self) -> list[str]:
@@ -260,12 +261,14 @@ class Zones(Sequence[Zone]):
 
     def svg(self, width_px: int = notebook.WIDTH_PX) -> str:
         """The same as a picture."""
+        sheet = self.sheet
         circles = [
             (zone.x_mm, zone.y_mm, notebook.radius_mm(zone.area_mm2))
             for zone in self
             if zone.x_mm is not None and zone.y_mm is not None
         ]
-        sheet = self.sheet
+        if sheet.around_mm is not None:
+            circles = notebook.over_the_seam(circles, sheet.around_mm, sheet.pitch_x_mm)
         pitch_mm = (sheet.pitch_x_mm, sheet.pitch_y_mm)
         return notebook.sheet(
             (sheet.rows, sheet.columns), pitch_mm, "\n".join(self._head), circles, self.cells, width_px

@@ -29,7 +29,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("joint", metavar="JOINT", help="Name of the joint that folds it.")
     output = "File to write; robot.toml names it as the link's folds."
     parser.add_argument("output", metavar="FOLDS.json", help=output)
-    step = f"How finely angles are told apart (default: {folds.STEP_RAD:g})."
+    step = f"Width of a step of the angle; folds are learned per step (default: {folds.STEP_RAD:g})."
     parser.add_argument("--step", type=numbers.number(1e-4, 1, "rad"), default=folds.STEP_RAD, metavar="RAD", help=step)
     parser.epilog = "Reads the joint's angle from standard input, in rad, one per line, until the input ends."
 

@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the topic's flags to its parser."""
     parser.add_argument("robot", metavar="ROBOT.toml", help="The robot's links; docs/body.md has the format.")
     parser.add_argument("link", metavar="LINK", help="Name of the link.")
-    points = "Points of the link, [[point]] with point_m each; those without pressed_mm are to be pressed now."
+    points = "Known points on the link, a [[point]] with point_m each; you press those without pressed_mm when asked."
     parser.add_argument("points", metavar="POINTS.toml", help=points)
     wait = "Seconds to wait for each press (default: 60)."
     parser.add_argument("--wait", type=numbers.SECONDS, default=60.0, metavar="S", help=wait)

@@ -39,12 +39,12 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     loads = parser.add_argument_group("loads")
     newton, share = numbers.number(1e-3, 1e6, "N"), numbers.number(0, 10)
     loads.add_argument("--force", type=newton, default=30.0, metavar="N", help="Largest push (default: 30).")
-    loads.add_argument("--friction", type=share, default=0.5, metavar="MU", help="Of what touches (default: 0.5).")
+    loads.add_argument("--friction", type=share, default=0.5, metavar="MU", help="Friction coefficient (default: 0.5).")
     at = "Push at which errors are stated (default: 12)."
     loads.add_argument("--at", type=newton, default=12.0, metavar="N", help=at)
     mass = "Mass of the bumper, whose weight is taken out in every pose (default: 0)."
     loads.add_argument("--mass", type=numbers.number(0, 1000, "kg"), default=0.0, metavar="KG", help=mass)
-    sigma = "How well gravity and motion are known then (default: 0.1)."
+    sigma = "With --mass: how accurately gravity and motion are known (default: 0.1)."
     loads.add_argument(
         "--acceleration-sigma", type=numbers.number(0, 100, "m/s2"), default=0.1, metavar="M/S2", help=sigma
     )

@@ -21,7 +21,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--unit", action="append", default=[], metavar="K=STEPS", help=unit)
     whole = "Sum K, a row of the Skin's unit_sums, likewise."
     parser.add_argument("--sum", action="append", default=[], metavar="K=STEPS", help=whole)
-    units = "The units (docs/haptics.md): then --unit takes newtons, as 0=8, and --sum does where all gains are alike."
+    units = "The units (docs/haptics.md): then --unit takes newtons, as 0=8, and so does --sum if all gains are equal."
     parser.add_argument("--units", metavar="FILE", help=units)
 
 

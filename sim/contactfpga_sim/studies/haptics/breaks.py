@@ -197,7 +197,7 @@ def _places(*methods: tuple[str, Case], **knob: Callable[[float], object]) -> di
 
 RAMP = (30.0, 30.0)
 CLOSINGS = Case("closings", 5.0, RAMP)
-SHARE = "stated 95 % that do not hold, %"
+SHARE = "contacts outside the stated 95 %, %"
 
 STUDIES = {
     study.name: study
