@@ -25,6 +25,8 @@ SHAPES = {
     "bar over the seam and a dot": ("#...# #.#.# #...#", [(6, 27, 6), (1, 2, 1)]),
     "nested arches over the seam": ("####.#### #.......# #.##.##.# #.#...#.# #.#...#.#",
                                     [(16, 136, 20), (4, 9, 11), (4, 23, 11)]),
+    "arch over the seam and a zone in it, joined below": ("###..## ..#..#. #.#..#. ###..#.", [(14, 99, 20)]),
+    "arch that ends beside the seam, and a dot in it": ("...###.. ..#...#. #.#.#..# ...#....", [(10, 44, 13)]),
     "two rings": ("#### .... ####", [(4, RING, 0), (4, RING, 8)]),
     "ring and a dot below it": ("#### .... #..#", [(4, RING, 0), (2, 7, 4)]),
     "nearly a ring": ("#.#. #.#. #.##", [(7, 21, 8)]),

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 import unrolled
 from sample import sample
-from unrolled import RULES, every_frame, hard_frames, recorded, skin_of
+from unrolled import RULES, every_frame, recorded, skin_of
 
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.board.labeller import LabelBench
 from contactfpga_sim.golden import all_departures, row_clocks
+from contactfpga_sim.scenes import shapes
 
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 
@@ -102,7 +103,7 @@ def test_random_frames_and_mazes(record_property, size, connectivity, labeller):
 @pytest.mark.parametrize(("connectivity", "labeller"), RULES)
 @pytest.mark.parametrize("size", SIZES)
 def test_shapes_that_go_around(record_property, size, connectivity, labeller):
-    frames, seen = hard_frames(*size), []
+    frames, seen = shapes.around(*size), []
     part = 200_000 // (size[0] * size[1])
     for first in range(0, len(frames), part):
         seen.append(check_compiled(frames[first : first + part], connectivity, labeller)[1][:, 2])

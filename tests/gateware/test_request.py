@@ -58,16 +58,17 @@ def listen(bench):
 @pytest.fixture(scope="module")
 def obey(bench):
     """(number, hello, command) of all that a board takes that obeys, in bytes whose bits come one per clock; command:
-    (what, value) or None."""
+    (what, value) or None; ``broken``: the place of the one byte that has no stop bit."""
     dut = RequestReader(commands=True)
     sim = bench(dut)
 
-    def obey(data):
-        events = []  # level, bit, index, good
-        for byte in data:
-            events += [(byte >> index & 1, 1, index, 0) for index in range(8)] + [(1, 0, 0, 1)]
-        events += [(1, 0, 0, 0)] * 2
-        for place, name in enumerate(("level", "bit", "index", "good")):
+    def obey(data, broken=None):
+        events = []  # level, bit, index, good, bad
+        for at, byte in enumerate(data):
+            stop = (0, 0, 0, 0, 1) if at == broken else (1, 0, 0, 1, 0)
+            events += [*((byte >> index & 1, 1, index, 0, 0) for index in range(8)), stop]
+        events += [(1, 0, 0, 0, 0)] * 2
+        for place, name in enumerate(("level", "bit", "index", "good", "bad")):
             sim.drive(getattr(dut.bits, name), lambda cycle, place=place: events[min(cycle, len(events) - 1)][place])
         seen = {name: sim.watch(getattr(dut, name)) for name in OUTPUTS}
         sim.run(len(events))
@@ -212,6 +213,15 @@ def agrees(packet):
 @pytest.mark.parametrize("hello", [False, True])
 def test_a_command_is_taken_with_its_closing_delimiter(obey, what, value, hello):
     assert obey(b"\0" + sealed(order(0x15A2D1, what, value, hello))) == [(0x15A2D1, hello, (what, value))]
+
+
+@pytest.mark.parametrize("packet", [plain(9), order(9, 1, 5)])
+def test_a_packet_one_of_whose_bytes_has_no_stop_bit_is_not_taken(obey, packet):
+    """Though all its bits are right."""
+    data = b"\0" + sealed(packet) + b"\0" + sealed(plain(10))
+    for broken in range(1, len(sealed(packet)) + 1):
+        assert obey(data, broken) == [(10, False, None)]
+    assert len(obey(data)) == 2
 
 
 def test_a_board_without_commands_ignores_them(bench):

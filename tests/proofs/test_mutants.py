@@ -6,10 +6,13 @@ import itertools
 import pytest
 
 from contactfpga.skin import Skin
+from contactfpga.skin.units import SUM_THRESHOLD, THRESHOLD
 from contactfpga_sim.board.compiled import CompiledBoard
 from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.golden import Timeline
-from contactfpga_sim.mutants import aig, campaign, netlist, proof, solve, stimuli, trial
+from contactfpga_sim.golden import Timeline, units
+from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.golden.request import heard
+from contactfpga_sim.mutants import aig, campaign, netlist, options, proof, solve, stimuli, trial
 from contactfpga_sim.mutants.skins import OPTIONS, SKINS
 from contactfpga_sim.mutants.stimuli import Stimulus
 
@@ -86,6 +89,32 @@ def test_a_table_is_written_only_when_all_of_its_skins_were_run(tmp_path, monkey
 def test_no_noise_comes_where_pulses_are_bits():
     noisy = {name: any(one.noise for one in stimuli.quick(SKINS[name])) for name in ("8x8", "4x4, debounced")}
     assert noisy == {"8x8": True, "4x4, debounced": False}
+
+
+@pytest.mark.parametrize(
+    ("skin", "wrong"),
+    [
+        ("2x2, units at their own pace", {"what": THRESHOLD, "amount": 1}),
+        ("2x2, units at their own pace", {"what": SUM_THRESHOLD, "amount": 1}),
+        ("2x2, units at their own pace", {"what": SUM_THRESHOLD, "amount": -1}),
+        *(("2x2, units", {"what": SUM_THRESHOLD, "place": 2, "lost": 1 << bit}) for bit in (15, 20)),
+    ],
+)
+def test_stimuli_of_units_notice_amounts_one_off_and_thresholds_without_a_bit(monkeypatch, skin, wrong):
+    """Sum 2 of this Skin never reaches 2**15. Its thresholds may have more bits."""
+    skin = OPTIONS[skin][0]
+    timeline, cycles = options.thresholds(skin, 240)
+    asked = heard(timeline.received, facts(skin).bit_clocks, commands=True).requests
+    right = units.play(facts(skin), timeline, asked, cycles).over
+
+    def reached(settings, what, place, cycle, amount):
+        threshold, is_set = settings.at(what, place, cycle)
+        if what == wrong["what"] and place == wrong.get("place", place):
+            amount, threshold = amount + wrong.get("amount", 0), threshold & ~wrong.get("lost", 0)
+        return is_set and amount >= threshold
+
+    monkeypatch.setattr(units._Settings, "reached", reached)
+    assert units.play(facts(skin), timeline, asked, cycles).over != right
 
 
 def test_what_only_a_flip_can_reach_has_no_mutants(sample):

@@ -1,4 +1,4 @@
-"""Zones of closed sheets by scipy, on many turns of the sheet side by side; shapes that go around; labellers to try."""
+"""Zones of closed sheets by scipy, on many turns of the sheet side by side; labellers to try."""
 
 from pathlib import Path
 
@@ -8,7 +8,6 @@ from scipy import ndimage
 
 from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga_sim.scenes.shapes import variants
 
 CLOSED = [name for name, labeller in LABELLERS.items() if labeller.closed]
 RULES = [(connectivity, labeller) for labeller in CLOSED for connectivity in (8, 4)]
@@ -86,23 +85,6 @@ def every_frame(rows, columns, first=0, count=None):
     cells = rows * columns
     numbers = np.arange(first, first + (count or 1 << cells), dtype=np.uint32)
     return (numbers[:, None] >> np.arange(cells, dtype=np.uint32) & 1).astype(bool).reshape(-1, rows, columns)
-
-
-def hard_frames(rows, columns):
-    """(n, R, C) bool: shapes that break labellers, shifted over the seam and sheared around the cylinder; helices."""
-    frames = []
-    for _, cells in variants(rows, columns):
-        for lean in (-3, -1, 0, 1, 2):
-            sheared = np.stack([np.roll(row, y * lean // 2) for y, row in enumerate(cells)])
-            frames += [np.roll(sheared, shift, axis=1) for shift in (0, columns // 3, columns - 1)]
-    y, x = np.indices((rows, columns))
-    for step in range(1, columns):
-        for wide in sorted({1, step, columns // 2}):
-            frames += [(x - sign * y * step) % columns < wide for sign in (-1, 1)]
-    for gap in range(2, max(3, columns // 2)):  # a spiral of two rows per turn, and its seam of one cell
-        turn = (x - y // 2 * gap) % columns
-        frames += [np.where(y % 2 == 0, turn != 0, turn == 1), np.where(y % 2 == 0, turn > 1, turn == columns - 1)]
-    return np.unique(np.array(frames, bool), axis=0)
 
 
 def recorded(name):

@@ -52,35 +52,49 @@ def thresholds(skin: Skin, epochs: int) -> tuple[Timeline, int]:
     touches the sheet."""
     rng = np.random.default_rng(41)
     units, bits = Derived(skin).units, facts(skin).bit_clocks
+    most = 2**units.converter.bits - 1
     zeros = [0] * skin.units
     received: list[tuple[int, bytes]] = []
     readings: list[tuple[int, list[int]]] = []
     start, before = 0, (THRESHOLD, 0)
     for _ in range(epochs):
         around = [_of_bits(units.converter.bits, rng) for _ in range(skin.units)]
-        unit, zero = int(rng.integers(skin.units)), _of_bits(NUMBER_BITS, rng)
-        zeros[unit] = (zero << number_shift(units.converter.bits)) % 2**units.converter.bits
-        what, place, number = _threshold(skin, around, zeros, rng)
+        what, place, weights, shift = _watched(skin, rng)
+        unit, zero = int(rng.choice(np.flatnonzero(weights))), _of_bits(NUMBER_BITS, rng)
+        zeros[unit] = (zero << number_shift(units.converter.bits)) % (most + 1)
+        total = sum(weight * (read - zero) for weight, read, zero in zip(weights, around, zeros, strict=True))
+        number = _number(abs(total) >> shift, rng)
+        if rng.random() < 0.5:  # numbers are coarse: without this no reading comes close
+            wanted = number << shift if total >= 0 else -(number << shift)
+            around[unit] = min(max(around[unit] + (wanted - total) // weights[unit], 0), most)
         for order, value in (before, (ZERO, unit | zero << 3), (what, place | number << 3)):
             received.append((start, command(129 + len(received) % 64, order, value, False, bits)))
             start += 14 * 10 * bits
         before = (what, place)
         for step in (0, -1, 1, 2):
-            moved = min(max(around[unit] + step, 0), 2**units.converter.bits - 1)
+            moved = min(max(around[unit] + step, 0), most)
             readings.append((start, [*around[:unit], moved, *around[unit + 1 :]]))
             start += 2 * units.sweep_clocks
     return Timeline([], received, units=readings), start
 
 
-def _threshold(skin: Skin, around: list[int], zeros: list[int], rng: np.random.Generator) -> tuple[int, int, int]:
-    """Of a unit or a sum that these readings reach or miss by little: command, place and number."""
+def _watched(skin: Skin, rng: np.random.Generator) -> tuple[int, int, list[int], int]:
+    """Whose threshold is next, a unit's or a sum's: command, place, weights, and in steps of 2 to which power."""
     units, of_sum = Derived(skin).units, bool(rng.random() < 0.5)
-    place = int(rng.integers(len(skin.unit_sums) if of_sum else skin.units))
-    weights = skin.unit_sums[place] if of_sum else [int(place == unit) for unit in range(skin.units)]
-    total = abs(sum(weight * (read - zero) for weight, read, zero in zip(weights, around, zeros, strict=True)))
-    shift = number_shift(units.sum_bits if of_sum else units.converter.bits)
-    number = min(2**NUMBER_BITS - 1, max(1, (total >> shift) + int(rng.integers(2))))
-    return SUM_THRESHOLD if of_sum else THRESHOLD, place, number
+    if of_sum:
+        place = int(rng.integers(len(skin.unit_sums)))
+        return SUM_THRESHOLD, place, list(skin.unit_sums[place]), number_shift(units.sum_bits)
+    place = int(rng.integers(skin.units))
+    weights = [int(place == unit) for unit in range(skin.units)]
+    return THRESHOLD, place, weights, number_shift(units.converter.bits)
+
+
+def _number(reached: int, rng: np.random.Generator) -> int:
+    """A threshold that is reached, or missed by one step; or far above that, in one more bit."""
+    number = reached + int(rng.integers(2))
+    if rng.random() < 0.25:
+        number |= 1 << int(rng.integers(min(reached.bit_length(), NUMBER_BITS - 1), NUMBER_BITS))
+    return min(2**NUMBER_BITS - 1, max(1, number))
 
 
 def _of_bits(most: int, rng: np.random.Generator) -> int:

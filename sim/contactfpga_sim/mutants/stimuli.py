@@ -40,13 +40,16 @@ class Stimulus(NamedTuple):
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:
-    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan. With
-    guard lines or a self-test also a sheet at rest with lines that break and touch."""
+    """Cells that come and go at any time, requests, stuck columns and noise; every adversarial shape for one scan, on a
+    closed sheet also shapes around it. With guard lines or a self-test also a sheet at rest with lines that break and
+    touch."""
     for seed in range(3):
         yield _random(skin, seed, max(12_000, 20 * facts(skin).scan_clocks, options.least_cycles(skin)))
     yield from _noisy(skin, max(60, 15_000 // facts(skin).scan_clocks))
     yield from _optional(skin)
     yield _frames(skin, "shapes", np.stack([cells for _, cells in shapes.variants(skin.rows, skin.columns)]))
+    if skin.closed:
+        yield _frames(skin, "shapes around", shapes.around(skin.rows, skin.columns))
 
 
 def thorough(skin: Skin) -> Iterator[Stimulus]:

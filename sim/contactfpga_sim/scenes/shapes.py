@@ -145,3 +145,34 @@ def variants(rows: int, columns: int) -> Iterator[tuple[str, np.ndarray]]:
                     seen.add(turned.tobytes())
                     suffix = ("-t" if transposed else "") + (f"-{flipped}" if flipped else "")
                     yield name + suffix, np.ascontiguousarray(turned)
+
+
+def around(rows: int, columns: int) -> np.ndarray:
+    """(n, rows, columns) bool, for a sheet whose last column is a neighbor of the first: all variants, shifted over the
+    seam and sheared around the cylinder; helices; spirals; hooks."""
+    frames = []
+    for _, cells in variants(rows, columns):
+        for lean in (-3, -1, 0, 1, 2):
+            sheared = np.stack([np.roll(row, y * lean // 2) for y, row in enumerate(cells)])
+            frames += [np.roll(sheared, shift, axis=1) for shift in (0, columns // 3, columns - 1)]
+    y, x = np.indices((rows, columns))
+    for step in range(1, columns):
+        for wide in sorted({1, step, columns // 2}):
+            frames += [(x - sign * y * step) % columns < wide for sign in (-1, 1)]
+    for gap in range(2, max(3, columns // 2)):  # a spiral of two rows per turn, and its seam of one cell
+        turn = (x - y // 2 * gap) % columns
+        frames += [np.where(y % 2 == 0, turn != 0, turn == 1), np.where(y % 2 == 0, turn > 1, turn == columns - 1)]
+    if rows >= 5 and columns >= 6:
+        hooks = [np.roll(_hook(rows, columns), shift, axis=1) for shift in range(columns)]
+        frames += [cells[:, ::sign] for cells in hooks for sign in (1, -1)]
+    return np.unique(np.array(frames, bool), axis=0)
+
+
+def _hook(rows: int, columns: int) -> np.ndarray:
+    """An arch with one leg on either side of the seam, and inside it a zone that the last row joins with one leg: the
+    arch lies on two turns when it is found, the zone on one."""
+    cells = np.zeros((rows, columns), bool)
+    cells[0, [0, 1, 2, -2, -1]] = cells[-1, :3] = True
+    cells[:, [2, -2]] = True
+    cells[2:, 0] = True
+    return cells
