@@ -132,7 +132,7 @@ body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a bo
 view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
 	$(PY) -m contactfpga_sim.pages.view_page docs/view.md docs/images
 
-net-page: $(VENV)/.stamp-test ## run 1 to 64 links through a router, and write docs/net.md and its picture (a minute)
+net-page: $(VENV)/.stamp-test ## run 1 to 64 links through a router, and write docs/net.md and its picture (two minutes)
 	$(PY) -m contactfpga_sim.pages.net_page docs/net.md docs/images
 
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md

@@ -24,8 +24,8 @@ GIGABIT = 1e9 / 8
 
 
 @functools.cache
-def measured(links: int, batch_ms: float, full: bool = False) -> load.Load:
-    """Once per run of this program."""
+def measured(links: int, batch_ms: float, *, full: bool) -> load.Load:
+    """Once per run of this program. ``full`` has no default: the cache takes a call that leaves it out for another."""
     return load.measure(links, batch_ms / 1000, full)
 
 
@@ -34,7 +34,7 @@ def batch_table() -> str:
     head = ("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50 / p99")
     rows: list[tuple[str, ...]] = [(*head, "CPU, all ends")]
     for batch_ms in BATCHES_MS:
-        found = measured(1, batch_ms)
+        found = measured(1, batch_ms, full=False)
         cells = (f"{batch_ms:g} ms", f"{found.messages:,.0f}", _ms(found.latency), _ms(found.bare), _ratio(found))
         rows.append((*cells, _percent(sum(found.cpu.values()))))
     return writer.table_of(rows)
@@ -45,7 +45,7 @@ def links_table() -> str:
     head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
     rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
     for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
-        found = measured(links, GROWTH_MS, full)
+        found = measured(links, GROWTH_MS, full=full)
         name = f"{links}" + (f", and one of {load.FULL_HZ:,.0f} Hz" if full else "")
         cpu = (_percent(used / found.links) for used in _ends(found))
         rates = (f"{found.frames:,.0f}", f"{100 * found.share:.1f} %", f"{found.lost}")
@@ -60,7 +60,7 @@ def _ends(found: load.Load) -> tuple[float, float, float]:
 
 def thousand_table() -> str:
     """What a thousand links would take, from what was measured and computed."""
-    found = measured(LINKS[-1], GROWTH_MS)
+    found = measured(LINKS[-1], GROWTH_MS, full=False)
     publisher, router, reader = (used / found.links for used in _ends(found))
     frame = len(source.frames(1)[0])
     messages = 1000 / GROWTH_MS
@@ -105,7 +105,7 @@ def draw(folder: Path) -> Path:
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(2.6)
         cpu, latency = figure.subplots(1, 2)
-        found = [measured(links, GROWTH_MS) for links in LINKS]
+        found = [measured(links, GROWTH_MS, full=False) for links in LINKS]
         names = ("publishers", "router", "readers")
         for name, values, color in zip(names, zip(*map(_ends, found)), (style.BLUE, style.VERMILLION, style.GREEN)):
             cpu.plot(LINKS, [100 * value for value in values], marker="o", ms=4, label=name, color=color)
