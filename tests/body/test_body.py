@@ -15,7 +15,8 @@ import contactfpga
 from contactfpga.body import Body, BodyError, JointHistory, NoJoints
 from contactfpga.body.contact import forces_of, on_link
 from contactfpga.body.pose import Pose
-from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.body.snapshot import Snapshot
+from contactfpga.body.state import LinkState
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.units import UnitSamples

@@ -3,7 +3,8 @@
 import time
 
 import pytest
-from two_links import FLAT, Plugged, Streaming, state_of, wait_for
+from fake_board import wait_until
+from two_links import FLAT, Plugged, Streaming, state_of
 
 import contactfpga
 from contactfpga.body import Body, OpenBody
@@ -11,7 +12,7 @@ from contactfpga.body.plan import read
 from contactfpga.driver.stats import Stats
 
 LEFT, RIGHT = FLAT.replace(name="LEFT"), FLAT.replace(name="RIGHT")
-PATIENT = {"late_s": 1.0, "silent_s": 1.5}
+PATIENT = {"late_s": 5.0, "silent_s": 7.0}
 
 
 def body_of(folder, links):
@@ -38,12 +39,12 @@ def test_boards_that_changed_places_are_a_mismatch(tmp_path):
         for port, skin in (("a", RIGHT), ("b", LEFT)):
             gone, world.ports[port] = world.ports[port], Streaming(skin)
             gone.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("unplugged"))
-        wait_for(lambda: {one.status for one in opened.latest().links.values()} == {"mismatch"})
+        wait_until(lambda: {one.status for one in opened.latest().links.values()} == {"mismatch"})
         states = opened.latest().links
         assert states["left"].zones is None
         assert states["left"].reason == "the board is named 'RIGHT'; this link's Skin is named 'LEFT'"
         world.ports |= {"a": Streaming(LEFT), "b": Streaming(RIGHT)}
-        wait_for(lambda: opened.latest().answering == ("left", "right"))
+        wait_until(lambda: opened.latest().answering == ("left", "right"))
 
 
 def test_a_board_that_is_flashed_with_another_name_is_a_mismatch(tmp_path):
@@ -53,7 +54,7 @@ def test_a_board_that_is_flashed_with_another_name_is_a_mismatch(tmp_path):
         board = world.ports["a"]
         board.__init__(RIGHT)
         board._out = board.hello()
-        wait_for(lambda: opened.latest().links["left"].status == "mismatch")
+        wait_until(lambda: opened.latest().links["left"].status == "mismatch")
 
 
 @pytest.mark.parametrize("skins", [(FLAT, LEFT), (LEFT, FLAT)], ids=["board", "Skin"])
@@ -85,7 +86,7 @@ def test_two_robots_of_the_same_skins_keep_to_their_own_boards(tmp_path):
 
 
 class Instant:
-    """An open board that has a frame every 50 ms, without a driver: 64 of these are few for a busy machine."""
+    """An open board that has a frame every 0.2 s, without a driver: 64 of these are few for a busy machine."""
 
     name = ""
 
@@ -93,7 +94,7 @@ class Instant:
         self.zones, self.stats = zones, Stats()
 
     def latest(self, timeout=1.0):
-        time.sleep(min(timeout, 0.05))
+        time.sleep(min(timeout, 0.2))
         self.stats.frames += 1
         return self.zones
 
@@ -117,10 +118,10 @@ def test_64_links_with_some_that_are_gone(tmp_path):
         return Instant(zones)
 
     with OpenBody(body, opened=opened) as robot:
-        wait_for(lambda: len(robot.latest().answering) == 64 - len(absent))
+        wait_until(lambda: len(robot.latest().answering) == 64 - len(absent))
         snapshot = robot.latest()
         assert {name for name, state in snapshot.links.items() if state.status == "lost"} == absent
         assert len(snapshot.contacts("link", links=snapshot.answering)) == 64 - len(absent)
         absent.clear()
-        wait_for(lambda: robot.latest().answering == tuple(names))
+        wait_until(lambda: robot.latest().answering == tuple(names))
         assert robot.stats.frames == sum(one.frames for one in robot.stats.links.values()) >= 64

@@ -4,7 +4,8 @@ import threading
 import time
 
 import pytest
-from two_links import FLAT, wait_for
+from fake_board import wait_until
+from two_links import FLAT
 
 from contactfpga.body import Body, OpenBody
 from contactfpga.driver import driver
@@ -30,7 +31,7 @@ def opened(tmp_path, monkeypatch):
 
     monkeypatch.setattr(driver, "open", fails)
     with OpenBody(Body.load(tmp_path / "robot.toml")):
-        wait_for(lambda: len(calls) >= 12)
+        wait_until(lambda: len(calls) >= 12)
     return calls
 
 

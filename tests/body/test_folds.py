@@ -14,7 +14,7 @@ from contactfpga import cli
 from contactfpga.body import BodyError, Snapshot
 from contactfpga.body.body import Body
 from contactfpga.body.folds import Folds, cells_of, learn
-from contactfpga.body.snapshot import LinkState
+from contactfpga.body.state import LinkState
 from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
 from contactfpga_sim.studies.body import folding

@@ -7,7 +7,8 @@ import json
 import threading
 
 import pytest
-from two_links import Plugged, wait_for
+from fake_board import wait_until
+from two_links import Plugged
 
 import contactfpga
 from contactfpga.body import Body, NoJoints, NoLinkData, OpenBody
@@ -35,16 +36,16 @@ def test_open_body_goes_on_without_a_link_and_takes_it_back(patient):
         assert len(body.read().contacts()) == 2
         port = plugged.ports.pop("a")
         port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
-        wait_for(lambda: body.latest().links["arm"].status == "lost")
+        wait_until(lambda: body.latest().links["arm"].status == "lost")
         snapshot = body.read(timeout=5)
         with pytest.raises(NoLinkData, match=r"no data of arm: lost \(.*a is "):
             snapshot.contacts()
         assert [one.link for one in snapshot.contacts(links=snapshot.answering)] == ["chest"]
         plugged.plug("a")
-        wait_for(lambda: body.latest().links["arm"].status == "ok")
+        wait_until(lambda: body.latest().links["arm"].status == "ok")
         assert len(body.next().contacts()) == 2
         plugged.ports["b"].mute = True
-        wait_for(lambda: body.latest().links["chest"].status == "silent")
+        wait_until(lambda: body.latest().links["chest"].status == "silent")
         assert body.latest().links["chest"].zones is None
     with pytest.raises(contactfpga.BoardClosed):
         body.latest()
@@ -75,7 +76,7 @@ def test_subscription_gets_each_change_in_order_and_counts_what_it_drops(patient
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         with body.subscribe(maxsize=8) as queue:
             times = [queue.next().host_time_s for _ in range(5)]
-            wait_for(lambda: queue.dropped > 3)
+            wait_until(lambda: queue.dropped > 3)
         assert times == sorted(times)
         with pytest.raises(ValueError, match="maxsize is 0"):
             body.subscribe(0)
@@ -89,11 +90,11 @@ def test_a_snapshot_that_waited_tells_of_its_moment_and_is_made_when_it_is_looke
         body.read()
         with body.subscribe() as queue:
             changes = body._changes
-            wait_for(lambda: body._changes > changes + 20)
+            wait_until(lambda: body._changes > changes + 20)
             assert made == []
             waited = queue.next()
             plugged.ports["b"].mute = True
-            wait_for(lambda: body.latest().links["chest"].status == "silent")
+            wait_until(lambda: body.latest().links["chest"].status == "silent")
         made.clear()
         assert {state.status for state in waited.links.values()} == {"ok"}
         assert made == ["arm", "chest"]
@@ -144,13 +145,13 @@ def test_batch_of_a_link_without_frames_has_no_arrays_of_it(patient):
 def test_stats_go_on_where_a_board_comes_back(patient):
     plugged = Plugged()
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
-        wait_for(lambda: body.stats.links["arm"].frames > 5)
+        wait_until(lambda: body.stats.links["arm"].frames > 5)
         port = plugged.ports.pop("a")
         port.read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("a is gone"))
-        wait_for(lambda: body.latest().links["arm"].status == "lost")
+        wait_until(lambda: body.latest().links["arm"].status == "lost")
         before = body.stats.links["arm"]
         plugged.plug("a")
-        wait_for(lambda: body.stats.links["arm"].frames > before.frames)
+        wait_until(lambda: body.stats.links["arm"].frames > before.frames)
         assert body.stats.links["arm"].hellos == before.hellos + 1
         stats = body.stats
         assert stats.frames == sum(one.frames for one in stats.links.values())

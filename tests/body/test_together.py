@@ -3,8 +3,9 @@
 import time
 
 import pytest
+from fake_board import wait_until
 from model_board import DirectPort
-from two_links import FLAT, ROBOT, ROUND, wait_for
+from two_links import FLAT, ROBOT, ROUND
 
 import contactfpga
 from contactfpga.body import Body, OpenBody
@@ -92,6 +93,6 @@ def test_frequent_and_rare_frames_come_at_one_pace(robot):
         assert max(apart) <= 2 * STEP_S
         assert statuses == {"ok"}
         ports["chest"].read = lambda seconds: (_ for _ in ()).throw(contactfpga.PortLost("it broke"))
-        wait_for(lambda: body.latest().links["chest"].status == "lost")
+        wait_until(lambda: body.latest().links["chest"].status == "lost")
         passed = ports["arm"].clock()
-        wait_for(lambda: ports["arm"].clock() > passed + 3 * STEP_S)
+        wait_until(lambda: ports["arm"].clock() > passed + 3 * STEP_S)

@@ -8,7 +8,7 @@ import time
 from model_board import DirectPort
 
 import contactfpga
-from contactfpga.body.snapshot import LinkState
+from contactfpga.body.state import LinkState
 
 URDF = """<robot name="two"><link name="torso"/><link name="arm"/>
 <joint name="elbow" type="revolute"><parent link="torso"/><child link="arm"/>
@@ -91,10 +91,3 @@ def state_of(skin, x_cells, y_cells, frame_s):
     board.moments = [(4, 4 * x_cells, 4 * y_cells)]
     with contactfpga.open(board, skin) as opened:
         return LinkState(opened.read(), 0.0, "ok", "", frame_s)
-
-
-def wait_for(condition):
-    end = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)

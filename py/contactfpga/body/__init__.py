@@ -6,7 +6,8 @@ from contactfpga.body.contact import Contact
 from contactfpga.body.joints import JointHistory
 from contactfpga.body.open_body import OpenBody
 from contactfpga.body.queue import SnapshotQueue
-from contactfpga.body.snapshot import LinkState, Snapshot
+from contactfpga.body.snapshot import Snapshot
+from contactfpga.body.state import LinkState
 from contactfpga.body.totals import BodyStats, SnapshotBatch
 
 __all__ = [

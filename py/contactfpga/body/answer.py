@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from contactfpga.body.state import LinkState
 from contactfpga.errors import ContactFPGAError, NoData
-
-if TYPE_CHECKING:
-    from contactfpga.body.snapshot import LinkState
 
 
 class BodyError(ContactFPGAError, ValueError):

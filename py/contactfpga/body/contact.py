@@ -11,13 +11,13 @@ import numpy as np
 from contactfpga import haptics
 from contactfpga.body.folds import cells_of
 from contactfpga.body.pose import Pose
+from contactfpga.body.state import LinkState
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
     from contactfpga.body.plan import Plan
-    from contactfpga.body.snapshot import LinkState
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

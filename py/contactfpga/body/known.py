@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from contactfpga.body.plan import Plan
-from contactfpga.body.snapshot import LinkState
+from contactfpga.body.state import LinkState
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 

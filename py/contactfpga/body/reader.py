@@ -11,7 +11,7 @@ from typing import Protocol
 
 from contactfpga.body.known import Known, Seen
 from contactfpga.body.plan import Plan
-from contactfpga.body.snapshot import LinkState
+from contactfpga.body.state import LinkState
 from contactfpga.body.together import Together
 from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import (

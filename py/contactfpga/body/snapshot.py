@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
@@ -15,11 +14,10 @@ from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
 from contactfpga.body.contact import Contact
 from contactfpga.body.joints import Joints
 from contactfpga.body.kinematics import Kinematics
+from contactfpga.body.state import LinkState
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
 from contactfpga.surfaces.shapes import Floats
-from contactfpga.tracking.tracks import Tracks
-from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     from contactfpga.body.body import Body
@@ -28,30 +26,6 @@ BASE, LINK = "base", "link"
 LINK_PX = 200
 Known = Mapping[str, float] | ContactFPGAError
 """Joint angles, or why there are none."""
-
-
-@dataclasses.dataclass(frozen=True)
-class LinkState:
-    """What is known about a link at one moment."""
-
-    zones: Zones | None
-    """Its newest frame; None unless it is ok or late, because older frames say nothing about the present."""
-    age_s: float | None
-    """How long ago, on the body's clock, its newest frame ever was scanned; None if none ever came."""
-    status: str
-    """``ok``; ``late``: the newest frame is older than ``late_s``; ``silent``: no frame for ``silent_s``, with the port
-    open; ``lost``: no such port, or it is gone; ``mismatch``: a board of another Skin, name or version is
-    there."""
-    reason: str = ""
-    """Why it is not ok."""
-    frame_s: float | None = None
-    """When the frame was scanned, on the body's clock."""
-    tracks: Tracks | None = None
-    """Its contacts over the frames that were taken, as :class:`~contactfpga.Tracker` follows them."""
-
-    def __str__(self) -> str:
-        age = "no frame yet" if self.age_s is None else f"{self.age_s:.3f} s old"
-        return f"{self.status} ({age}{'; ' if self.reason else ''}{self.reason})"
 
 
 class Snapshot:

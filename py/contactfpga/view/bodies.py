@@ -14,7 +14,7 @@ from contactfpga.body.contact import on_link
 from contactfpga.body.open_body import OpenBody
 from contactfpga.body.opening import open_board
 from contactfpga.body.plan import Plan
-from contactfpga.body.snapshot import LinkState
+from contactfpga.body.state import LinkState
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
 from contactfpga.tracking.tracker import Tracker
