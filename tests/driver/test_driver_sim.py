@@ -129,6 +129,19 @@ def test_a_function_that_gives_another_sheets_cells_says_so():
         contactfpga.open(VirtualBoard(scene=lambda seconds: np.zeros((3, 3), bool)))
 
 
+@pytest.mark.parametrize("record", [False, True])
+def test_a_second_client_of_a_virtual_board_is_refused_and_the_first_goes_on(tmp_path, record):
+    virtual = VirtualBoard(scene="two_fingers")
+    with contactfpga.open(virtual, record=tmp_path / "first.raw" if record else None) as opened:
+        with pytest.raises(contactfpga.PortNotFound, match="is in use: this program opened it already; close that"):
+            contactfpga.open(virtual)
+        assert len(opened.read()) == 2
+    with pytest.raises(contactfpga.BoardClosed, match="make another one"):
+        contactfpga.open(virtual)
+    with pytest.raises(contactfpga.BoardClosed):  # and not that it is in use, though that was in vain
+        contactfpga.open(virtual)
+
+
 @pytest.mark.parametrize("call", ["next", "read", "latest", "batch", "clock", "subscribe"])
 def test_a_closed_simulated_board_says_so_every_time(call):
     virtual = VirtualBoard()

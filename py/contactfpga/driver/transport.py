@@ -6,6 +6,7 @@ import contextlib
 import os
 import shlex
 import time
+import weakref
 from typing import Protocol
 
 from contactfpga.circuit import Circuit, load_checked
@@ -128,6 +129,8 @@ class SimTransport:
     def __init__(self, name: str, board: SimulatedPort):
         self.name = name
         self._board = board
+        if _SIMULATED.setdefault(id(board), self) is not self:
+            raise PortNotFound(f"{name} is in use: this program opened it already; close that first")
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
@@ -145,7 +148,13 @@ class SimTransport:
         return float(self._board.clock())
 
     def close(self) -> None:
+        if _SIMULATED.get(id(self._board)) is self:
+            del _SIMULATED[id(self._board)]
         self._board.close()
+
+
+_SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDictionary()
+"""What is open, by its board's identity: two readers would take each other's bytes."""
 
 
 class RecordingTransport:
