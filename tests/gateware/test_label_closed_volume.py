@@ -84,9 +84,10 @@ def test_every_small_frame(record_property, rows, columns, connectivity, labelle
 SIZES = [(8, 8), (9, 7), (12, 12), (16, 16), (20, 33), (32, 32), (64, 64)]
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize(("connectivity", "labeller"), RULES)
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(
+    ("size", "connectivity", "labeller"),
+    sample([(size, *rule) for size in SIZES for rule in RULES], quick=[((9, 7), *rule) for rule in RULES]),
+)
 def test_random_frames_and_mazes(record_property, size, connectivity, labeller):
     rng = np.random.default_rng(size[0])
     cells = size[0] * size[1]

@@ -23,6 +23,8 @@ _TIME_WRAPS_US = 1 << 24
 _AT_REST = 400_000
 _ALL_FRAMES = 16
 """Cells of a sheet of which every frame is tried."""
+_FEW_CELLS = 64
+"""Cells of a sheet of which many more frames are tried, as each of them has fewer places where zones meet."""
 
 
 class Stimulus(NamedTuple):
@@ -155,8 +157,9 @@ def _various_frames(skin: Skin) -> np.ndarray:
         numbers = np.arange(1 << cells)
         return (numbers[:, None] >> np.arange(cells) & 1).astype(bool).reshape(-1, skin.rows, skin.columns)
     rng = np.random.default_rng(5)
-    density = rng.choice([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 0.95, 1.0], (3000, 1, 1))
-    return rng.random((3000, skin.rows, skin.columns)) < density
+    count = 3000 if cells > _FEW_CELLS else 15_000
+    density = rng.choice([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 0.95, 1.0], (count, 1, 1))
+    return rng.random((count, skin.rows, skin.columns)) < density
 
 
 def _frames(skin: Skin, name: str, frames: np.ndarray) -> Stimulus:
