@@ -22,7 +22,7 @@ def beside(size):
 
 
 def watched(cells, shift):
-    """What is suspected where the sheet is turned by so many columns, with the cells turned back, and the watch."""
+    """What is suspected on the sheet turned by ``shift`` columns, turned back; the same as found; the watch."""
     watch = Watch(SKIN, stuck_s=5.0)
     turned = np.roll(cells, shift, axis=2)
     found = [

@@ -1,4 +1,4 @@
-"""What is known of a link at a moment, from which its state then is made where somebody looks."""
+"""What a link's thread learned last; the link's state is made from it when somebody asks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NO_TRACKS = Tracks(0, (), ())
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Known:
-    """It holds from one event of a link to the next."""
+    """What holds from one event of a link to the next."""
 
     opened: bool = False
     """There is an open board."""

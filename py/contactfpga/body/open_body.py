@@ -46,8 +46,7 @@ class OpenBody:
         self._timeout, self._period_s = checked(timeout), period_s
         self._changed = threading.Condition()
         self._changes = self._given = 0
-        self._closing = False
-        self._ending = threading.Event()  # of its own, so that no change of a link wakes the other links' threads
+        self._closing = threading.Event()  # beside the condition: no change of a link wakes the other links' threads
         self._queues: list[SnapshotQueue] = []
         opener, together = opened or self._open_board, Together(self.clock)
         self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
@@ -70,14 +69,14 @@ class OpenBody:
 
     def _read(self, reader: LinkReader) -> None:
         before = None
-        while not self._closing:
+        while not self._closing.is_set():
             pause_s = max(reader.step(), self._period_s)
             state = reader.state()
             now = (state.status, state.frame_s)
             if now != before or not reader.tried:
                 before = now
                 self._tell()
-            self._ending.wait(min(pause_s, RETRY_S))
+            self._closing.wait(min(pause_s, RETRY_S))
 
     def _tell(self) -> None:
         with self._changed:
@@ -109,7 +108,7 @@ class OpenBody:
         asked = {name: reader.ask() for name, reader in self._readers.items()}
 
         def settled() -> bool:
-            return self._closing or all(
+            return self._closing.is_set() or all(
                 self._readers[name].answered >= number or self._readers[name].state().status in ("lost", "mismatch")
                 for name, number in asked.items()
             )
@@ -124,7 +123,7 @@ class OpenBody:
         lost."""
         timeout = checked(timeout)
         with self._changed:
-            if not self._changed.wait_for(lambda: self._closing or self._changes > self._given, timeout):
+            if not self._changed.wait_for(lambda: self._closing.is_set() or self._changes > self._given, timeout):
                 raise ReadTimeout(f"no link has changed within {timeout:g} s: {self._snapshot()}")
             self._given = self._changes
         return self.latest()
@@ -173,7 +172,7 @@ class OpenBody:
         return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
 
     def _check_open(self) -> None:
-        if self._closing:
+        if self._closing.is_set():
             raise BoardClosed("this body was closed; open it again")
 
     # ---- its end
@@ -189,9 +188,8 @@ class OpenBody:
     def close(self) -> None:
         """Give all ports back; may be called twice."""
         with self._changed:
-            self._closing = True
+            self._closing.set()
             self._changed.notify_all()
-        self._ending.set()
         for thread in self._threads:
             thread.join()
         for reader in self._readers.values():

@@ -40,7 +40,7 @@ class SnapshotQueue:
     def _wait(self, timeout: float) -> None:
         """Until one waits."""
         with self._body._changed:
-            self._body._changed.wait_for(lambda: self._waiting or self._body._closing, timeout)
+            self._body._changed.wait_for(lambda: self._waiting or self._body._closing.is_set(), timeout)
             self._body._check_open()
             if not self._waiting:
                 raise ReadTimeout(f"no link has changed within {timeout:g} s")

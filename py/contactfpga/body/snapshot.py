@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 BASE, LINK = "base", "link"
 LINK_PX = 200
-Known = Mapping[str, float] | ContactFPGAError
+Angles = Mapping[str, float] | ContactFPGAError
 """Joint angles, or why there are none."""
 
 
@@ -36,8 +36,8 @@ class Snapshot:
         """When it was taken, on the body's clock."""
         self._links = links
         self._body = body
-        self._angles: dict[str, Known] = {}
-        self._beside: dict[str, Known] = {}  # a standard deviation of the frame's time earlier or later
+        self._angles: dict[str, Angles] = {}
+        self._beside: dict[str, Angles] = {}  # a standard deviation of the frame's time earlier or later
         if joints is not None:  # looked up now, as a history is short
             for name in self.answering:
                 self._look_up(name, joints)
@@ -142,7 +142,7 @@ class Snapshot:
         return f"<Snapshot at {self.host_time_s:.3f} s: {states}>"
 
 
-def _angles(joints: Joints, host_time_s: float) -> Known:
+def _angles(joints: Joints, host_time_s: float) -> Angles:
     try:
         return joints(host_time_s)
     except ContactFPGAError as error:  # said to whoever asks for what needs them

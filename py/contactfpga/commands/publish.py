@@ -30,8 +30,8 @@ PORTS = (
     "them publish several boards (default: the one supported board plugged in; with --skin, the one with that Skin)."
 )
 SHOWN_S = 0.2
-"""How often is looked which boards are still there; those that go within this time, as all sheets of one FPGA do, go
-together."""
+"""How often to check which boards are still there. Boards that go within this time, as all sheets of one FPGA do, are
+reported together."""
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

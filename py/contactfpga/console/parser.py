@@ -1,4 +1,4 @@
-"""What reads the command line."""
+"""The parser of the command line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Parser(argparse.ArgumentParser):
     _within = False
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As that of argparse."""
+        """As argparse does, but with options anywhere."""
         topics = any(action.nargs == argparse.PARSER for action in self._get_positional_actions())
         if self._within or topics:
             return super().parse_known_args(args, namespace)

@@ -157,7 +157,7 @@ class ClockFit:
 
 
 def _hides(point: _Point, earlier: _Point) -> bool:
-    """Whether an earlier point of the same piece bounds no line that a later one leaves open."""
+    """Whether a later point of the same piece makes an earlier one redundant: a line below it is below both."""
     if math.floor(earlier.device_s / PIECE_S) < math.floor(point.device_s / PIECE_S):
         return False
     return earlier.excess_s - point.excess_s > MOST_PPM * 1e-6 * (point.device_s - earlier.device_s)

@@ -55,7 +55,7 @@ class Sorter:
         self.alone = False
         """The board has one sheet, which has no number, as its last hello shows."""
         self.sheets: int | None = None
-        """As many sheets has the board; None: no hello has said so."""
+        """How many sheets the board has; None until a hello says so."""
         self._rest = b""
 
     def take(self, data: bytes) -> list[tuple[int | None, bytes]]:

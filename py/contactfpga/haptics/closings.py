@@ -129,7 +129,7 @@ class ClosingWatch:
 
 
 def _around(sheet: Sheet) -> int | None:
-    """Columns from the seam to the seam, past which sums count on."""
+    """Columns around a closed sheet; None for any other sheet."""
     return sheet.columns if sheet.closed else None
 
 

@@ -137,7 +137,7 @@ class Locator:
         return self._turned(found, cut)
 
     def _turned(self, place: Place, columns: int) -> Place:
-        """So many columns further around."""
+        """The same place, moved around the sheet by this many columns."""
         return dataclasses.replace(
             place, x_m=(place.x_m + columns * self._pitch_x) % (self._sheet.columns * self._pitch_x)
         )
@@ -183,7 +183,7 @@ def _cut(taken: set[int], columns: int) -> int:
     """The column in the middle of the widest gap between these."""
     wide, left = max((min((other - one - 1) % columns for other in taken), one) for one in taken)
     if not wide:
-        raise HapticsError("the cells lie all the way round the closed sheet, so that the contact has no x")
+        raise HapticsError("the cells lie all the way round the closed sheet, so the contact has no x")
     return left + 1 + wide // 2
 
 

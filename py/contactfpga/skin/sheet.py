@@ -30,7 +30,7 @@ class Sheet:
 
     @property
     def around_mm(self) -> float | None:
-        """From the seam to the seam where the ends meet; None: they do not."""
+        """Circumference of a sheet whose ends meet; None for any other sheet."""
         return self.columns * self.pitch_x_mm if self.closed else None
 
     def max_zones(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +19,7 @@ BEFORE_S = 0.25
 """So much before the place that one is led to is read as well: what was there then, a keep-alive later at most."""
 
 
-class Playback(Generic[Item]):
+class Playback(abc.ABC, Generic[Item]):
     """Plays a recording; :meth:`play`, :meth:`pause`, :meth:`seek` and :attr:`speed` are for any thread."""
 
     def __init__(self, duration_s: float, clock: Callable[[], float] = time.monotonic):
@@ -34,13 +35,13 @@ class Playback(Generic[Item]):
         self._led_to: float | None = 0.0
         self._turned_s = clock()
 
+    @abc.abstractmethod
     def begin(self, start_s: float) -> Iterator[tuple[float, Item]]:
         """What there is from this moment on, with its times; what was seen before counts no more."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def follow(self, seconds: float, item: Item) -> None:
         """Take the next one, which is to be seen now or was meanwhile."""
-        raise NotImplementedError
 
     def play(self) -> None:
         """Go on; from the beginning where it has ended."""

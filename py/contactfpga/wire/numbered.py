@@ -17,7 +17,7 @@ from contactfpga.wire.framing import DELIMITER, DIGIT_BITS, FLAG_BITS
 
 KIND_NUMBERED = 11
 NUMBER_BYTES = 2
-"""By which a numbered packet is longer."""
+"""How many bytes longer a numbered packet is."""
 _BLOCK = 2
 """A stuffed zero ends the packet itself; the block after it is one byte long."""
 _MARKS = (0x80, 0x80, 0xFC)

@@ -27,7 +27,7 @@ def moved(records: np.ndarray, earlier: np.ndarray, sheet: Sheet) -> bool:
     """Whether a zone lies farther than :data:`LIMIT` pitches from each zone of an adjacent frame that has as many.
 
     Both as :attr:`contactfpga.Zones.records`, and where the ends of the sheet meet as
-    :attr:`contactfpga.Zones.closed_records`. A zone without an x is told by its y, from the others like it.
+    :attr:`contactfpga.Zones.closed_records`. Zones without an x are compared by y, and only with each other.
     """
     if len(records) != len(earlier) or np.array_equal(records, earlier):
         return False
