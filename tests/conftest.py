@@ -5,6 +5,7 @@ What only some computers have is imported where it is used: the tests in host.tx
 
 import os
 import random
+from collections import Counter
 
 import pytest
 
@@ -75,3 +76,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_xdist_auto_num_workers() -> int:
     """One more than there are cores: tests of ports and processes wait more than they compute."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """One line that names what was skipped and why, so that nobody takes a machine without a tool for a full run."""
+    reasons = Counter(report.longrepr[2] for report in terminalreporter.stats.get("skipped", []))
+    if reasons:
+        parts = [f"{reason.removeprefix('Skipped: ')} ({count})" for reason, count in reasons.most_common()]
+        terminalreporter.write_line(f"Skipped: {'; '.join(parts)}")
