@@ -156,7 +156,7 @@ def _last_record(trace: Trace, skin: Skin) -> int | None:
 LEGEND = (
     "last record after last row: below 0 where all zones ended before the frame's last row.",
     'touch to first and last byte: here each touch comes just as a scan begins. "touch to last byte" in README.md is '
-    "the median and the worst of touches at any instant of a scan, so both are longer.",
+    "the median and the worst of touches at any instant of a scan.",
 )
 """Which number of the table is which."""
 
