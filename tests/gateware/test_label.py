@@ -13,7 +13,8 @@ from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import place_of
 
-pytestmark = pytest.mark.parametrize("labeller", ["run", "serial"])  # the exact ones
+EXACT = [name for name, labeller in LABELLERS.items() if labeller.exact]
+pytestmark = pytest.mark.parametrize("labeller", EXACT)
 
 SHAPES = {
     "nested U": "#.#.#.# #.#.#.# #.#.#.# #.###.# #.....# #######",
