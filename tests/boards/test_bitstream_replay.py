@@ -51,6 +51,7 @@ def test_one_wrong_table_in_the_netlist_is_seen(synthesized):
         replay(SMALL, model_of(SMALL, broken), stimulus(SMALL, 50, []))
 
 
+@pytest.mark.slow
 def test_the_gateware_itself_passes_with_no_reset_before_cycle_0():
     skin = Skin()
     assert bitstream_replay.reset_clocks(skin, model_of(skin)) == 0

@@ -16,6 +16,7 @@ EXAMPLE = str(examples() / "two-sheets.toml")
 SKIN = Skin(rows=2, columns=2, labeller="single", settle_us=4.0, row_drive="74hc595", column_read="74hc165")
 
 
+@pytest.mark.slow
 def test_each_wire_has_a_pin_of_its_own_in_the_constraints():
     several = Several((SKIN, SKIN, SKIN))
     pins = ICEBREAKER.pins(several)

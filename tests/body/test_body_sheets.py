@@ -19,6 +19,7 @@ silent_s = 90.0
 PORT = f"sim://?scene=palm&sheets={SHEETS}#{{}}"
 
 
+@pytest.mark.slow
 def test_two_links_share_a_port(tmp_path):
     links = [
         LINK.format(name=name, number=number, folder=SHEETS.parent) for number, name in enumerate(("chest", "back"))

@@ -144,6 +144,7 @@ def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
     assert loaded(code) == "contactfpga_sim"
 
 
+@pytest.mark.slow
 def test_help_costs_little_more_than_importing_what_a_host_needs():
     def seconds(*command):
         """Of the processor: other processes may have it now and then."""

@@ -60,6 +60,7 @@ def assert_well_ended(status, took, said):
         assert word not in said, said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "keys"),
     sample(itertools.product(POOLS, (True, False)), quick=[("chart", True), ("fit", False)]),
@@ -76,6 +77,7 @@ def test_commands_with_processes_end_with_all_of_them(name, keys, tmp_path):
     assert_well_ended(*interrupted([*arguments, *many], ready, keys, tmp_path / "cache"))
 
 
+@pytest.mark.slow
 def test_what_the_arm_has_done_is_kept(tmp_path):
     def ready(terminal):
         return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
@@ -108,6 +110,7 @@ BUILDS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "step", "keys"),
     sample(

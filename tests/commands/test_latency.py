@@ -47,6 +47,7 @@ def test_the_fast_example_reaches_its_figures(run):
     assert bound < last["median"] <= 1.1 * bound + 0.1
 
 
+@pytest.mark.slow
 def test_the_figures_are_told_in_words(run):
     status, out, _ = run("--skin", FILE, "--cells", "2x5", "--touches", "2")
     assert status == 0

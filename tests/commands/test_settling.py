@@ -51,6 +51,7 @@ def all_but_one():
     return pressed
 
 
+@pytest.mark.slow
 def test_the_image_is_what_the_circuit_predicts(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:

@@ -60,6 +60,7 @@ def shown(said):
     return [line.rpartition("\r")[2] for line in CONTROL.sub("", said).split("\n")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "columns"),
     sample(

@@ -80,6 +80,7 @@ def test_a_sheet_that_nobody_touches_is_a_fault(run, simulated):
     assert "fault no switch read pressed; was the sheet touched?" in out
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_watch_with_what_it_found(simulated):
     cells = touched(0.25)
     cells[:, 3, 1] = True

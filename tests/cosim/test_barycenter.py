@@ -63,6 +63,7 @@ def assert_replayed(frames, bits, connectivity=8, most=None):
 # ---- through the compiled gateware
 
 
+@pytest.mark.slow
 def test_random_frames_and_shapes_that_break_labellers_have_scipys_barycenters_rounded(record_property):
     rng = np.random.default_rng(7)
     frames = rng.random((1500, 16, 16)) < rng.uniform(0, 1, (1500, 1, 1))
@@ -175,6 +176,7 @@ def test_a_skin_with_other_fraction_bits_is_another_one(scene):
         contactfpga.open(port, SHEET.replace(barycenter_bits=4))
 
 
+@pytest.mark.slow
 def test_commands(scene, tmp_path, capsys):
     skin, frames, cells = scene
     port = f"sim://?scene={frames}&skin={skin}"

@@ -145,6 +145,7 @@ def test_fault_planted_in_the_gatewares_trace_is_named(boundary, fault):
     assert found.value.got == (None if fault == "delay" else (value ^ bit, *rest))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not bench_cocotb.available("icarus"), reason="no iverilog on PATH")
 @pytest.mark.parametrize("name", sample(COCOTB, quick=["reference"]))
 def test_top_through_cocotb_on_icarus(name):
@@ -186,6 +187,7 @@ def half_a_second() -> tuple[Skin, Trace]:
     return skin, expected
 
 
+@pytest.mark.slow
 def test_hello_comes_again_after_half_a_second():
     skin, trace = half_a_second()
     assert len(decoded(bytes(value for _, value in trace.bytes), skin)[1]) == 2

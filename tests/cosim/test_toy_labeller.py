@@ -92,6 +92,7 @@ def test_what_is_kept_of_it_depends_on_its_file():
     assert kept.sources(SKIN) != kept.sources(SKIN.replace(labeller="run"))
 
 
+@pytest.mark.slow
 def test_the_chart_draws_it(tmp_path):
     skins = {name: skin for name, skin in methods.by(TOY).items() if name == "toy, 20 mm"}
     tasks = [Task(name, skin, "fingers", 4, 0, checked=0) for name, skin in skins.items()]

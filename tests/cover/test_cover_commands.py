@@ -184,6 +184,7 @@ def test_design_command(run):
     assert (found["fits"], found["best"]) == (False, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", sample(["png", "svg"], quick=["svg"]))
 def test_figures_command(run, tmp_path, suffix):
     data = tmp_path / "foam.csv"

@@ -113,6 +113,7 @@ def random_blows(count):
         yield Arm(inertia, lever, torque, weight, random.uniform(-math.pi, math.pi)), speed, stiffness
 
 
+@pytest.mark.slow
 def test_quadrature_against_30_digit_arithmetic(record_property):
     cases = 0
     for moved, speed, stiffness in random_blows(12):

@@ -105,6 +105,7 @@ def test_a_time_is_measured():
     assert 0 < formula_study.seconds(lambda: np.ones(10), repeats=1) < 1e-3
 
 
+@pytest.mark.slow
 def test_study_as_a_command(tmp_path, monkeypatch, capsys):
     page = tmp_path / "page.md"
     page.write_text("<!-- figures: foams -->\n<!-- end -->\n", encoding="utf-8")

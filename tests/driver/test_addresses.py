@@ -52,6 +52,7 @@ def test_what_is_no_address_is_told(address, message):
     assert str(caught.value).startswith(address)
 
 
+@pytest.mark.slow
 def test_files_of_any_name_make_a_board(tmp_path):
     skin, scene = tmp_path / "50%&+#.toml", tmp_path / "a b%41.npy"
     skin.write_text(SLOW.to_toml())

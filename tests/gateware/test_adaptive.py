@@ -87,6 +87,7 @@ BOARDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sample(BOARDS, quick=["9x4"]))
 def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property, name):
     skin = Skin(scan="adaptive", **BOARDS[name])

@@ -75,6 +75,7 @@ def check_transitions(rows: int, name: str, offset: int) -> int:
     return len(walk) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sample(DEBOUNCES, quick=["sym_defer_pk"]))
 def test_every_transition_of_4_rows_is_no_later_than_a_rasters_worst(record_property, name):
     """And the frames are the sheet's from then on. The offset moves each transition against the slots."""

@@ -87,6 +87,7 @@ def slots_of_frames(skin: Skin, cells: np.ndarray, frames: int) -> list[int]:
     return [round(int(gap) / Derived(skin).row_clocks) for gap in np.diff(lasts[:frames])]
 
 
+@pytest.mark.slow
 def test_the_gateware_takes_a_row_time_more_than_active_rows():
     for active in range(9):
         cells = np.zeros((8, 3), bool)
@@ -148,6 +149,7 @@ def test_a_column_that_is_masked_in_every_row_never_wakes_the_scan():
     assert set(slots_of_frames(skin, cells, 6)) == {1}
 
 
+@pytest.mark.slow
 def test_stuck_columns_are_counted_as_soon_as_they_read_pressed():
     skin = Skin(**SMALL | {"baud": 6_000_000})
     stuck = np.array([True, False, True])

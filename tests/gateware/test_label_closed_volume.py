@@ -86,7 +86,11 @@ SIZES = [(8, 8), (9, 7), (12, 12), (16, 16), (20, 33), (32, 32), (64, 64)]
 
 @pytest.mark.parametrize(
     ("size", "connectivity", "labeller"),
-    sample([(size, *rule) for size in SIZES for rule in RULES], quick=[((9, 7), *rule) for rule in RULES]),
+    sample(
+        [(size, *rule) for size in SIZES for rule in RULES],
+        quick=[((9, 7), *rule) for rule in RULES if rule[0] == 8],
+        slow=[((9, 7), *rule) for rule in RULES if rule[0] == 4],
+    ),
 )
 def test_random_frames_and_mazes(record_property, size, connectivity, labeller):
     rng = np.random.default_rng(size[0])

@@ -32,7 +32,8 @@ RANDOM = {  # (rows, columns): frames for each connectivity; `serial` takes a te
     (33, 33): 1_000,
     (64, 64): 300,
 }
-QUICK_RANDOM = [((8, 8), 8, "run"), ((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES if "run" in rule)]
+QUICK_RANDOM = [((8, 8), 8, "run")]
+SLOW_RANDOM = [((8, 8), 4, "run"), *(((16, 16), *rule) for rule in RULES if "run" in rule)]
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +127,8 @@ def test_every_small_frame(benches, record_property, columns, connectivity, labe
     ("size", "connectivity", "labeller"),
     sample(
         [(size, *rule) for size in SQUARES for rule in RULES],
-        quick=[(8, 8, "run"), *((16, *rule) for rule in RULES[1:])],
+        quick=[(8, 8, "run")],
+        slow=[(16, *rule) for rule in RULES[1:]],
     ),
 )
 def test_shapes_that_break_labellers(benches, record_property, size, connectivity, labeller):
@@ -138,7 +140,7 @@ def test_shapes_that_break_labellers(benches, record_property, size, connectivit
 
 @pytest.mark.parametrize(
     ("size", "connectivity", "labeller"),
-    sample([(size, *rule) for size in RANDOM for rule in RULES], quick=QUICK_RANDOM),
+    sample([(size, *rule) for size in RANDOM for rule in RULES], quick=QUICK_RANDOM, slow=SLOW_RANDOM),
     ids=str,
 )
 def test_random_frames(benches, record_property, size, connectivity, labeller):
@@ -150,7 +152,8 @@ def test_random_frames(benches, record_property, size, connectivity, labeller):
 
 def test_random_frames_are_enough():
     assert sum(RANDOM.values()) >= 100_000, "for each connectivity, in the campaign"
-    assert sum(RANDOM[size] // (1 if labeller == "run" else 10) for size, _, labeller in QUICK_RANDOM) >= 100_000
+    run = QUICK_RANDOM + SLOW_RANDOM
+    assert sum(RANDOM[size] // (1 if labeller == "run" else 10) for size, _, labeller in run) >= 100_000
 
 
 @BOTH
@@ -168,7 +171,8 @@ def test_stalls_change_no_zone(benches, record_property, gap, stall, connectivit
     ("name", "connectivity", "labeller"),
     sample(
         [(name, *rule) for name in RECORDINGS for rule in RULES],
-        quick=[("dtmf16x16", *rule) for rule in RULES],
+        quick=[("dtmf16x16", *RULES[0])],
+        slow=[("dtmf16x16", *rule) for rule in RULES[1:]],
     ),
 )
 def test_recordings(benches, record_property, name, connectivity, labeller):

@@ -165,6 +165,7 @@ def test_flags_without_a_meaning_are_ignored(listen):
     assert listen(b"\0" + sealed(plain(9)[:3] + b"\x5e"))[0] == [(moment(10), 9, False)]
 
 
+@pytest.mark.slow
 def test_no_burst_of_up_to_sixteen_bits_makes_another_request(listen, rng):
     """Of every third start and each length one; bits of the check bytes that carry none of the CRC do not count."""
     whole = sealed(plain(0x12345 | 1, True))
@@ -266,6 +267,7 @@ def test_no_flip_of_a_bit_makes_another_command(obey):
     assert len(found) == 1 + 1 + 6
 
 
+@pytest.mark.slow
 def test_no_burst_of_up_to_sixteen_bits_makes_another_command(obey, rng):
     """Of every third start and each length one."""
     sent = (0x12345 | 1, True, (1, 0x54321))

@@ -161,6 +161,7 @@ def frames(count):
     return np.random.default_rng(1).random((count, 4, 4)) < 0.5
 
 
+@pytest.mark.slow
 def test_a_labeller_that_finds_nothing_is_wrong_in_every_frame_that_has_a_zone(monkeypatch):
     some = frames(50)
     some[7] = False
@@ -193,6 +194,7 @@ def test_frames_hold_shapes_and_noise_and_all_small_ones():
     assert noise.mean((1, 2)).max() > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("labeller", campaign.OURS)
 def test_ours_are_right_on_the_same_frames(labeller):
     checked = exactness.check_ours(labeller, 8, exactness.frames_for(8, 1000))

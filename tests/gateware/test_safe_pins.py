@@ -42,6 +42,7 @@ def events(skin: Skin, cycles: int, pause: int = 1_500) -> Timeline:
     return Timeline(pieces, cuts=cuts)
 
 
+@pytest.mark.slow
 def test_both_pins_of_the_compiled_board_are_the_golden_models_in_every_clock():
     """Its lines are soldered in another order."""
     cycles = 400_000

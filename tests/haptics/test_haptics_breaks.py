@@ -31,6 +31,7 @@ def on_page(name):
     return table[first : starts[starts.index(first) + 1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "method"), [pytest.param(*one, marks=[] if one in QUICK else pytest.mark.campaign) for one in ALL]
 )

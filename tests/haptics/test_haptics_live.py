@@ -51,6 +51,7 @@ def files(tmp_path):
     return HERE.format(skin=skin, units=units), str(units)
 
 
+@pytest.mark.slow
 def test_forces_of_two_contacts_come_through_gateware_and_driver():
     cells = bumper()
     scene = Scene((finger(0, 0, 12.0), finger(30, 20, 5.0)))

@@ -55,6 +55,7 @@ def go_on(board, reader, since_s):
             assert one.at_s - (board.begun_s + one.time_us / 1e6) < MOST_S + SLOW_S
 
 
+@pytest.mark.slow
 def test_whoever_stands_still_nothing_old_is_new_and_every_frame_is_counted():
     """Shortly, so that Zenoh does not notice, and for so long that it closes connections."""
     endpoint = free_endpoint()

@@ -102,6 +102,7 @@ def test_one_publisher_has_several_boards_and_goes_on_when_one_is_gone(streaming
         assert publisher.process.wait(LONG) == 1
 
 
+@pytest.mark.slow
 def test_a_killed_publisher_shows_within_a_second(streaming):
     endpoint = free_endpoint()
     with router(endpoint), publish(streaming.path, "--connect", endpoint) as publisher:
@@ -116,6 +117,7 @@ def test_a_killed_publisher_shows_within_a_second(streaming):
             contactfpga.open(publisher.line)
 
 
+@pytest.mark.slow
 def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(streaming):
     endpoint = free_endpoint()
     with router(endpoint):
@@ -131,6 +133,7 @@ def test_a_publisher_that_comes_back_in_time_goes_on_where_times_are_known(strea
             assert board.stats.restarts == 0
 
 
+@pytest.mark.slow
 def test_a_router_that_restarts_is_a_hole_that_is_counted(streaming):
     endpoint = free_endpoint()
     with router(endpoint) as first, publish(streaming.path, "--connect", endpoint):

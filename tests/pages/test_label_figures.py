@@ -47,6 +47,7 @@ def test_every_place_is_every_offset_of_the_frame():
     assert {row.tobytes(): number for row, number in zip(rows, count.tolist())} == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("labeller", "connectivity"),
     sample(itertools.product(label_figures.EXACT, (8, 4)), quick=[(label_figures.EXACT[0], 8)]),

@@ -16,6 +16,7 @@ LEAST_PX = 11
 every_picture = pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.stem)
 
 
+@pytest.mark.slow
 @every_picture
 def test_words_are_large_enough(path):
     picture = svg_texts.read(path)

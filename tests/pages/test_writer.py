@@ -53,6 +53,7 @@ def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch
         writer.page_and_folder("Write it.")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
     [

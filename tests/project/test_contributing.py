@@ -115,6 +115,7 @@ def test_the_citation_names_the_software_and_the_paper():
     ]
 
 
+@pytest.mark.slow
 def test_the_listed_host_tests_need_no_unix_and_no_gateware():
     command = [sys.executable, "-m", "pytest", "-p", "host_only", "--collect-only", "-q", "@tests/host.txt"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)

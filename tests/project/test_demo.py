@@ -32,6 +32,7 @@ def test_the_whole_command(tmp_path):
     assert_all_said(done.stdout, demo.RUNS, picture)
 
 
+@pytest.mark.slow
 def test_two_engines_and_two_scenes(monkeypatch, capsys, tmp_path):
     picture = tmp_path / "scenes.png"
     monkeypatch.setattr(demo, "RUNS", {"fingertip": ("compiled", "Amaranth"), "palm": ("compiled",)})

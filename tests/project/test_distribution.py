@@ -151,6 +151,7 @@ def in_python(host, program, *arguments):
     return run(host / "python", "-I", "-c", program, *arguments, cwd=host).stdout.split()
 
 
+@pytest.mark.slow
 def test_the_host_alone_says_one_version(host):
     asked = [[host / "contactfpga"], [host / "python", "-m", "contactfpga"]]
     said = {run(*command, "--version", cwd=host).stdout.strip() for command in asked}
@@ -190,6 +191,7 @@ def test_the_host_alone_decodes_a_frame(host, tmp_path):
     assert in_python(host, program, file) == ["4", "55.0", "75.0"]  # 5.5 and 7.5 cells of 10 mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "extra"),
     [

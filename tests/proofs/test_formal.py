@@ -79,6 +79,7 @@ def test_the_claim_holds(case):
     assert verdict.outcome == "proved", verdict.said[-5000:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "bug"), list(_bugs_with_marks()))
 def test_a_planted_bug_breaks_the_claim(case, bug):
     assert case.run_with(bug).outcome == "counterexample"

@@ -37,12 +37,14 @@ def sample():
     return Sample(skin, candidates, mutants, campaign.left_by(skin, mutants, stimuli.quick(skin)))
 
 
+@pytest.mark.slow
 def test_short_stimuli_kill_most_mutants(sample, record_property):
     """Not even counting those that are no change, which only a proof can tell."""
     assert len(sample.left) <= 0.25 * SAMPLE
     record_property("cases", SAMPLE)
 
 
+@pytest.mark.slow
 def test_every_stage_of_the_design_has_mutants(sample):
     assert {mutant.stage for mutant in sample.all} == {"scan", "label", "report", "pack", "link", "serial", "top"}
     skin, drawn = OPTIONS["3x4, reversal, guard, self-test"]

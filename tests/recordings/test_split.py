@@ -94,6 +94,7 @@ def test_a_file_of_that_name_goes_first(tmp_path):
     assert b"".join(data for _, data in Recording(tmp_path / "touches.mcap").raw_bytes()) == port.sent
 
 
+@pytest.mark.slow
 def test_the_commands_take_the_name_too(tmp_path, capsys):
     recorded(tmp_path, StreamPort(frames=2000), **SPLIT)
     for command, out in (("export", ["x.csv"]), ("plot", ["--output", "x.svg"])):

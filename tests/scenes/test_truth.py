@@ -144,6 +144,7 @@ def test_random_scenes_against_a_raster(record_property):
     record_property("cases", compared)
 
 
+@pytest.mark.slow
 def test_random_scenes_against_adaptive_quadrature(record_property):
     # The rows' union by sorting in plain Python, and scipy's adaptive rule: to the accuracy that is promised.
     def width(parts, box, y):

@@ -62,6 +62,7 @@ def bare_patterns():
     return [np.zeros((SIZE, SIZE), bool), np.ones((SIZE, SIZE), bool), *one, *(rng.random((14, SIZE, SIZE)) < 0.4)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floating", [True, False])
 def test_every_pattern_of_3x3_reads_as_nodal_analysis_says(floating, record_property):
     ghosts = fights = 0

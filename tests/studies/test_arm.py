@@ -203,6 +203,7 @@ def test_the_supply_limits_how_fast_the_current_rises():
     assert state[2] == pytest.approx(1.5 / 0.5e-3 * 1e-7, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_halving_the_step_changes_nothing_by_more_than_a_hundredth():
     """The controller's period and the places of its samples stay; 25 us is near the largest step that is taken."""
     names = [field.name for field in dataclasses.fields(run(PAPER, "latency").outcome)]

@@ -63,6 +63,7 @@ def test_the_thinnest_foam_is_one_that_is_just_not_pressed_flat(nothing_kept):
     assert 4e-3 < point.thickness_m < 5e-3
 
 
+@pytest.mark.slow
 def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeypatch, capsys):
     few = latency_charts.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
     few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
@@ -85,6 +86,7 @@ def test_the_arm_needs_no_more_than_the_simulation():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+@pytest.mark.slow
 def test_charts_of_a_few_points(nothing_kept, tmp_path):
     tasks = latency_charts.plan(PAPER, latencies=(1e-3, 6e-3), speeds=(0.1, 0.23))
     few = dataclasses.replace(tasks, sheet={}, speed={"6 ms": tasks.speed["6 ms"]}, thick={0.23: tasks.thick[0.23][1:]})

@@ -23,6 +23,7 @@ def at_rest(result):
     return abs(result.course["speed_rad_s"][-1]) * 0.2 < 1e-3 and result.outcome.rest_s is not None
 
 
+@pytest.mark.slow
 def test_a_contact_halfway_between_four_switches_is_left_to_the_torque_limit():
     halfway = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))
     result = run(halfway, "uart")
@@ -53,6 +54,7 @@ def test_by_the_patchs_pressure_the_switch_closes_at_28_n_which_the_limit_does_n
     assert (outcome.reason, outcome.closes_s) == ("torque", None)
 
 
+@pytest.mark.slow
 def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
     outcomes = [run(PAPER.but(link={"speed_m_s": speed}), "latency").outcome for speed in (0.3, 0.4, 0.5, 0.6)]
     flat = [outcome.peak_indentation_m > 5e-3 for outcome in outcomes]
@@ -71,6 +73,7 @@ def test_a_fast_arm_presses_the_foam_flat_and_the_force_leaps():
 BOUNCING = {"bounce_s": 8e-3, "bounce_period_s": 1.5e-3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", sample(["pin", "uart"], quick=["uart"]))
 def test_a_bounce_makes_an_arm_hunt_that_does_not_wait_for_its_end(way):
     hunting = run(PAPER.but(switch=BOUNCING, control={"clear_s": 0.0}), way)
@@ -179,6 +182,7 @@ def test_a_saturated_sensor_still_trips_the_limit_and_a_limit_it_cannot_read_is_
     assert fast.reason == "torque"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dies_s", sample([8e-3, 15e-3], quick=[15e-3]))
 @pytest.mark.parametrize(("way", "who"), [("pin", "board"), ("uart", "board"), ("uart", "host")])
 def test_a_board_or_host_that_dies_in_a_contact_does_not_drive_the_arm_back_for_ever(way, who, dies_s):

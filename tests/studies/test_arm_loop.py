@@ -155,6 +155,7 @@ def test_the_chip_sends_when_its_timer_runs_out_or_a_packet_is_full(timer_ms):
     assert sum(came) == 999 + 600
 
 
+@pytest.mark.slow
 def test_a_latency_timer_left_at_16_ms_costs_what_a_full_packet_takes(golden, by_uart):
     """A frame of 17 bytes every 96 us fills a packet in 3 ms, which is sooner; still it costs force."""
     leads = [LEAD + 4 * number * PAPER.control.period_s for number in range(3)]
@@ -165,6 +166,7 @@ def test_a_latency_timer_left_at_16_ms_costs_what_a_full_packet_takes(golden, by
     assert max(one.peak_force_n for one in outcomes) > by_uart.outcome.peak_force_n + 1
 
 
+@pytest.mark.slow
 def test_halving_the_step_changes_nothing_by_more_than_a_hundredth_through_the_gateware(by_uart):
     fine = run(PAPER.but(run={"step_s": STEP / 2}), "uart").outcome
     for field in dataclasses.fields(fine):

@@ -34,6 +34,7 @@ def ran_before(found, monkeypatch):
     assert asked == [(PAPER, "paper", pytest.approx(6e-3), None)]
 
 
+@pytest.mark.slow
 def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     assert cli.main(["arm", "--output", str(tmp_path)]) == 0
@@ -131,6 +132,7 @@ def test_every_case_that_comes_along_is_known_and_differs_from_the_paper():
     assert tomllib.loads((Path(report.__file__).parent / "cases/push.toml").read_text())["like"] == "paper"
 
 
+@pytest.mark.slow
 def test_the_arm_yields_to_a_push_and_returns_and_the_torque_stays_below_the_limit():
     fastest = comply.fastest_m_s(PUSH)
     push, result = comply.pushed(PUSH, fastest)
@@ -161,6 +163,7 @@ def test_a_push_of_an_arm_that_does_not_comply_is_refused():
         comply.pushed(PAPER, 0.1)
 
 
+@pytest.mark.slow
 def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
     monkeypatch.setattr(comply, "fastest_m_s", lambda case: 0.25)
     monkeypatch.setattr(comply, "SHARES", (1.0, 1.4))

@@ -98,6 +98,7 @@ def test_the_front_holds_what_nothing_else_beats():
     assert best == sorted(best)
 
 
+@pytest.mark.slow
 def test_the_time_is_that_of_the_compiled_board():
     cells = np.zeros((8, 8), bool)
     cells[2:4, 3] = True
@@ -127,6 +128,7 @@ def test_no_touch_is_faster_than_the_bound():
     assert speed.measure(SMALL, [cells] * 9, 0).bound_us < speed.measure(SMALL, [cells] * 9, 0).median_us
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["adaptive, 10 mm", "adaptive, 20 mm", "adaptive, 5 mm, 24 MHz"])
 def test_a_frame_of_an_adaptive_scan_takes_at_most_2_percent_more_than_the_bound(method, record_property):
     skin, over = METHODS[method], []
@@ -192,6 +194,7 @@ def test_exact_labellers_add_no_error_and_the_others_do():
     assert sum(found[names[-1]]["total"]["miscounted"]) > 50
 
 
+@pytest.mark.slow
 def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
     tasks = [task(checked=1), task("single, 20 mm", "bumper", 130)]
@@ -216,6 +219,7 @@ def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatc
     assert len(calls) == 40
 
 
+@pytest.mark.slow
 def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, capsys):
     options = ["--no-size", "--jobs", "1", "--output"]
     first, second = tmp_path / "first", tmp_path / "second"
@@ -244,6 +248,7 @@ def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     """Pictures and table of docs/chart.md and README.md come from docs/chart/chart.csv."""
     monkeypatch.chdir(ROOT)
@@ -319,6 +324,7 @@ def test_the_pages_numbers_are_found_again(tmp_path):
         assert dataclasses.replace(found, host_us=shown.host_us) == shown
 
 
+@pytest.mark.slow
 def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
     monkeypatch.setattr(chart_page, "SHEETS", (16,))
     monkeypatch.setattr(chart_page.host, "label_us", lambda frames, connectivity: 13.0)

@@ -156,6 +156,7 @@ def test_every_method_of_every_study_is_pinned():
     assert set(BREAKS) == {(name, method) for name, study in STUDIES.items() for method in study.runs}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method"), sample(BREAKS, QUICK), ids=[" ".join(key) for key in BREAKS])
 def test_it_breaks_where_it_is_pinned(turn, name, method):
     found = turn(name, method)
@@ -257,6 +258,7 @@ OTHERS_PF = 16 * 2 + 2 * 3 + 15 * 4
 """Of a column beside its own capacitance: crossings, neighbors, blocked diodes of the other rows' pressed switches."""
 
 
+@pytest.mark.slow
 def test_settle_times_are_those_of_the_closed_form(turn):
     """A neighbor is read where a column is below VIH for too long, a switch missed where it is above VIL."""
     for method, pull, level in (

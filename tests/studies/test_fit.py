@@ -30,12 +30,14 @@ def test_one_contact_needs_single_and_a_second_one_an_exact_labeller(file, short
     assert refused["single"].refusals[0].startswith("miscounts 100 % of scenes (96.3 to 100), limit 5 %")
 
 
+@pytest.mark.slow
 def test_hands_need_an_exact_labeller(file, shortcuts):
     found = chosen(file(HANDS), barycenter_mm=4.0)
     assert found.answer.skin.labeller == "serial"
     assert found.answer.measured[0].errors["miscounted"].mean == 0
 
 
+@pytest.mark.slow
 def test_neither_names_nor_orders_make_a_difference(file, shortcuts):
     texts = [BUMPER, HANDS]
     names = [("bumper.toml", "hands.toml"), ("x.toml", "0.toml")]
@@ -48,6 +50,7 @@ def test_neither_names_nor_orders_make_a_difference(file, shortcuts):
     assert len(answers) == 1
 
 
+@pytest.mark.slow
 def test_what_is_called_hands_is_no_hand(file, shortcuts):
     bumper, renamed = (chosen(file(BUMPER, name)) for name in ("bumper.toml", "hands.toml"))
     assert renamed.answer == bumper.answer
@@ -55,6 +58,7 @@ def test_what_is_called_hands_is_no_hand(file, shortcuts):
     assert swapped.answer.skin.labeller == "serial"
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_cheapest_of_all_that_pass(file, shortcuts):
     """Counted and placed by OpenCV, on newly drawn scenes."""
     found = chosen(file(HANDS), miscounted=0.1, barycenter_mm=2.2, pitches=(8.0, 10.0, 16.0))

@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # ---- the command
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_skin_that_loads_and_builds(file, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
     built = []
@@ -59,6 +60,7 @@ def test_the_luts_are_those_of_place_and_route():
     )
 
 
+@pytest.mark.slow
 def test_the_command_says_what_it_chose_and_why(file, shortcuts, capsys):
     assert cli.main(["fit", file(HANDS), "--pitch-mm", "10", "--barycenter-mm", "4"]) == 0
     said = " ".join(capsys.readouterr().out.split())
@@ -126,6 +128,7 @@ def test_the_page_shows_what_the_examples_say(name):
     assert section.count("| the answer |") == section.count("| runner-up |") == 1
 
 
+@pytest.mark.slow
 def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
     path = file(HANDS)
     section = fit_page.section(f"{path} --pitch-mm 10 --scan raster")
@@ -163,6 +166,7 @@ def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypat
     assert (one.broken, two.broken) == ((), ())
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 def test_real_contacts_need_an_exact_labeller(shortcuts):
     path = figures.RECORDINGS / "dtmf16x16.dev.npz"

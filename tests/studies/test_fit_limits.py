@@ -25,6 +25,7 @@ MEASURE = speed.measure
 # ---- limits
 
 
+@pytest.mark.slow
 def test_a_latency_that_is_too_long_is_refused_with_its_worst(file, shortcuts, monkeypatch):
     monkeypatch.setattr(speed, "measure", MEASURE)
     monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
@@ -44,6 +45,7 @@ def test_touches_of_the_answer_go_through_the_gateware_as_well(file, shortcuts):
     assert [one for one in shortcuts.checked if one[1]] == [(found.answer.skin, 2)]
 
 
+@pytest.mark.slow
 def test_bitmaps_need_a_host_that_says_its_time(file, shortcuts):
     path = file(HANDS)
     refused = next(one for one in chosen(path).cheaper if one.skin.report == "cells")
@@ -104,6 +106,7 @@ def test_a_share_that_so_few_scenes_cannot_show_is_refused():
 # ---- what it costs
 
 
+@pytest.mark.slow
 def test_no_more_is_synthesized_than_the_order_of_the_cheapest_needs(file, shortcuts):
     pitches = (5.0, 8.0, 10.0, 16.0, 20.0)
     found = chosen(file(BUMPER), pitches=pitches)
@@ -119,6 +122,7 @@ def test_no_more_is_synthesized_than_the_order_of_the_cheapest_needs(file, short
     assert sorted(rest)[:1] == [found.answer.luts]
 
 
+@pytest.mark.slow
 def test_quick_synthesizes_no_refused_ones(file, shortcuts):
     path = file(HANDS)
     slow = chosen(path)

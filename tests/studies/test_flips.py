@@ -50,6 +50,7 @@ def place_of(board, name):
     return index
 
 
+@pytest.mark.slow
 def test_every_bit_of_the_synthesized_design_can_be_flipped(plain, tmp_path):
     from contactfpga_hdl.top import Top
 

@@ -79,6 +79,7 @@ def test_scores_are_those_counted_by_hand():
     assert found.idf1 == pytest.approx(2 * 6 / (8 + 8))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", scenes.FAMILIES)
 def test_the_tracker_is_no_worse_than_the_nearest_zone(family):
     pytest.importorskip("motmetrics")
@@ -105,6 +106,7 @@ def test_all_scores_are_up_to_date():
     assert writer.update(text, {"scores": tracking_page.scores_table}) == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sample(breaks.STUDIES, quick=["slide", "bounce"]))
 def test_the_breaks_are_up_to_date(name):
     study = breaks.STUDIES[name]

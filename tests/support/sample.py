@@ -1,18 +1,22 @@
-"""Which parameters of a long test `make test` runs; the others are for `make campaign`."""
+"""Which parameters of a long test `make test` and `make test-all` run; the others are for `make campaign`."""
 
 from collections.abc import Collection, Iterable, Mapping
 
 import pytest
 
 
-def sample(values: Iterable, quick: Collection) -> list:
-    """Parameters for ``pytest.mark.parametrize``: those not in ``quick`` are marked ``campaign``. A tuple holds the
-    values of several arguments. A quick one that is not there, or no quick one at all, is an error."""
+def sample(values: Iterable, quick: Collection, slow: Collection = ()) -> list:
+    """Parameters for ``pytest.mark.parametrize``: those in ``slow`` are marked so, and those in neither ``slow`` nor
+    ``quick`` are marked ``campaign``. A tuple holds the values of several arguments. A value that is not there, or no
+    quick one at all, is an error."""
     values = list(values)
-    missing = [value for value in quick if value not in values]
+    missing = [value for value in (*quick, *slow) if value not in values]
     if missing or not quick:
         raise ValueError(f"no parameters of this test: {missing}")
-    return [value if value in quick else _campaign(value) for value in values]
+    return [
+        value if value in quick else _marked(value, pytest.mark.slow if value in slow else pytest.mark.campaign)
+        for value in values
+    ]
 
 
 def each_choice(rows: Iterable[Mapping]) -> list[int]:
@@ -27,5 +31,5 @@ def each_choice(rows: Iterable[Mapping]) -> list[int]:
     return sorted(found)
 
 
-def _campaign(value: object):
-    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.campaign)
+def _marked(value: object, mark: pytest.MarkDecorator):
+    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=mark)

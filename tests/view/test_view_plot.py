@@ -104,6 +104,7 @@ def test_cells_count_by_themselves():
     assert found.rows[2, 0] == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", [(), [(0.1, 0.0), (0.2, 0.004)]])
 def test_it_is_drawn_and_says_what_is_not_known(tmp_path, late):
     plot = pytest.importorskip("contactfpga.view.plot")

@@ -85,6 +85,7 @@ def test_another_component_constant_or_driver_is_another_library(tmp_path, monke
     assert len(list((tmp_path / "cache").glob("*.so"))) == 4
 
 
+@pytest.mark.slow
 def test_processes_that_start_together_share_one_build_and_later_ones_find_it_without_amaranth(tmp_path):
     code = (
         "import sys; from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"

@@ -41,6 +41,7 @@ def assert_zones_are_scipys(frames, connectivity):
 SHAPES = [(4, 5), (16, 16), (1, 1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "connectivity"),
     sample(itertools.product(SHAPES, (8, 4)), quick=[((16, 16), 8)]),
@@ -127,6 +128,7 @@ def run(capsys):
     return run
 
 
+@pytest.mark.slow
 def test_json_lines_have_the_names_of_zones(tmp_path, run, capsys):
     values = np.zeros((3, 4, 5), np.uint8)
     values[1, 1:3, 2] = 40

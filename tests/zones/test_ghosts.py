@@ -159,6 +159,7 @@ def test_json_tells_ghosts():
     assert [zone["ghost"] for zone in received(skin_of(5, 5), corners)[0].to_dict()["zones"]] == [True] * 4
 
 
+@pytest.mark.slow
 def test_the_gateware_is_the_golden_models_in_every_clock(record_property):
     skin = Skin(rows=6, columns=7, diodes="none", connectivity=4)
     rng = np.random.default_rng(5)
