@@ -230,7 +230,7 @@ def _run_all(skin: Skin) -> list[Outcome]:
 
 def _available(engine: str) -> bool:
     if engine.startswith("cocotb") and not bench_cocotb.available("verilator"):
-        terminal.say(f"{engine}: not available on this machine, left out")
+        terminal.say(f"{engine}: left out: it needs Verilator and perl, which this machine lacks")
         return False
     return True
 

