@@ -54,7 +54,7 @@ def test_without_perl_the_scenes_through_cocotb_are_left_out_and_that_is_said(mo
     monkeypatch.setenv("PATH", str(tmp_path))
     engine = next(name for name in demo.ENGINES if name.startswith("cocotb"))
     assert not demo._available(engine)
-    assert "left out: it needs Verilator and perl" in capsys.readouterr().err
+    assert "left out: it needs Verilator and perl" in capsys.readouterr().out
 
 
 def test_a_difference_is_told(monkeypatch, capsys, tmp_path):
