@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from contactfpga import __version__
+from contactfpga.choices.choice import trusted
 from contactfpga.commands import (
     arm,
     board,
@@ -100,7 +101,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 2
     command = COMMANDS[args.command]
     try:
-        return command.run(args)
+        with trusted(args.trust):
+            return command.run(args)
     except ModuleNotFoundError as error:
         return interrupt.failed(_missing(args.command, command.EXTRA, error))
     except MissingExtra as error:  # of a part that does not know which command it serves
@@ -132,7 +134,19 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name, command in COMMANDS.items():
         command.add_flags(commands.add_parser(name, help=command.HELP, description=command.HELP))
+    for leaf in leaves(parser):
+        leaf.add_argument("--trust", action="store_true", help="Import, and so run, modules that Skin files name.")
     return parser
+
+
+def leaves(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """The parsers of commands without topics, and of topics."""
+    topics = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    for action in topics:
+        for topic in action.choices.values():
+            yield from leaves(topic)
+    if not topics:
+        yield parser
 
 
 if __name__ == "__main__":

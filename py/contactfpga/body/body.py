@@ -13,6 +13,7 @@ from contactfpga.body.answer import BodyError
 from contactfpga.body.joints import Joints
 from contactfpga.body.kinematics import Kinematics
 from contactfpga.body.plan import Plan
+from contactfpga.choices.choice import trusted
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 
@@ -33,12 +34,14 @@ class Body:
     """The file that says how the links are connected."""
 
     @classmethod
-    def load(cls, path: str | Path) -> Body:
-        """Read `robot.toml`; the paths in it count from its folder. Raises :class:`BodyError`, OSError."""
+    def load(cls, path: str | Path, trust: bool = False) -> Body:
+        """Read `robot.toml`; the paths in it count from its folder. ``trust`` as for :meth:`contactfpga.Skin.load`.
+        Raises :class:`BodyError`, OSError."""
         path = Path(path)
         values = tomlfile.load(path, BodyError)
         try:
-            return cls.of(values, path.parent)
+            with trusted(trust):
+                return cls.of(values, path.parent)
         except BodyError as error:
             raise BodyError(f"{path}: {error}") from None
 

@@ -14,7 +14,7 @@ from contactfpga.driver.board import Board
 def open_board(plan: Plan, timeout: float = 1.0) -> Board:
     """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
     with _turn(plan.port):
-        return driver.open(plan.port, plan.skin, timeout=timeout)
+        return driver.open(plan.port, plan.skin, timeout=timeout, trust=plan.trust)
 
 
 def _turn(port: str | None) -> contextlib.AbstractContextManager[None]:

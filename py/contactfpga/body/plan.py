@@ -15,6 +15,7 @@ from contactfpga import surfaces
 from contactfpga.body.answer import BodyError
 from contactfpga.body.folds import Folds
 from contactfpga.body.pose import Pose
+from contactfpga.choices.choice import trusting
 from contactfpga.driver import sheets, sim_address
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
@@ -56,6 +57,8 @@ class Plan:
     """From which on the link is silent."""
     folds: Folds | None = None
     """What the folding cover presses."""
+    trust: bool = False
+    """The Skin files of its port may name modules, as those of :meth:`contactfpga.body.Body.load` could."""
 
     @property
     def laid(self) -> Surface:
@@ -131,6 +134,7 @@ def _plan(name: str, values: dict[str, Any], folder: Path) -> Plan:
         late_s=late_s,
         silent_s=_number(values, "silent_s", max(SILENT_S, late_s)),
         folds=folds,
+        trust=trusting(),
     )
 
 

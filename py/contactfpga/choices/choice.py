@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import dataclasses
 import importlib
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -14,6 +16,40 @@ from contactfpga.inputs.values import shown
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
+
+
+FIELDS = ("labeller", "scan", "debounce", "converter")
+"""Fields of a Skin that may name a choice of your own, ``module:attribute``."""
+
+_trusting: contextvars.ContextVar[bool] = contextvars.ContextVar("trusting", default=False)
+
+
+@contextlib.contextmanager
+def trusted(trust: bool) -> Iterator[None]:
+    """With ``trust``, files that are read in this block may name modules, which are then imported and so run."""
+    token = _trusting.set(trust or trusting())
+    try:
+        yield
+    finally:
+        _trusting.reset(token)
+
+
+def trusting() -> bool:
+    """Whether this is a block of :func:`trusted`."""
+    return _trusting.get()
+
+
+def refuse_modules(values: Mapping[str, Any], source: str) -> None:
+    """Raise SkinError where a Skin that came from ``source`` names a module, but in a block of :func:`trusted`."""
+    if trusting():
+        return
+    for field in FIELDS:
+        value = values.get(field)
+        if isinstance(value, str) and ":" in value:
+            raise SkinError(
+                f"{source}: {field} is {shown(value)}, a module that would be imported and so run; "
+                "if you know its code, allow that by --trust (in Python by trust=True)"
+            )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -82,9 +118,7 @@ def load_own(place: str, what: str) -> Any:
 def own_files(skin: Skin) -> set[Path]:
     """Files of the modules that the Skin's choices of your own name, for keys of what is kept."""
     own = [
-        load(value)
-        for value in (skin.labeller, skin.scan, skin.debounce, skin.converter)
-        if isinstance(value, str) and ":" in value
+        load(value) for value in (getattr(skin, field) for field in FIELDS) if isinstance(value, str) and ":" in value
     ]
     places = {place for one in own for place in (one.name, one.gateware, one.golden) if place}
     specs = [importlib.util.find_spec(place.partition(":")[0]) for place in places]

@@ -8,6 +8,7 @@ import os
 import threading
 from pathlib import Path
 
+from contactfpga.choices.choice import trusted
 from contactfpga.driver import finding, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.recording import FileTap, Tap
@@ -28,6 +29,7 @@ def open(
     baud: int | None = None,
     record: str | Path | Tap | None = None,
     timeout: float = 1.0,
+    trust: bool = False,
 ) -> Board:
     """Open a board and wait for its hello.
 
@@ -39,14 +41,15 @@ def open(
     ``skin``: the Skin (or its file) that the board must be built from; None accepts any board. ``baud``: bits per
     second; by default the baud rate of ``skin``, or 3,000,000. ``record``: a file that gets every byte received, for
     ``replay://``, or a :class:`~contactfpga.driver.recording.Tap`.
-    ``timeout`` in seconds, for the hello. Paths may be text or :class:`~pathlib.Path`.
+    ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
+    (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`.
 
     Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
     :class:`SkinMismatch`, :class:`VersionMismatch`.
     """
     timeout = checked(timeout)
     if skin is not None and not isinstance(skin, Skin):
-        skin = Skin.load(skin)
+        skin = Skin.load(skin, trust)
     if baud is None:
         baud = skin.baud if skin is not None else DEFAULT_BAUD
     elif not isinstance(baud, int) or not limits.MIN_BAUD <= baud <= limits.MAX_CLOCK_HZ // 2:
@@ -60,7 +63,8 @@ def open(
         port = os.fspath(port)
     if port is None or (isinstance(port, str) and finding.searched(port)):
         port = finding.find(port, skin, baud)
-    transport = connect(port, baud)
+    with trusted(trust):
+        transport = connect(port, baud)
     try:
         if record is not None:
             tap = FileTap(record) if isinstance(record, (str, Path)) else record

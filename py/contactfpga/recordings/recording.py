@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from contactfpga import notebook
+from contactfpga.choices.choice import refuse_modules
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes
 from contactfpga.driver.mcap_part import METADATA, RecordingError
@@ -122,8 +123,10 @@ class Recording:
 
 def _skin(text: str) -> Skin | None:
     try:
-        return Skin(**tomllib.loads(text)) if text else None
-    except (TypeError, ValueError):  # of a later version; the hello is known all the same
+        values = tomllib.loads(text)
+        refuse_modules(values, "a recording")
+        return Skin(**values) if text else None
+    except (TypeError, ValueError):  # of a later version, or with a module; the hello is known all the same
         return None
 
 

@@ -35,8 +35,9 @@ class Several:
             self._check(number, skin)
 
     @classmethod
-    def load(cls, path: str | Path) -> Several:
-        """Read a TOML file whose only key is ``sheets``, a list of Skin files; their paths begin at its folder."""
+    def load(cls, path: str | Path, trust: bool = False) -> Several:
+        """Read a TOML file whose only key is ``sheets``, a list of Skin files; their paths begin at its folder.
+        ``trust`` as for :meth:`Skin.load`."""
         values = tomlfile.load(path, SkinError)
         if set(values) != {"sheets"}:
             unknown = sorted(set(values) - {"sheets"})
@@ -45,7 +46,7 @@ class Several:
         files = values["sheets"]
         if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
             raise SkinError(f"{path}: sheets is {shown(files)}; it must be a list of Skin files")
-        skins = [Skin.load(Path(path).parent / file) for file in files]
+        skins = [Skin.load(Path(path).parent / file, trust) for file in files]
         try:
             return cls(tuple(skins))
         except SkinError as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from contactfpga.choices import scans
+from contactfpga.choices.choice import refuse_modules, trusted
 from contactfpga.choices.converters import Converter, ConverterName
 from contactfpga.choices.debounces import Debounce, DebounceName
 from contactfpga.choices.labellers import Labeller, LabellerName
@@ -149,11 +150,14 @@ class Skin:
         checks.check_timing(self)
 
     @classmethod
-    def load(cls, path: str | Path) -> Skin:
+    def load(cls, path: str | Path, trust: bool = False) -> Skin:
         """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
         ``[circuit]`` are not the Skin's: :func:`contactfpga.cover.load_cover` and
-        :func:`contactfpga.circuit.load_circuit` read them."""
+        :func:`contactfpga.circuit.load_circuit` read them. A file that names a module, such as
+        ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code."""
         values = tomlfile.load(path, SkinError)
+        with trusted(trust):
+            refuse_modules(values, str(path))
         for table in ("cover", "circuit"):
             values.pop(table, None)
         known = [field.name for field in dataclasses.fields(cls)]
