@@ -123,7 +123,7 @@ def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
         for _ in range(10):
             shown.view.turn()
         text = shown.view._facts.content
-        assert "**arm** ok (0.00" in text
+        assert r"**arm** ok \(0\.00" in text
         assert "1 zone" in text
         chest = shown.view.stage.stages["chest"]
         assert chest._points.visible

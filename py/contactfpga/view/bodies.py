@@ -20,7 +20,7 @@ from contactfpga.driver.board import Board
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.view import picture
 from contactfpga.view.fingers import Hand, Touchable
-from contactfpga.view.panel import Timeline
+from contactfpga.view.panel import Timeline, as_markdown, shortened
 from contactfpga.view.playback import Playback
 from contactfpga.view.robot import RobotStage
 from contactfpga.view.sources import Moment
@@ -128,7 +128,7 @@ class BodyView:
                 stage.draw(Moment(state.zones, tracks, truth, arrows=self._arrows(source.body.links[name], state)))
         if self._turned_s - self._told_s > TOLD_S:
             self._told_s = self._turned_s
-            self._facts.content = facts(source, states, self.stage.unread)
+            self._facts.content = as_markdown(facts(source, states, self.stage.unread))
             if self._timeline is not None:
                 self._timeline.write()
 
@@ -155,15 +155,15 @@ def pushes(plan: Plan, contacts: Iterable[Contact]) -> np.ndarray:
     return np.array(arrows) if arrows else np.zeros((0, 2, 3))
 
 
-def facts(source: Shown, states: dict[str, LinkState], unread: set[str]) -> str:
-    """As the panel shows them."""
-    lines = [f"**source** {source.title}  "]
+def facts(source: Shown, states: dict[str, LinkState], unread: set[str]) -> list[tuple[str, str]]:
+    """Names and values, as the panel shows them."""
+    rows = [("source", shortened(source.title))]
     if isinstance(source, Playback):
-        lines.append(f"**moment** {source.position_s:.3f} of {source.duration_s:.3f} s  ")
+        rows.append(("moment", f"{source.position_s:.3f} of {source.duration_s:.3f} s"))
     if unread:
-        lines.append(f"**meshes** {', '.join(sorted(unread))} cannot be read; lines between joints are drawn  ")
+        rows.append(("meshes", f"{', '.join(sorted(unread))} cannot be read; lines between joints are drawn"))
     for name, state in states.items():
         found = 0 if state.zones is None else len(state.zones)
         zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
-        lines.append(f"**{name}** {state}{zones}  ")
-    return "\n".join(lines)
+        rows.append((name, f"{state}{zones}"))
+    return rows

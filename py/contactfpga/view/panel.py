@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +109,7 @@ class Panel:
 
     def write(self, moment: Moment | None) -> None:
         """What is known now."""
-        self._facts.content = "\n".join(f"**{name}** {value}  " for name, value in facts(self._source, moment))
+        self._facts.content = as_markdown(facts(self._source, moment))
         strip = self._source.meter.strip
         if len(strip.seconds) > 1:
             self._chart.data = (strip.seconds, strip.zones, strip.area_mm2 / 100)
@@ -172,6 +174,17 @@ def facts(source: Source, moment: Moment | None) -> list[tuple[str, str]]:
         flags = sorted(zones.flags | set(zones.faults))
         rows += [("flags", ", ".join(flags))] if flags else []
     return rows + source.told()
+
+
+def as_markdown(rows: Iterable[tuple[str, str]]) -> str:
+    """Names and values, a line each. Both are shown as they are written: names of links, files and Skins come from
+    strangers, and the page would otherwise run the HTML in them and load the pictures that they name."""
+    return "\n".join(f"**{_plain(name)}** {_plain(value)}  " for name, value in rows)
+
+
+def _plain(text: str) -> str:
+    # Markdown takes any ASCII punctuation behind a backslash for itself.
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", " ".join(text.split()))
 
 
 def shortened(title: str) -> str:

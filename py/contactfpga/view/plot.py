@@ -23,7 +23,8 @@ def draw(recording: Recorded, path: Path) -> Path:
     touches = Touches.of(recording)
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(HEIGHT_IN)
-        figure.suptitle(title(recording, touches), x=0.02, ha="left", fontsize=style.LARGE)
+        # A name with dollar signs is no formula.
+        figure.suptitle(title(recording, touches), x=0.02, ha="left", fontsize=style.LARGE, parse_math=False)
         grid = figure.add_gridspec(4, 1, height_ratios=[3.2, 1.2, 1.6, 1.0])
         _map(figure, figure.add_subplot(grid[0]), touches)
         over_time = figure.add_subplot(grid[1])
