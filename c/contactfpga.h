@@ -138,8 +138,9 @@ typedef struct {
 
 /* What was counted since contactfpga_init; the names are those of the Python driver's board.stats. */
 typedef struct {
-    uint32_t frames, lost, unexplained, overwritten, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, fault_reports,
-        sweeps, sweeps_lost, sweeps_unexplained, before_hello, unknown_kinds, foreign_version, skin_changes, restarts, bytes;
+    uint64_t frames, lost, overwritten, bytes; /* at full rate 32 bits are used up within hours, and lost may jump */
+    uint32_t unexplained, damaged[CONTACTFPGA_REASONS], resynchronized, hellos, fault_reports, sweeps, sweeps_lost,
+        sweeps_unexplained, before_hello, unknown_kinds, foreign_version, skin_changes, restarts;
 } contactfpga_stats;
 
 /* Widths of a sheet's fields on the wire. */
@@ -243,7 +244,10 @@ enum {
     CONTACTFPGA__NAME = 7,
     CONTACTFPGA__COMMANDS = 8,
     CONTACTFPGA__UNITS = 9,
+    CONTACTFPGA__PLACE = 10,
     CONTACTFPGA__CHECK = 255,
+    CONTACTFPGA__UNIT_BITS = 28, /* of a reading, at most */
+    CONTACTFPGA__SUM_BITS = 38,  /* of a sum: readings times weights of seven bits, of eight units */
     CONTACTFPGA__STATE_DIGITS = 16,
     CONTACTFPGA__LONGEST_HELLO = 8192
 };
@@ -381,6 +385,7 @@ static inline uint8_t contactfpga__least(uint8_t kind) {
     switch (kind) {
     case CONTACTFPGA__SHEET:
     case CONTACTFPGA__UNITS: return 10;
+    case CONTACTFPGA__PLACE: return 2;
     case CONTACTFPGA__STATE: return CONTACTFPGA__STATE_DIGITS;
     case CONTACTFPGA__PITCH: return 16;
     case CONTACTFPGA__RADIUS:
@@ -391,7 +396,13 @@ static inline uint8_t contactfpga__least(uint8_t kind) {
     }
 }
 
-enum { CONTACTFPGA__ODD_SHEET = 16, CONTACTFPGA__ODD_STATE = 17, CONTACTFPGA__ODD_NAME = 18, CONTACTFPGA__ODD_UNITS = 19 };
+enum {
+    CONTACTFPGA__ODD_SHEET = 16,
+    CONTACTFPGA__ODD_STATE = 17,
+    CONTACTFPGA__ODD_NAME = 18,
+    CONTACTFPGA__ODD_UNITS = 19,
+    CONTACTFPGA__ODD_PLACE = 20
+};
 
 /* Keep a field's content; what is wrong with it counts only once the hello is whole. */
 static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t kind, const uint8_t *value, uint8_t length) {
@@ -429,8 +440,13 @@ static inline void contactfpga__take_field(contactfpga_reader *reader, uint8_t k
         hello->spacing_clocks = (uint16_t)(value[4] | value[5] << 8);
         hello->sweep_clocks = contactfpga__word(value + 6);
         reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_UNITS);
-        if (value[0] < 1 || value[0] > CONTACTFPGA_MAX_UNITS || value[1] < 1 || value[1] > 28 || !hello->sweep_clocks)
+        if (value[0] < 1 || value[0] > CONTACTFPGA_MAX_UNITS || value[1] < 1 || value[1] > CONTACTFPGA__UNIT_BITS
+            || value[3] > CONTACTFPGA__SUM_BITS || !hello->sweep_clocks)
             odd = UINT32_C(1) << CONTACTFPGA__ODD_UNITS;
+        break;
+    case CONTACTFPGA__PLACE:
+        reader->draft_fields &= ~(UINT32_C(1) << CONTACTFPGA__ODD_PLACE);
+        if (value[0] >= value[1]) odd = UINT32_C(1) << CONTACTFPGA__ODD_PLACE;
         break;
     case CONTACTFPGA__NAME: {
         size_t kept = length < sizeof hello->name - 1 ? length : sizeof hello->name - 1;
@@ -539,7 +555,7 @@ static inline void contactfpga__take_hello(contactfpga_reader *reader) {
             first = 0;
         }
         if (hello->sent > first + reader->waiting)
-            reader->stats.lost += (uint32_t)(hello->sent - first - reader->waiting);
+            reader->stats.lost += hello->sent - first - reader->waiting;
     }
     reader->met = reader->known = reader->greeted = true;
     reader->next = hello->sent, reader->epoch = hello->epoch;
@@ -969,7 +985,7 @@ static inline bool contactfpga_unit_value(
     bool sum = what == CONTACTFPGA_SUM_THRESHOLD;
     uint8_t bits = sum ? hello->sum_bits : hello->unit_bits, shift = bits > 18 ? (uint8_t)(bits - 18) : 0;
     if (what < CONTACTFPGA_ZERO || what > CONTACTFPGA_SUM_THRESHOLD || place >= (sum ? hello->sums : hello->units)
-        || (bits < 32 && steps >> bits))
+        || bits > CONTACTFPGA__SUM_BITS || (bits < 32 && steps >> bits))
         return false;
     uint32_t kept = steps >> shift;
     if (steps && !kept && what != CONTACTFPGA_ZERO) kept = 1; /* rounded down, but a threshold stays one */

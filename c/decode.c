@@ -68,7 +68,7 @@ int main(void) {
         if (event == CONTACTFPGA_FAULTS) show_faults(&reader.hello);
     }
     printf("stats");
-    printf(" frames=%" PRIu32 " lost=%" PRIu32 " unexplained=%" PRIu32 " overwritten=%" PRIu32, stats->frames,
+    printf(" frames=%" PRIu64 " lost=%" PRIu64 " unexplained=%" PRIu32 " overwritten=%" PRIu64, stats->frames,
         stats->lost, stats->unexplained, stats->overwritten);
     printf(" framing=%" PRIu32 " crc=%" PRIu32 " length=%" PRIu32 " kind=%" PRIu32 " content=%" PRIu32 " noise=%" PRIu32,
         stats->damaged[CONTACTFPGA_FRAMING], stats->damaged[CONTACTFPGA_CRC], stats->damaged[CONTACTFPGA_LENGTH],
@@ -79,7 +79,7 @@ int main(void) {
            " unknown_kinds=%" PRIu32,
         stats->resynchronized, stats->hellos, stats->fault_reports, stats->before_hello, stats->unknown_kinds);
     printf(" foreign_version=%" PRIu32 " skin_changes=%" PRIu32 " restarts=%" PRIu32
-           " bytes=%" PRIu32 "\n",
+           " bytes=%" PRIu64 "\n",
         stats->foreign_version, stats->skin_changes, stats->restarts, stats->bytes);
     return 0;
 }

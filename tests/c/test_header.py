@@ -320,6 +320,36 @@ def test_sweeps_out_of_time_are_counted_and_not_shown(decoder):
     assert "sweeps=7 sweeps_lost=2 sweeps_unexplained=3" in said[-1]
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "taken"),
+    [
+        (9, struct.pack("<BBBBHI", 3, 28, 4, 38, 5, 700), True),
+        (9, struct.pack("<BBBBHI", 3, 12, 4, 39, 5, 700), False),
+        (9, struct.pack("<BBBBHI", 3, 12, 4, 128, 5, 700), False),
+        (9, struct.pack("<BBBBHI", 3, 29, 4, 0, 5, 700), False),
+        (10, bytes([0, 2]), True),
+        (10, bytes([1, 2]), True),
+        (10, bytes([2, 2]), False),
+        (10, bytes([0, 0]), False),
+        (10, bytes([1]), False),
+    ],
+)
+def test_a_hello_that_cannot_be_is_refused_alike(decoder, field, value, taken):
+    board = ModelBoard(Skin(rows=5, columns=4, units=3))
+    data = board.wire.hello(facts=board.wire.facts() | {field: value})
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert (said[0].split()[0] == "hello") == taken
+
+
+def test_a_loss_of_more_than_32_bits_is_counted(decoder):
+    wire = ModelBoard(Skin()).wire
+    data = wire.hello(sent=1) + wire.hello(sent=2**40)
+    said = by_c(decoder, data)
+    assert said == by_python(data)
+    assert f" lost={2**40 - 1} " in said[-1]
+
+
 def test_the_histories_hold_all_that_is_counted():
     """Otherwise the comparison would say nothing of it."""
     seen = set()
@@ -460,7 +490,12 @@ static contactfpga_reader reader;
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     contactfpga_init(&reader);
     for (size_t i = 0; i < size; i++) {
-        if (contactfpga_push(&reader, data[i]) != CONTACTFPGA_FRAME) continue;
+        contactfpga_event event = contactfpga_push(&reader, data[i]);
+        for (unsigned what = 0; event == CONTACTFPGA_HELLO && what < 8; what++) {
+            uint32_t value;
+            contactfpga_unit_value(&reader.hello, (uint8_t)what, 0, UINT32_MAX, &value);
+        }
+        if (event != CONTACTFPGA_FRAME) continue;
         contactfpga_zone zone;
         for (uint16_t n = 0; contactfpga_zone_at(&reader, n, &zone); n++)
             if (!zone.area && !(reader.frame.flags & CONTACTFPGA_MISMATCH)) __builtin_trap();

@@ -23,6 +23,11 @@ TRAILER_DIGITS = -(-(TIME_BITS + SEQUENCE_BITS) // DIGIT_BITS)
 OVER, ARMED = 1, 2
 """Flags: a threshold is reached, and there is one."""
 
+MOST_BITS = 28
+"""Of a reading."""
+MOST_SUM_BITS = MOST_BITS + 7 + 3
+"""Of a sum's largest amount: readings times weights of seven bits, of eight units."""
+
 _FACTS = struct.Struct("<BBBBHI")
 FACTS_BYTES = _FACTS.size
 
@@ -58,8 +63,10 @@ class UnitFacts:
     def decode(cls, value: bytes) -> UnitFacts:
         """Raises ValueError."""
         facts = cls(*_FACTS.unpack_from(value))
-        if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= 28 and facts.sweep_clocks):
+        if not (1 <= facts.count <= 1 << INDEX_BITS and 1 <= facts.bits <= MOST_BITS and facts.sweep_clocks):
             raise ValueError(f"{facts.count} units of {facts.bits} bits, {facts.sweep_clocks} clocks a sweep")
+        if facts.sum_bits > MOST_SUM_BITS:
+            raise ValueError(f"sums of {facts.sum_bits} bits; {MOST_SUM_BITS} is the most")
         return facts
 
 
