@@ -16,11 +16,13 @@ class Dual(wiring.Component):
 
     Each input reaches ``second`` a clock after ``first``, and it starts a clock later, so that no register of the two
     ever holds the same by construction and synthesis has nothing to merge. The outputs are those of ``first``, in the
-    same clock. Two clocks after the first difference at the latest ``tx`` is low, for longer than a byte: the packet on
-    the line ends without its check. Then it rests, both copies start from reset, and the host hears a board that was
-    restarted. With ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
+    same clock, but with ``fail_safe`` ``contact`` a clock later, as copies give it without a register. Two clocks after
+    the first difference at the latest ``tx`` is low, for longer than a byte: the packet on the line ends without its
+    check. Then it rests, both copies start from reset, and the host hears a board that was restarted. With
+    ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
 
-    Nothing in here keeps a state of its own but for the time that a restart takes, and that counts itself to its end.
+    Nothing in here keeps a state of its own but for the time that a restart takes, and that counts itself to its end;
+    the register at ``contact`` is set anew in each clock.
 
     first (component): may have probes, which are passed on.
     second (component): the same without probes.
@@ -37,16 +39,15 @@ class Dual(wiring.Component):
         breaks = Signal()
         holds = Signal()
         holds_second = Signal(init=1)
-        raises = Signal()
         m.submodules.first = ResetInserter(holds)(self.first)
         m.submodules.second = ResetInserter(holds_second)(self.second)
         self._connect(m)
         m.d.comb += differs.eq(self._compare(m) & ~holds_second)
         m.d.sync += holds_second.eq(holds)
-        self._restart(m, differs, breaks, holds, raises)
+        restarts = self._restart(m, differs, breaks, holds)
         m.d.comb += self.tx.eq(self.first.tx & ~breaks)
         if self.skin.fail_safe:
-            m.d.comb += self.contact.eq(self.first.contact | raises)
+            m.d.sync += self.contact.eq(self.first.contact | restarts)
         return m
 
     def _connect(self, m: Module) -> None:
@@ -69,7 +70,8 @@ class Dual(wiring.Component):
         m.d.sync += before.eq(said)
         return before != Cat(getattr(self.second, name) for name in names)
 
-    def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value, raises: Value) -> None:
+    def _restart(self, m: Module, differs: Value, breaks: Value, holds: Value) -> Value:
+        """Returns what is high from a difference to the end of the restart."""
         pause = PAUSE_BITS * Derived(self.skin).bit_clocks
         scan = Derived(self.skin).frame_clocks
         left = Signal(range(scan + 2 * pause + 1))  # of the restart, in clocks
@@ -80,5 +82,5 @@ class Dual(wiring.Component):
         m.d.sync += [
             breaks.eq(differs | (left > scan + pause)),
             holds.eq(differs | (left > scan)),
-            raises.eq(differs | (left != 0)),
         ]
+        return differs | (left != 0)

@@ -17,7 +17,8 @@ _INSIDE = ("bits", "bytes", "turn", "holds", "contact")
 
 class SeveralTop(wiring.Component):
     """A :class:`Top` for each sheet, its pins and probes named as there with the sheet's number after them, as
-    ``row_data_0``; ``tx``, ``rx`` and ``contact``, which is high while any sheet is touched, are shared.
+    ``row_data_0``; ``tx``, ``rx`` and ``contact`` are shared. ``contact`` is high in the clock after one in
+    which any sheet's is.
 
     Sheets know nothing of each other but whose turn it is to send. Each keeps its newest frame until then.
     """
@@ -39,8 +40,9 @@ class SeveralTop(wiring.Component):
             self.tx.eq(transmitter.pin),
             receiver.pin.eq(self.rx),
             turns.holds.eq(Cat(sheet.holds for sheet in self.sheets)),
-            self.contact.eq(Cat(sheet.contact for sheet in self.sheets).any()),
         ]
+        # One may be let go as another is touched: a register keeps that from the pin.
+        m.d.sync += self.contact.eq(Cat(sheet.contact for sheet in self.sheets).any())
         for number, sheet in enumerate(self.sheets):
             m.submodules[f"sheet_{number}"] = sheet
             m.d.comb += [sheet.turn.eq(turns.turn[number]), sheet.bytes.ready.eq(transmitter.bytes.ready)]

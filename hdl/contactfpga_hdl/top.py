@@ -39,8 +39,8 @@ class Top(wiring.Component):
     rows (out), columns (in): one pin per row and column; or in their place those of the shift registers, see
     :func:`~contactfpga_hdl.scan.pins.row_pins` and :func:`~contactfpga_hdl.scan.pins.column_pins`.
     tx (out), rx (in): the UART.
-    contact (out): high while something touches the sheet, or with units while a threshold is reached; with
-    ``fail_safe`` also while a fault is known or units have no threshold, and a clock later.
+    contact (out): high while something touches the sheet; with units a clock later, and while a threshold is reached;
+    with ``fail_safe`` a clock later, too, and while a fault is known or units have no threshold.
     spi_clock, spi_select_n, spi_mosi (out), spi_miso (in): with units, those at their converter.
     alive (out): with ``alive``, see :class:`~contactfpga_hdl.link.alive.Alive`.
 
@@ -52,7 +52,8 @@ class Top(wiring.Component):
     bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin ``contact`` is high
     until a frame after that is packed.
 
-    A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``.
+    A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``, whose ``contact``
+    is not from a register with ``fail_safe``.
 
     With a ``place`` it serves one of several sheets (:class:`~contactfpga_hdl.several.SeveralTop`): in place of the
     UART it has ``bits`` (in), ``bytes`` (out), and ``turn`` (in) and ``holds`` (out) of its link.
@@ -169,11 +170,14 @@ class Top(wiring.Component):
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
         m.d.comb += fault.eq(scan.tag.fault | (scan.faults.as_value().any() if hasattr(scan, "faults") else 0))
+        # Where one may fall as another rises, a register keeps that from the pin.
         if self.skin.fail_safe:
-            # Both may change at once: from a register without a glitch.
-            m.d.sync += self.contact.eq(scan.contact | over | fault | unwatched | self._blind(m, packer))
+            level = scan.contact | over | fault | unwatched | self._blind(m, packer)
+            m.d["comb" if self.copy else "sync"] += self.contact.eq(level)
+        elif units is not None:
+            m.d.sync += self.contact.eq(scan.contact | over)
         else:
-            m.d.comb += self.contact.eq(scan.contact | over)
+            m.d.comb += self.contact.eq(scan.contact)
         if self.skin.alive:
             m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
             watched = scan.watched if self.derived.scan.waits else 0

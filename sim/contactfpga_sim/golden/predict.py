@@ -46,6 +46,7 @@ def predict_several(skins: Sequence[Skin], timelines: Sequence[Timeline], cycles
     for trace, link in played:
         trace.bytes, trace.line = link.bytes, sent
         contact = safe.either(contact, trace.contact)
+    contact = safe.later(contact)
     for trace, _ in played:
         trace.contact = contact
     return [trace.until(cycles) for trace, _ in played]
@@ -88,7 +89,9 @@ def _play(known: Facts, timeline: Timeline, cycles: int, line: Line | None = Non
     faulty = safe.fault(frames, stages.told)
     touched = safe.either(scanned.contact, pressed.over)
     unwatched = [(0, 1), *((cycle, 1 - level) for cycle, level in pressed.armed)] if skin.units else []
-    trace.contact = safe.contact(touched, safe.either(faulty, unwatched)) if skin.fail_safe else touched
+    if skin.fail_safe:
+        touched = safe.either(touched, safe.either(faulty, unwatched))
+    trace.contact = safe.later(touched) if skin.fail_safe or skin.units else touched
     trace.alive = safe.alive(known, sorted(stages.well), faulty, cycles) if skin.alive else []
     return trace, link, scanned
 

@@ -1,4 +1,4 @@
-"""The pins that a fault changes: ``contact`` with ``fail_safe``, and ``alive``."""
+"""What several levels make of the pin ``contact``; whether a fault is known; and ``alive``."""
 
 from __future__ import annotations
 
@@ -29,12 +29,9 @@ def either(one: Changes, other: Changes) -> Changes:
     return _changes((cycle, _level(one, cycle) | _level(other, cycle)) for cycle in cycles)
 
 
-def contact(touched: Changes, faulty: Changes) -> Changes:
-    """Of the contact pin with ``fail_safe``: a clock after either."""
-    levels = []
-    for cycle in sorted({cycle for cycle, _ in (*touched, *faulty)}):
-        levels.append((cycle + 1, _level(touched, cycle) | _level(faulty, cycle)))
-    return _changes(levels)
+def later(level: Changes) -> Changes:
+    """The same from a register."""
+    return [(cycle + 1, high) for cycle, high in level]
 
 
 def alive(facts: Facts, well: Sequence[int], faulty: Changes, cycles: int) -> Changes:
