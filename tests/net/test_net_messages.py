@@ -1,5 +1,6 @@
 """Messages and what is missing between them, without a network: nothing wrong is delivered, what is lost is counted."""
 
+import dataclasses
 import random
 
 import pytest
@@ -7,8 +8,8 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.net.address import ENDPOINT, is_loopback, key_of, parse
-from contactfpga.net.message import MOST_BYTES, Counters, Message, Stream
+from contactfpga.net.address import LOOPBACK, is_loopback, key_of, own_endpoint, parse
+from contactfpga.net.message import BEAT_S, MOST_BYTES, QUIET_S, Counters, Message, Stream
 from contactfpga.wire.asked import Asked, asked_in
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request
@@ -39,10 +40,10 @@ class Receiver:
         self.frames = []
 
     def take(self, payload, now_s):
-        data, after_break = self.stream.take(payload)
-        if after_break:
-            self.host.doubt(now_s)
-        self.frames += [event.zones for event in self.host.receive(data, now_s) if isinstance(event, Arrival)]
+        for data, after_break in self.stream.take(payload, now_s):
+            if after_break:
+                self.host.doubt(now_s)
+            self.frames += [event.zones for event in self.host.receive(data, now_s) if isinstance(event, Arrival)]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -77,13 +78,15 @@ def test_whatever_is_lost_nothing_wrong_is_delivered(seed):
             receiver.take(rng.choice(old), now_s)  # comes again
         if rng.random() < 0.01:
             sender = Sender(rng)
+            receiver.stream.ended = rng.random() < 0.5  # else it was cut off and will be missed
             old.clear()
     assert {(zones.time_us, zones.sequence) for zones in receiver.frames} <= sent
     times = [zones.time_us for zones in receiver.frames]
     assert times == sorted(set(times))
     assert len(times) > 100
     stats = receiver.host.stats
-    for payload in (*jam, sender.send(board.hello(), now_s)):
+    now_s += QUIET_S  # the last publisher may be a new one, of whose first messages none counted
+    for payload in (*jam, sender.send(b"", now_s), sender.send(board.hello(), now_s), sender.send(b"", now_s)):
         receiver.take(payload, now_s)
     assert stats.frames + stats.lost + stats.unexplained == len(sent)
     assert receiver.counters.lost_messages > 20
@@ -91,15 +94,101 @@ def test_whatever_is_lost_nothing_wrong_is_delivered(seed):
     assert stats.restarts == 0
 
 
+class Stranger:
+    """Forges messages out of one that it read."""
+
+    def __init__(self, rng):
+        self.rng = rng
+
+    def forge(self, payload):
+        """A message of the same publisher or of another, which begins somewhere near or far, or continues the one that
+        was read."""
+        read, rng = Message.decode(payload), self.rng
+        far = [1, 2, 3, 300, 1 << 32, (1 << 63) - 1]
+        after = {"sequence": read.sequence + 1, "offset": read.offset + len(read.data)}
+        kind = rng.randrange(4)
+        if kind == 1:
+            after = {name: value + rng.choice(far) for name, value in after.items()}
+        elif kind == 2:
+            after = {name: rng.choice([0, 1, value // 2, (1 << 64) - 1]) for name, value in after.items()}
+        elif kind == 3:
+            after["publisher"] = rng.getrandbits(64)
+        data = bytes(rng.randrange(1, 255) for _ in range(rng.choice([0, 1, 40, 5000])))
+        read_us = read.read_us + rng.choice([0, 1, 1000, -1, 10**9, -(10**9)])
+        return dataclasses.replace(read, **after, data=data, read_us=read_us).encode()
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_after_any_forged_message_a_reader_goes_on_within_a_second(seed):
+    """At any place, the beginning included, between messages that are 10 ms or a beat apart and may get lost."""
+    rng = random.Random(seed)
+    sender, counters, now_s = Sender(rng), Counters(), 1000.0
+    stream, step_s, losing = Stream(counters), rng.choice([0.01, BEAT_S]), rng.choice([0.0, 0.0, 0.3])
+    forged_at, found, sent = rng.choice([0, 1, 2, rng.randrange(3, 20)]), b"", {}
+    read = sender.send(b"-first-", now_s)
+    for number in range(forged_at):
+        if rng.random() >= losing:
+            read = sender.send(b"<%d>" % number, now_s)
+            stream.take(read, now_s)
+        now_s += step_s
+    forged = Stranger(rng).forge(read)
+    found += b"".join(piece for piece, _ in stream.take(forged, now_s))
+    forged_s, believed = now_s, counters.messages
+    for number in range(1000, 1000 + round(3 / step_s)):
+        now_s += step_s
+        message = sender.send(b"<%d>" % number, now_s)
+        if rng.random() >= losing:
+            sent[b"<%d>" % number] = now_s
+            found += b"".join(piece for piece, _ in stream.take(message, now_s))
+    last = list(sent)[-1]  # which may still be doubted
+    late = [text for text, at_s in sent.items() if text not in found and text != last]
+    assert all(sent[text] - forged_s < 1.0 for text in late)
+    assert counters.refused <= len(late) + 2
+    assert counters.messages > believed
+    if step_s == 0.01 and not losing and Message.decode(forged).data not in found:
+        assert not late, "what was forged and not believed costs nothing"
+
+
+def test_a_stream_of_forged_messages_that_no_publisher_bears_out_is_refused():
+    """As long as the publisher is heard, whatever others send is none of its own."""
+    rng, counters, now_s = random.Random(1), Counters(), 0.0
+    sender, stream, other = Sender(rng), Stream(counters), Sender(rng)
+    found = b"".join(piece for _ in range(2) for piece, _ in stream.take(sender.send(b"!", now_s), now_s))
+    sent, strangers = b"!!", 0
+    for number in range(300):
+        now_s += 0.1
+        if rng.random() < 0.5:
+            assert stream.take(other.send(b"?", now_s), now_s) == []
+            strangers += 1
+        data = b"<%d>" % number
+        sent += data
+        found += b"".join(piece for piece, _ in stream.take(sender.send(data, now_s), now_s))
+    assert found.replace(b"\0", b"") == sent
+    assert counters.refused == strangers
+    assert counters.lost_messages == 0
+
+
 def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
     rng, counters = random.Random(1), Counters()
     sender, stream = Sender(rng), Stream(counters)
-    assert stream.take(sender.send(b"abc", 0.0)) == (b"abc", False)
-    assert stream.take(sender.send(b"def", 0.1)) == (b"def", False)
+    assert stream.take(sender.send(b"abc", 0.0), 0.0) == [], "the first one, until another bears it out"
+    assert stream.take(sender.send(b"def", 0.1), 0.1) == [(b"abc", False), (b"def", False)]
     sender.send(b"12345", 0.2)
     sender.send(b"67", 0.3)
-    assert stream.take(sender.send(b"ghi", 0.4)) == (b"\0ghi", False)
-    assert (counters.lost_messages, counters.lost_bytes, counters.breaks, counters.messages) == (2, 7, 0, 3)
+    assert stream.take(sender.send(b"ghi", 0.4), 0.4) == []
+    sender.send(b"8", 0.5)
+    assert stream.take(sender.send(b"jkl", 0.6), 0.6) == [(b"\0ghi", False)]
+    assert stream.take(sender.send(b"mno", 0.7), 0.7) == [(b"\0jkl", False), (b"mno", False)]
+    assert (counters.lost_messages, counters.lost_bytes, counters.breaks, counters.messages) == (3, 8, 0, 5)
+
+
+def test_two_messages_in_the_wrong_order_leave_no_hole():
+    sender, counters = Sender(random.Random(1)), Counters()
+    stream = Stream(counters)
+    messages = [sender.send(b"%d" % number, 0.0) for number in range(4)]
+    found = [stream.take(messages[number], 0.0) for number in (0, 1, 3, 2)]
+    assert found[2:] == [[], [(b"2", False), (b"3", False)]]
+    assert (counters.lost_messages, counters.refused, counters.messages) == (0, 0, 4)
 
 
 @pytest.mark.parametrize("step_s", [-0.001, -3600.0, 2.1, 3600.0])
@@ -107,9 +196,10 @@ def test_a_step_of_the_publishers_clock_is_a_break(step_s):
     """Or its process stood still, and its port ran over meanwhile: the same from here."""
     counters, sender = Counters(), Sender(random.Random(1))
     stream = Stream(counters)
-    stream.take(sender.send(b"a", 1000.0))
-    assert stream.take(sender.send(b"b", 1000.0 + step_s)) == (b"\0b", True)
-    assert stream.take(sender.send(b"c", 1000.1 + step_s)) == (b"c", False)
+    stream.take(sender.send(b"", 1000.0), 0.0)
+    stream.take(sender.send(b"a", 1000.0), 0.0)
+    assert stream.take(sender.send(b"b", 1000.0 + step_s), 0.0) == [(b"\0b", True)]
+    assert stream.take(sender.send(b"c", 1000.1 + step_s), 0.0) == [(b"c", False)]
     assert counters.breaks == 1
 
 
@@ -118,22 +208,28 @@ def test_what_is_no_message_is_refused_and_counted():
     stream = Stream(counters)
     whole = sender.send(b"x", 0.0)
     for bad in (b"", b"cfp1", b"zzzz" + whole[4:], whole + bytes(MOST_BYTES), b"\x80\x04pickled"):
-        assert stream.take(bad) == (b"", False)
+        assert stream.take(bad, 0.0) == []
     assert (counters.refused, counters.messages) == (5, 0)
-    stream.take(whole)
-    stream.take(whole)
-    assert (counters.refused, counters.messages) == (6, 1)
+    stream.take(whole, 0.0)
+    stream.take(whole, 0.0)
+    stream.take(sender.send(b"y", 0.0), 0.0)
+    assert (counters.refused, counters.messages) == (6, 2)
 
 
 def test_a_board_restarts_behind_a_publisher_that_restarts():
+    """The second one is heard as soon as the first has ended, or has been silent for a while."""
     rng, board, receiver = random.Random(1), ModelBoard(SKIN), Receiver()
-    sender = Sender(rng)
+    sender, second = Sender(rng), Sender(rng)
     board.time_us, board.heard = 5_000_000, 3
     receiver.take(sender.send(board.hello() + board.frame(), 5.0), 5.0)
+    receiver.take(sender.send(b"", 5.0), 5.0)
     board.power_up()
-    receiver.take(Sender(rng).send(board.frame(), 5.5), 5.5)
+    receiver.take(second.send(board.frame(), 5.4), 5.4)
+    receiver.take(second.send(b"", 5.45), 5.45)
+    assert receiver.counters.publishers == 1
+    receiver.take(second.send(b"", 5.0 + QUIET_S), 5.0 + QUIET_S)
     assert [zones.time_us for zones in receiver.frames] == [5_000_000]
-    assert (receiver.counters.publishers, receiver.counters.breaks) == (2, 1)
+    assert (receiver.counters.publishers, receiver.counters.breaks, receiver.counters.refused) == (2, 1, 1)
 
 
 # ---- what may go to a board
@@ -199,7 +295,7 @@ def test_which_endpoints_are_this_machine_alone():
         "tls/robot.local:7447",
         "tcp/127.0.0.1.nip.io:1",
     ]
-    assert all(map(is_loopback, [*here, ENDPOINT]))
+    assert all(map(is_loopback, [*here, LOOPBACK, own_endpoint()]))
     assert not any(map(is_loopback, there))
 
 

@@ -40,7 +40,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.reading(parser)
     key = "Name of a single board on the network (default: contactfpga/ and its name, or its fingerprint)."
     parser.add_argument("--key", help=key)
-    listen = f"Listen there, such as tcp/0.0.0.0:7447 for all (default: {address.ENDPOINT}, this machine only)."
+    listen = "Listen there, such as tcp/0.0.0.0:7447 for all (default: a Unix socket that only your programs reach)."
     parser.add_argument("--listen", metavar="ENDPOINT", help=listen)
     parser.add_argument("--connect", metavar="ENDPOINT", help="Do not listen; connect to the router there.")
     parser.add_argument("--config", metavar="FILE", help="Zenoh's own configuration (JSON5): TLS, users, access.")
@@ -63,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
 
     key = None if args.key is None else address.checked_key(args.key)
     boards = _look(args, key)
-    here = args.connect or args.listen or address.ENDPOINT
+    here = args.connect or args.listen
     batch_s, block = args.batch_ms / 1000, args.congestion == "block"
     with contextlib.ExitStack() as ending:
         open_session = session.connected if args.connect else session.listening
-        network = ending.enter_context(open_session(args.connect or args.listen, args.config))
+        network = ending.enter_context(open_session(here, args.config))
         publishers: dict[Publisher, Transport] = {}
         for of, (device, baud) in boards.items():
             transport = connect(device, baud)
@@ -75,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
             publishers[Publisher(transport, network, of, **options)] = transport
         for of in boards:
-            print(f"{address.SCHEME}{of}" + ("" if here == address.ENDPOINT else f"?connect={here}"), flush=True)
-        _warn(args, here)
+            print(f"{address.SCHEME}{of}" + (f"?connect={here}" if here else ""), flush=True)
+        _warn(args)
         return _publish(publishers)
 
 
@@ -156,10 +156,11 @@ def _run(
         transport.close()  # a device that is held keeps its name from the board that is plugged in again
 
 
-def _warn(args: argparse.Namespace, here: str) -> None:
-    if args.listen and not address.is_loopback(here) and args.config is None:
+def _warn(args: argparse.Namespace) -> None:
+    if args.listen and not address.is_loopback(args.listen) and args.config is None:
         terminal.say(
-            f"whoever reaches {here} can read this board; docs/net.md says how to ask for certificates and users",
+            f"whoever reaches {args.listen} can read this board; docs/net.md says how to ask for certificates and "
+            "users",
             sys.stderr,
         )
     if args.allow_commands:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import BoardSilent, OnlyNoise, ReadTimeout
-from contactfpga.net.message import Counters
+from contactfpga.net.message import Counters, refused
 
 
 def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Counters | None) -> ReadTimeout:
@@ -12,11 +12,8 @@ def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Co
     ``net``: what is counted about the network; None: there is none."""
     stats = said.stats
     head = f"{name}: no frame within {timeout:g} s"
-    if net is not None and not net.messages:
-        return BoardSilent(
-            f"{head}, and no message of its publisher, which runs; if there are access rules, they must let this "
-            "program read KEY/bytes"
-        )
+    if net is not None:
+        head += refused(net)
     if stats.bytes == start:
         return BoardSilent(
             f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "

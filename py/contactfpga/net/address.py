@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import ipaddress
+import os
 import re
+import stat
+import sys
+import tempfile
+from pathlib import Path
 from urllib.parse import unquote
 
-from contactfpga.errors import PortNotFound
+from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import number_in
 
 SCHEME = "zenoh://"
-ENDPOINT = "tcp/127.0.0.1:7447"
-"""Where a publisher listens, and where a port looks for it, unless asked otherwise."""
+LOOPBACK = "tcp/127.0.0.1:7447"
+"""Which every user of this machine reaches."""
+_MOST_PATH = 100
+"""Bytes of a socket's path; systems take 103 or 107."""
 _FORM = "it reads zenoh://KEY, with ?connect=ENDPOINT, &config=FILE and &wait=SECONDS where wanted"
 
 
@@ -54,6 +62,34 @@ def key_of(name: str, fingerprint: bytes) -> str:
     """The usual key of a board."""
     usual = re.sub(r"[^\w.@:+-]+", "-", name).strip("-") or fingerprint.hex()
     return f"contactfpga/{usual}"
+
+
+def own_endpoint() -> str:
+    """Where a publisher listens, and where a port looks for it, unless asked otherwise.
+
+    It is a Unix socket in a folder that only this user can open: in ``XDG_RUNTIME_DIR`` if that is set, else in the
+    folder for temporary files. On Windows it is :data:`LOOPBACK`. Raises :class:`~contactfpga.ContactFPGAError` where
+    another user could open or replace the folder.
+    """
+    if sys.platform == "win32":
+        return LOOPBACK
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    folder = Path(runtime, "contactfpga") if runtime else Path(tempfile.gettempdir(), f"contactfpga-{os.getuid()}")
+    path = folder.absolute() / "zenoh.sock"
+    step = f"name an endpoint, for instance {LOOPBACK}, to publisher and readers"
+    if len(os.fsencode(path)) > _MOST_PATH or re.search(r"[?#;]", str(path)):
+        raise ContactFPGAError(f"{path} cannot be a socket: at most {_MOST_PATH} bytes, and none of ? # ; {step}")
+    try:
+        with contextlib.suppress(FileExistsError):
+            folder.mkdir(0o700)
+        found, above = folder.lstat(), folder.parent.stat()
+    except OSError as error:
+        raise ContactFPGAError(f"{folder} cannot be made for the socket: {error.strerror}; {step}") from None
+    alone = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+    replaceable = above.st_uid not in (0, os.getuid()) or (above.st_mode & 0o022 and not above.st_mode & stat.S_ISVTX)
+    if not alone or replaceable:
+        raise ContactFPGAError(f"{folder} is not a folder that only you can open or replace; remove it, or {step}")
+    return f"unixsock-stream/{path}"
 
 
 def is_loopback(endpoint: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections
 import contextlib
-import re
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -12,15 +11,17 @@ from typing import TYPE_CHECKING
 from contactfpga.errors import ContactFPGAError, PortLost, PortNotFound, VersionMismatch
 from contactfpga.net import session
 from contactfpga.net.address import parse
-from contactfpga.net.message import VERSION, Counters, Stream
+from contactfpga.net.message import QUIET_S, VERSION, Counters, Stream, refused, token
 
 if TYPE_CHECKING:
     import zenoh
 
 MOST_WAITING = 1 << 24
 """Bytes that wait to be read; beyond, the oldest are left out."""
-FOUND_S = 2.0
-"""How long a publisher may take to show."""
+FOUND_S = 3.0
+"""How long the first message of a publisher may take."""
+GONE_S = 1.0
+"""A publisher that sent nothing for so long is gone, whatever its token says: anyone can declare a token."""
 
 
 class ZenohPort:
@@ -35,7 +36,6 @@ class ZenohPort:
         self._changed = threading.Condition()
         self._pieces: collections.deque[tuple[bytes, bool]] = collections.deque()
         self._waiting = 0
-        self._gone_s: float | None = None  # since when nobody publishes
         self._stream = Stream(self.counters)
         self._asks: zenoh.Publisher | None = None
         try:
@@ -45,9 +45,7 @@ class ZenohPort:
         try:
             self._asks = self._session.declare_publisher(f"{address.key}/ask", express=True)
             self._bytes = self._session.declare_subscriber(f"{address.key}/bytes", self._take)
-            self._life = self._session.liveliness().declare_subscriber(
-                f"{address.key}/alive/*", self._note, history=True
-            )
+            self._life = self._session.liveliness().declare_subscriber(f"{address.key}/alive/*", self._note)
             self._find()
         except BaseException:
             self.close()
@@ -55,11 +53,17 @@ class ZenohPort:
 
     def _find(self) -> None:
         with self._changed:
-            if not self._changed.wait_for(lambda: self._stream.alive, FOUND_S):
-                step = "is `contactfpga publish` running with this key"
-                if self._address.config is not None:
-                    step += ", and do its access rules let this user read it"
-                raise PortNotFound(f"{self.name}: nobody publishes it; {step}?")
+            if self._changed.wait_for(lambda: self._stream.heard_s is not None, FOUND_S):
+                return
+            if self._stream.other_version:
+                raise VersionMismatch(
+                    f"{self.name}: its publisher sends messages of another version than {VERSION.decode()}, which this "
+                    "host reads; install a contactfpga of the same release on both computers"
+                )
+            step = "is `contactfpga publish` running with this key"
+            if self._address.config is not None:
+                step += ", and do its access rules let this user read KEY/bytes"
+            raise PortNotFound(f"{self.name}: nobody publishes it{refused(self.counters)}; {step}?")
 
     def read(self, timeout_s: float) -> bytes:
         """What is there, waiting at most ``timeout_s`` for the first byte."""
@@ -72,16 +76,17 @@ class ZenohPort:
                 self.counters.passed_breaks += after_break
                 self._waiting -= len(piece)
                 data += piece
-            if self._stream.other_version:
-                raise VersionMismatch(
-                    f"{self.name}: its publisher sends messages of another version than {VERSION.decode()}, which this "
-                    "host reads; install a contactfpga of the same release on both computers"
-                )
-            if not data and self._gone_s is not None and time.monotonic() - self._gone_s > self._address.wait_s:
+            if not data and self._gone():
                 raise PortLost(
-                    f"{self.name} is gone: its publisher ended, or the network is broken; open it again when it is back"
+                    f"{self.name} is gone: its publisher ended, or the network is broken{refused(self.counters)}; "
+                    "open it again when it is back"
                 )
             return data
+
+    def _gone(self) -> bool:
+        assert self._stream.heard_s is not None
+        silent_s, wait_s = time.monotonic() - self._stream.heard_s, self._address.wait_s
+        return silent_s > (max(wait_s, QUIET_S) if self._stream.ended else wait_s + GONE_S)
 
     def write(self, data: bytes) -> None:
         """Ask the board."""
@@ -103,14 +108,14 @@ class ZenohPort:
 
     def _take(self, sample: zenoh.Sample) -> None:
         with self._changed:
-            piece, after_break = self._stream.take(sample.payload.to_bytes())
-            if not piece:
-                return
-            self._pieces.append((piece, after_break))
-            self._waiting += len(piece)
+            for piece, after_break in self._stream.take(sample.payload.to_bytes(), time.monotonic()):
+                if piece:
+                    self._pieces.append((piece, after_break))
+                    self._waiting += len(piece)
             while self._waiting > MOST_WAITING:
                 self._leave_out()
-            self._changed.notify_all()
+            if self._pieces or self._stream.publisher is None:  # else only a beat came
+                self._changed.notify_all()
 
     def _leave_out(self) -> None:
         """Of those that wait, the oldest; what follows comes after a break then."""
@@ -128,13 +133,8 @@ class ZenohPort:
         import zenoh
 
         name = str(sample.key_expr).rpartition("/")[2]
-        if not re.fullmatch("[0-9a-f]{16}", name):
-            return
         with self._changed:
-            alive = self._stream.alive
-            if sample.kind == zenoh.SampleKind.PUT:
-                alive.add(int(name, 16))
-            else:
-                alive.discard(int(name, 16))
-            self._gone_s = None if alive else time.monotonic()
-            self._changed.notify_all()
+            number = self._stream.publisher
+            if sample.kind == zenoh.SampleKind.DELETE and number is not None and name == token(number):
+                self._stream.ended = True
+                self._changed.notify_all()

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Message
+from contactfpga.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Counters, Message, Stream, token
 from contactfpga.net.session import LEASE_MS
 from contactfpga.wire.asked import Asked, asked_in
 
@@ -68,7 +68,7 @@ class Publisher:
         control = zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP
         self._out = session.declare_publisher(f"{key}/bytes", congestion_control=control, express=True)
         self._in = session.declare_subscriber(f"{key}/ask", self._take)
-        self._token = session.liveliness().declare_token(f"{key}/alive/{self._number:016x}")
+        self._token = session.liveliness().declare_token(f"{key}/alive/{token(self._number)}")
 
     def run(self, stop: threading.Event) -> None:
         """Publish until told to stop. Raises :class:`~contactfpga.PortLost` where the board is gone."""
@@ -106,8 +106,9 @@ class Publisher:
     def _read(self, timeout_s: float) -> bytes:
         if self._source.threaded:
             return self._source.read(timeout_s)
-        data, until = b"", self._source.clock() + timeout_s  # a simulated board is held to the time that passes
-        while not data and (left := until - self._source.clock()) > 0:
+        # A simulated board is held to the time that passes; one that is slower still sends its beat in time.
+        data, until, until_s = b"", self._source.clock() + timeout_s, time.monotonic() + timeout_s
+        while not data and (left := until - self._source.clock()) > 0 and time.monotonic() <= until_s:
             while self._asked:
                 self._source.write(self._asked.popleft())
             data = self._source.read(min(left, SIMULATED_S))
@@ -130,11 +131,22 @@ class Publisher:
 
 
 def _check_alone(session: zenoh.Session, key: str) -> None:
-    """One that was killed may seem to live for a while."""
-    until_s = time.monotonic() + 2 * LEASE_MS / 1000
-    while list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
-        if time.monotonic() > until_s:
+    """Whoever sends has the key. A token alone says little: a killed publisher may leave its token for a while, and
+    anyone can declare one."""
+    if not list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
+        return
+    counters, heard = Counters(), threading.Event()
+    stream = Stream(counters)
+
+    def take(sample: zenoh.Sample) -> None:
+        if stream.take(sample.payload.to_bytes(), time.monotonic()):
+            heard.set()
+
+    subscriber = session.declare_subscriber(f"{key}/bytes", take)
+    try:
+        if heard.wait(2 * LEASE_MS / 1000):
             raise ContactFPGAError(
                 f"key is {key!r}; it is published already; end that publisher, or give this one --key"
             )
-        time.sleep(0.1)
+    finally:
+        subscriber.undeclare()

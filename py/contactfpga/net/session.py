@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.net.address import ENDPOINT
+from contactfpga.net.address import LOOPBACK, own_endpoint
 
 if TYPE_CHECKING:
     import zenoh
@@ -32,17 +32,12 @@ FILES = (
 
 def listening(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
     """A session that others connect to, and that passes on between them: a router."""
-    return _open({"mode": "router", "listen/endpoints": [endpoint or ENDPOINT]}, endpoint, config, "listen")
+    return _open({"mode": "router"}, endpoint, config, "listen")
 
 
 def connected(endpoint: str | None = None, config: str | None = None) -> zenoh.Session:
     """A session that connects to a router, and listens nowhere."""
-    settings = {
-        "mode": "client",
-        "connect/endpoints": [endpoint or ENDPOINT],
-        "connect/timeout_ms": CONNECT_MS,
-    }
-    return _open(settings, endpoint, config, "connect")
+    return _open({"mode": "client", "connect/timeout_ms": CONNECT_MS}, endpoint, config, "connect")
 
 
 def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, what: str) -> zenoh.Session:
@@ -58,6 +53,7 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
         "transport/shared_memory/enabled": False,
         "transport/link/rx/max_message_size": MOST_RECEIVED,
     }
+    place = f"{what}/endpoints"
     found, given = zenoh.Config(), {}
     if config is not None:
         if not Path(config).is_file():
@@ -67,13 +63,18 @@ def _open(settings: dict[str, Any], endpoint: str | None, config: str | None, wh
         except zenoh.ZError as error:
             raise ContactFPGAError(f"config {config!r}: {_reason(error)}") from None
         _check_files(found, config)
-        given = {name: found.get_json(name) for name in settings} | {"mode": "null"}
+        given = {name: found.get_json(name) for name in (*settings, place)} | {"mode": "null"}
     usual = zenoh.Config()
+
+    def as_usual(name: str) -> bool:
+        return given.get(name, "null") in ("null", "[]", usual.get_json(name))
+
     for name, value in settings.items():
-        as_usual = given.get(name, "null") in ("null", "[]", usual.get_json(name))
-        if as_usual or (endpoint is not None and name == f"{what}/endpoints"):
+        if as_usual(name):
             _insert(found, name, value)
-    places = json.loads(found.get_json(f"{what}/endpoints"))
+    if endpoint is not None or as_usual(place):
+        _insert(found, place, [endpoint or own_endpoint()])
+    places = json.loads(found.get_json(place))
     try:
         return zenoh.open(found)
     except zenoh.ZError as error:
@@ -97,7 +98,7 @@ def _insert(found: zenoh.Config, name: str, value: Any) -> None:
         found.insert_json5(name, json.dumps(value))
     except zenoh.ZError as error:  # of what a user names: an endpoint
         reason = re.sub(r'^.*msg: "', "", _reason(error))
-        raise ContactFPGAError(f"endpoint {value[0]!r}: {reason}; for instance {ENDPOINT}") from None
+        raise ContactFPGAError(f"endpoint {value[0]!r}: {reason}; for instance {LOOPBACK}") from None
 
 
 def _where(places: Any) -> str:
@@ -106,8 +107,10 @@ def _where(places: Any) -> str:
 
 def _step(what: str, reason: str, places: Any) -> str:
     if what == "listen":
-        taken = "connect to the publisher that listens there: --connect ENDPOINT"
-        return taken if "in use" in reason else f"give an endpoint of this computer, for instance {ENDPOINT}"
+        taken = "in use" in reason or "acquire lock" in reason
+        if taken:
+            return f"connect to the publisher that listens there: --connect {_where(places)}"
+        return f"give an endpoint of this computer, for instance {LOOPBACK}"
     if isinstance(places, list) and any(map(_answers, places)):
         return "something listens there; are certificates, user and password those that it asks for?"
     return "is `contactfpga publish` running there?"

@@ -1,0 +1,162 @@
+"""Whatever others send under a key, reader and publisher go on within a second; other users are kept out."""
+
+import collections
+import itertools
+import os
+import stat
+import subprocess
+import sys
+import time
+
+import pytest
+from fake_board import FakeBoard, wait_until
+from net_processes import Streaming, free_endpoint, publish, router
+
+import contactfpga
+from contactfpga import cli
+from contactfpga.net import session
+from contactfpga.net.address import own_endpoint
+from contactfpga.net.message import Message
+
+pytest.importorskip("zenoh")
+pytestmark = pytest.mark.usefixtures("_closed_ports")
+
+SKIN = contactfpga.Skin(name="left forearm")
+KEY = "contactfpga/left-forearm"
+LONG = 60.0
+SLOW_S = 2.0
+"""By how much longer than a second a busy machine may take."""
+
+
+def first_message(network):
+    """One that the publisher sends."""
+    found = []
+    subscriber = network.declare_subscriber(f"{KEY}/bytes", lambda one: found.append(one.payload.to_bytes()))
+    wait_until(lambda: found, LONG)
+    subscriber.undeclare()
+    return Message.decode(found[0])
+
+
+@pytest.mark.parametrize("far", [1, 1 << 20, 1 << 63])
+def test_one_forged_message_of_any_number_silences_no_reader(far):
+    endpoint = free_endpoint()
+    with Streaming(SKIN) as board, publish(board.path, "--listen", endpoint) as publisher:
+        with contactfpga.open(publisher.line, timeout=LONG) as reader, session.connected(endpoint) as stranger:
+            read = first_message(stranger)
+            forged = Message(read.publisher, read.sequence + far, read.offset + far, read.read_us, 0, b"\0forged\0")
+            stranger.put(f"{KEY}/bytes", forged.encode())
+            wait_until(lambda: reader.stats.net.refused > 0, LONG)
+            begun_s = time.monotonic()
+            zones = reader.read(LONG)
+            assert time.monotonic() - begun_s < 1.0 + SLOW_S
+            assert zones.time_us in board.sent_us
+            frames = reader.stats.frames
+            wait_until(lambda: reader.next(LONG) and reader.stats.frames > frames + 50, LONG)
+
+
+def test_a_forged_token_keeps_no_publisher_from_starting_and_hides_no_death():
+    endpoint = free_endpoint()
+    with Streaming(SKIN) as board, router(endpoint), session.connected(endpoint) as stranger:
+        stranger.liveliness().declare_token(f"{KEY}/alive/00000000deadbeef")
+        with publish(board.path, "--connect", endpoint) as publisher:
+            assert publisher.line.startswith("zenoh://"), publisher.end()
+            number = first_message(stranger).publisher
+            token = stranger.liveliness().declare_token(f"{KEY}/alive/{number:016x}")
+            with contactfpga.open(publisher.line, timeout=LONG) as reader:
+                assert reader.read(LONG)
+                publisher.end()
+                ended_s = time.monotonic()
+                with pytest.raises(contactfpga.PortLost, match="its publisher ended"):
+                    collections.deque((reader.next(LONG) for _ in itertools.count()), maxlen=0)
+                assert time.monotonic() - ended_s < 1.5 + SLOW_S
+            token.undeclare()
+
+
+# ---- the Unix socket that is the default
+
+
+@pytest.fixture
+def runtime(tmp_path, monkeypatch):
+    """The user's folder for sockets, short enough."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    if len(str(tmp_path)) > 70:
+        pytest.skip("the folder of the tests is too long for a socket")
+    return tmp_path
+
+
+def test_by_default_a_board_is_read_through_a_socket_in_a_folder_of_this_user_alone(runtime):
+    with Streaming(SKIN) as board, publish(board.path) as publisher:
+        assert publisher.line == f"zenoh://{KEY}"
+        folder = runtime / "contactfpga"
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        psutil = pytest.importorskip("psutil")
+        assert psutil.Process(publisher.process.pid).net_connections("inet") == []
+        with contactfpga.open(publisher.line, timeout=LONG) as reader:
+            assert reader.read(LONG).time_us in board.sent_us
+        if os.getuid() == 0:
+            connect = f"socket.socket(socket.AF_UNIX).connect({str(folder / 'zenoh.sock')!r})"
+            for other, said in ((0, ""), (65534, "PermissionError")):
+                script = f"import os, socket; os.setgroups([]); os.setuid({other}); {connect}"
+                found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+                assert said in found.stderr
+                assert bool(said) == bool(found.returncode)
+
+
+def test_a_socket_that_a_killed_publisher_left_is_taken_over_and_a_second_publisher_is_told_where(runtime, capsys):
+    with Streaming(SKIN) as board, publish(board.path) as publisher:
+        with FakeBoard(contactfpga.Skin(name="chest")) as other:
+            assert cli.main(["publish", other.path, "--timeout", "60"]) == 1
+            said = capsys.readouterr().err
+            assert said.endswith(f"connect to the publisher that listens there: --connect {own_endpoint()}\n")
+            with publish(other.path, "--connect", own_endpoint()) as second:
+                with contactfpga.open("zenoh://contactfpga/chest", timeout=LONG) as reader:
+                    assert reader.name == "chest"
+                assert second.line.startswith("zenoh://contactfpga/chest?connect=unixsock-stream/")
+        publisher.end()
+        assert (runtime / "contactfpga" / "zenoh.sock").exists()
+        with publish(board.path) as again, contactfpga.open(again.line, timeout=LONG) as reader:
+            assert reader.read(LONG)
+
+
+def test_a_folder_that_others_can_open_or_replace_is_not_used(runtime, monkeypatch):
+    folder = runtime / "contactfpga"
+
+    def refused():
+        with pytest.raises(contactfpga.ContactFPGAError, match=r"; .*name an endpoint, for instance tcp/127") as caught:
+            own_endpoint()
+        return str(caught.value)
+
+    alone = "is not a folder that only you can open or replace; remove it, or "
+    folder.mkdir(0o755)
+    assert alone in refused()
+    folder.rmdir()
+    (runtime / "real").mkdir(0o700)
+    folder.symlink_to(runtime / "real")
+    assert alone in refused()
+    folder.unlink()
+    folder.write_text("")
+    assert alone in refused()
+    folder.unlink()
+    runtime.chmod(0o777)
+    assert alone in refused()
+    runtime.chmod(0o1777)
+    assert own_endpoint() == f"unixsock-stream/{folder}/zenoh.sock"
+    if os.getuid() == 0:
+        os.chown(folder, 65534, 65534)
+        assert alone in refused()
+    for long in (runtime / ("x" * 100), runtime / "a?b"):
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
+        assert "cannot be a socket: at most 100 bytes" in refused()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime / "nowhere"))
+    assert "cannot be made for the socket: No such file or directory" in refused()
+
+
+def test_without_a_folder_of_the_session_the_socket_lies_in_that_for_temporary_files(tmp_path, monkeypatch):
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert own_endpoint() == f"unixsock-stream/{tmp_path}/contactfpga-{os.getuid()}/zenoh.sock"
+
+
+def test_windows_has_loopback(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert own_endpoint() == "tcp/127.0.0.1:7447"
