@@ -103,7 +103,7 @@ def test_missing_angle_is_named(jvrc):
         ('joint="turns" multi', 'joint="follows" multi', "joint 'follows' follows itself"),
         ('xyz="0 0 3"', 'xyz="0 0 0"', "the axis of joint 'slides' has no direction"),
         ('xyz="0 0 3"', 'xyz="0 0 nan"', "joint 'slides' says 'nan' where a finite number is due"),
-        ("<robot", "<!DOCTYPE x><robot", "it declares a document type, which no URDF needs; remove it"),
+        ("<robot", "<!DOCTYPE x><robot", "it declares a document type, which a URDF file does not need; remove it"),
         ("</robot>", "", "not a URDF file"),
     ],
 )

@@ -111,7 +111,7 @@ def test_only_one_link_at_a_time_is_searched_for(tmp_path, monkeypatch):
     (tmp_path / "robot.toml").write_text("".join(table.format(name=name) for name in "abc"))
     lock, inside, most = threading.Lock(), [], []
 
-    def search(port, skin, timeout):
+    def search(port, skin, timeout, trust):
         with lock:
             inside.append(port)
             most.append(len(inside))
@@ -126,3 +126,27 @@ def test_only_one_link_at_a_time_is_searched_for(tmp_path, monkeypatch):
     source.close()
     assert len(most) >= 3
     assert max(most) == 1
+
+
+def test_a_robot_without_joints_is_shown(tmp_path):
+    (tmp_path / "arm.urdf").write_text('<robot name="one"><link name="arm"/></robot>')
+    (tmp_path / "skin.toml").write_text("rows = 8\ncolumns = 4\n")
+    (tmp_path / "robot.toml").write_text(TABLE.format(mirrored="false"))
+    server, _ = serving.serve(port=0)
+    try:
+        shown = robot.RobotStage(server, Body.load(tmp_path / "robot.toml"))
+        shown.move({})
+        shown.look({})
+        np.testing.assert_allclose(shown.stages["sheet"].point_m, [0.0, 0.0, 0.5])
+    finally:
+        serving.stop(server)
+
+
+def test_meshes_beyond_a_limit_are_left_out_and_told(tmp_path, stage, monkeypatch):
+    shown, _ = stage
+    monkeypatch.setattr(robot, "MAX_MESHES", 2)
+    (visual,) = robot.visuals(tmp_path / "arm.urdf")
+    shown._add_mesh(visual)
+    assert shown.unread == set()
+    shown._add_mesh(visual)
+    assert shown.unread == {robot.REST}

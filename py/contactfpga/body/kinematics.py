@@ -23,7 +23,10 @@ class Kinematics:
         self.joint_names: tuple[str, ...] = tuple(joint.name for joint in moving if joint.mimic is None)
         """Joints that follow no other one, in the order of the URDF: the columns of a Jacobian."""
         self._follows = {joint.name: self._master(joint) for joint in moving}
-        self._chains = {link: self._chain(link) for link in robot.links}
+        self._order = self._from_root()
+        self._chains: dict[str, list[Joint]] = {robot.root: []}
+        for joint in self._order:
+            self._chains[joint.child] = [*self._chains[joint.parent], joint]
 
     def _master(self, joint: Joint) -> tuple[str, float, float]:
         """The joint whose angle moves this one, with factor and offset."""
@@ -37,15 +40,19 @@ class Kinematics:
             joint = self.robot.joints[name]
         return joint.name, factor, offset
 
-    def _chain(self, link: str) -> list[Joint]:
-        found: list[Joint] = []
-        while link in self._to:
-            joint = self._to[link]
-            if joint in found:
+    def _from_root(self) -> list[Joint]:
+        """All joints, each after the one that its parent hangs on."""
+        hanging: dict[str, list[Joint]] = {}
+        for joint in self.robot.joints.values():
+            hanging.setdefault(joint.parent, []).append(joint)
+        found = list(hanging.get(self.robot.root, ()))
+        for joint in found:  # which grows
+            found += hanging.get(joint.child, ())
+        reached = {joint.child for joint in found}
+        for link in self._to:
+            if link not in reached:
                 raise BodyError(f"link {shown(link)} hangs on itself")
-            found.append(joint)
-            link = joint.parent
-        return found[::-1]
+        return found
 
     def needed(self, link: str) -> tuple[str, ...]:
         """The joints on whose angles the pose of this link depends."""
@@ -57,6 +64,13 @@ class Kinematics:
         found = Pose.of()
         for joint in self._chains[link]:
             found = found @ joint.origin @ self._moved(joint, angles)
+        return found
+
+    def poses(self, angles: Mapping[str, float]) -> dict[str, Pose]:
+        """:meth:`pose` of every link, in the time of one of the farthest."""
+        found = {self.robot.root: Pose.of()}
+        for joint in self._order:
+            found[joint.child] = found[joint.parent] @ joint.origin @ self._moved(joint, angles)
         return found
 
     def jacobian(self, link: str, point_m: Floats, angles: Mapping[str, float]) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 from contactfpga.body import urdf as urdf_file
 from contactfpga.body.answer import BodyError
 from contactfpga.body.body import Body
+from contactfpga.inputs import tomlfile
 
 ROBOT = "robot"
 """Name of the texts in a recording."""
@@ -26,7 +26,7 @@ def pack(path: str | Path) -> dict[str, str]:
     path = Path(path)
     text = path.read_text(encoding="utf-8")
     found = {TOML: text}
-    for table, key, name in _files(tomllib.loads(text)):
+    for table, key, name in _files(tomlfile.parse(text.encode(), path, BodyError)):
         file = urdf_file.located(table[key], path.parent) if key == "urdf" else path.parent / table[key]
         found[name] = base64.b64encode(file.read_bytes()).decode("ascii")
     return found
@@ -36,7 +36,7 @@ def unpack(texts: Mapping[str, str], folder: Path) -> Body:
     """The body again, with its files in this folder, which must stay as long as the robot's meshes are looked for.
     Raises :class:`BodyError` where a text is missing, or is none of :func:`pack`."""
     try:
-        values = tomllib.loads(texts[TOML])
+        values = tomlfile.parse(texts[TOML].encode(), "robot.toml", BodyError)
         for number, (table, key, name) in enumerate(_files(values)):
             file = folder / str(number)
             file.write_bytes(base64.b64decode(texts[name], validate=True))

@@ -6,17 +6,23 @@ import dataclasses
 import importlib.util
 import math
 from pathlib import Path
-from xml.etree import ElementTree
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contactfpga.body.answer import BodyError
 from contactfpga.body.pose import Pose
+from contactfpga.inputs import xmlfile
 from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import number_in, shown
 from contactfpga.surfaces.shapes import Floats, Vector
 
+if TYPE_CHECKING:
+    from xml.etree import ElementTree
+
 MAX_BYTES = 20_000_000
+MAX_LINKS = 1000
+"""And as many joints."""
 PACKAGE = "package://"
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -78,31 +84,31 @@ def load(path: Path) -> Robot:
 def tree(path: Path) -> ElementTree.Element:
     """The outermost element of a URDF file. Raises :class:`BodyError`, OSError."""
     data = read_small(path, MAX_BYTES, "a URDF file", BodyError)
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities of entities would fill the memory
-        raise BodyError(f"{path}: it declares a document type, which no URDF needs; remove it")
-    try:
-        return ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        raise BodyError(f"{path}: not a URDF file: {error}") from None
+    return xmlfile.parse(data, path, "a URDF file", BodyError)
 
 
 def _robot(root: ElementTree.Element) -> Robot:
     if root.tag != "robot":
         raise BodyError(f"its outermost element is {shown(root.tag)}; in a URDF it is 'robot'")
-    links = tuple(_text(link, "name", "a link") for link in root.findall("link"))
+    listed, hung = root.findall("link"), root.findall("joint")
+    for what, found in (("links", listed), ("joints", hung)):
+        if len(found) > MAX_LINKS:
+            raise BodyError(f"{len(found):,} {what}; the limit is {MAX_LINKS:,}")
+    links = tuple(_text(link, "name", "a link") for link in listed)
     joints: dict[str, Joint] = {}
-    for element in root.findall("joint"):
+    for element in hung:
         joint = _joint(element)
         if joint.name in joints:
             raise BodyError(f"two joints are named {shown(joint.name)}")
         joints[joint.name] = joint
-    children = [joint.child for joint in joints.values()]
+    there, children = set(links), set[str]()
     for joint in joints.values():
         for link in (joint.parent, joint.child):
-            if link not in links:
+            if link not in there:
                 raise BodyError(f"joint {shown(joint.name)} names the link {shown(link)}, which is not there")
-        if children.count(joint.child) > 1:
+        if joint.child in children:
             raise BodyError(f"link {shown(joint.child)} hangs on two joints; a URDF is a tree")
+        children.add(joint.child)
         if joint.mimic is not None and joint.mimic[0] not in joints:
             raise BodyError(f"joint {shown(joint.name)} follows {shown(joint.mimic[0])}, which is not there")
     roots = [link for link in links if link not in children]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -15,20 +16,37 @@ Table = TypeVar("Table")
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 16
-"""Tables and lists within each other."""
+"""Tables and lists within each other, and parts of a dotted key: the parser's time goes with the square of these."""
+
+_NO_KEY = re.compile(
+    r'''"""(?:[^\\"]|\\.|"(?!""))*+(?:"""|\Z)|'{3}(?:[^']|'(?!''))*+(?:'{3}|\Z)'''
+    r"""|"(?:[^\\"\n]|\\.)*+"?|'[^'\n]*+'?|\#[^\n]*+""",
+    re.DOTALL,
+)
+"""Strings and comments, also those that do not end."""
+_LONG_KEY = re.compile(rf"\.(?:[^.=,{{}}\[\]\n]*+\.){{{MAX_DEPTH - 1}}}")
 
 
 def load(path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
     """What the file says. Raises ``refused`` for what is no TOML file, OSError for what cannot be read."""
+    return parse(read_small(path, MAX_BYTES, "a TOML file", refused), path, refused)
+
+
+def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str, Any]:
+    """What a file of these bytes says; ``path``: how messages call it. Raises ``refused``."""
+    if len(data) > MAX_BYTES:
+        raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
     try:
-        values = tomllib.loads(_text(path, refused))
-    except tomllib.TOMLDecodeError as error:
-        raise refused(f"{path}: not a TOML file: {error}") from None
+        text = data.decode()
     except UnicodeDecodeError as error:
         raise refused(f"{path}: not a TOML file: it is not UTF-8 ({error.reason} at byte {error.start})") from None
+    if _LONG_KEY.search(_NO_KEY.sub("", text)):
+        raise refused(f"{path}: a key has more than {MAX_DEPTH} parts with dots between; use shorter keys")
+    try:
+        values = tomllib.loads(text)
     except RecursionError:
         raise refused(f"{path}: tables and lists lie more than {MAX_DEPTH} deep in each other") from None
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # of TOML, or a number of thousands of digits
         raise refused(f"{path}: not a TOML file: {error}") from None
     _check(path, values, refused)
     return values
@@ -56,10 +74,6 @@ def fields_of(kind: type, name: str, values: Any, refused: type[ValueError]) -> 
     return values
 
 
-def _text(path: str | Path, refused: type[ValueError]) -> str:
-    return read_small(path, MAX_BYTES, "a TOML file", refused).decode()
-
-
 def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) -> None:
     """Whole numbers have 64 bits, as TOML has it, and no table is deep. A loop, as deep tables end a recursion."""
     todo: list[tuple[str, Any, int]] = [(name, value, 1) for name, value in values.items()]
@@ -68,7 +82,7 @@ def _check(path: str | Path, values: dict[str, Any], refused: type[ValueError]) 
         if depth > MAX_DEPTH:
             raise refused(f"{path}: tables and lists lie more than {MAX_DEPTH} deep in each other")
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise refused(f"{path}: {name} is {shown(value)}; whole numbers have 64 bits in TOML")
+            raise refused(f"{path}: {shown(name)} is {shown(value)}; whole numbers have 64 bits in TOML")
         if isinstance(value, dict):
             todo += [(key, one, depth + 1) for key, one in value.items()]
         elif isinstance(value, list):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import heapq
 import math
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +13,8 @@ from contactfpga.choices.choice import refuse_modules
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_bytes import McapBytes
 from contactfpga.driver.mcap_part import METADATA, RecordingError
+from contactfpga.errors import SkinError
+from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
@@ -123,7 +124,7 @@ class Recording:
 
 def _skin(text: str) -> Skin | None:
     try:
-        values = tomllib.loads(text)
+        values = tomlfile.parse(text.encode(), "the Skin of a recording", SkinError)
         refuse_modules(values, "a recording")
         return Skin(**values) if text else None
     except (TypeError, ValueError):  # of a later version, or with a module; the hello is known all the same

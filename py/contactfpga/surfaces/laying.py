@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import io
-import logging
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from contactfpga.errors import MissingExtra
-from contactfpga.inputs.files import open_regular
+from contactfpga.surfaces import mesh_file
 from contactfpga.surfaces.answer import SurfaceError
 from contactfpga.surfaces.mesh import Mesh
 from contactfpga.surfaces.shapes import Floats
@@ -22,7 +19,8 @@ CHUNK = 2_000_000
 """Pairs of ray and triangle at a time."""
 EDGE = 0.8
 """Cosine of the angle from which on two triangles meet at an edge and not on a round surface."""
-SUFFIXES = (".stl", ".obj", ".ply", ".off")
+MAX_AROUND = 20_000_000
+"""Corners times the triangles around the busiest of them: a table of the library's."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -36,24 +34,9 @@ class Triangles:
 
     @classmethod
     def load(cls, path: str | Path, scale: float = 1.0) -> Triangles:
-        """From an STL or OBJ file, whose lengths are times ``scale`` mm. Raises :class:`SurfaceError`, OSError."""
-        path = Path(path)
-        if path.suffix.lower() not in SUFFIXES:
-            raise SurfaceError(f"{path}: a mesh is a file of {', '.join(SUFFIXES)}")
-        try:
-            import trimesh
-        except ModuleNotFoundError as error:
-            raise MissingExtra(f"reading a mesh ({error})", "surface") from None
-        # What the library stumbles over it logs, traceback and all, where nobody else takes it.
-        logging.getLogger("trimesh").addHandler(logging.NullHandler())
-        with open_regular(path) as file:
-            try:
-                # Unprocessed, as else triangles without a place are left out in silence.
-                mesh = trimesh.load_mesh(io.BytesIO(file.read()), file_type=path.suffix[1:].lower(), process=False)
-            except Exception as error:  # whatever a parser of many formats stumbles over
-                raise SurfaceError(f"{path}: not a mesh: {str(error) or type(error).__name__}") from None
-        if not len(getattr(mesh, "faces", ())):
-            raise SurfaceError(f"{path}: no triangles in it")
+        """From a file of :data:`mesh_file.SUFFIXES`, whose lengths are times ``scale`` mm. Raises
+        :class:`SurfaceError`, OSError."""
+        mesh = mesh_file.read(path, "surface")
         corners = np.asarray(mesh.triangles, float)
         if wrong := int((~np.isfinite(corners)).any(axis=(1, 2)).sum()):
             raise SurfaceError(f"{path}: {wrong} of its {len(corners)} triangles have a corner that is no point")
@@ -103,15 +86,22 @@ class Triangles:
 
 def _corner_normals(mesh: Any) -> Floats:
     """(n, 3, 3): at each corner the mean of the triangles around it, by area, but for those beyond an edge."""
-    faces, around = np.asarray(mesh.faces), np.asarray(mesh.vertex_faces)
-    sized = np.asarray(mesh.face_normals, float) * np.asarray(mesh.area_faces, float)[:, None]
+    faces, normals = np.asarray(mesh.faces), np.asarray(mesh.face_normals, float)
+    most = int(np.bincount(faces.ravel()).max())
+    if most * len(mesh.vertices) > MAX_AROUND:
+        raise SurfaceError(f"{most:,} of its {len(faces):,} triangles share one corner; mesh the surface more evenly")
+    around = np.asarray(mesh.vertex_faces)
+    sized = normals * np.asarray(mesh.area_faces, float)[:, None]
     found = np.empty((len(faces), 3, 3))
-    for corner in range(3):
-        near = around[faces[:, corner]]
-        smooth = np.einsum("fkx,fx->fk", mesh.face_normals[near], mesh.face_normals) > EDGE
-        found[:, corner] = np.einsum("fkx,fk->fx", sized[near], smooth & (near >= 0))
+    step = max(1, CHUNK // around.shape[1])
+    for first in range(0, len(faces), step):
+        part = slice(first, first + step)
+        for corner in range(3):
+            near = around[faces[part, corner]]
+            smooth = np.einsum("fkx,fx->fk", normals[near], normals[part]) > EDGE
+            found[part, corner] = np.einsum("fkx,fk->fx", sized[near], smooth & (near >= 0))
     sizes = np.linalg.norm(found, axis=2)[..., None]
-    return np.where(sizes > 0, found / np.where(sizes > 0, sizes, 1), np.asarray(mesh.face_normals)[:, None])
+    return np.where(sizes > 0, found / np.where(sizes > 0, sizes, 1), normals[:, None])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from contactfpga.body import urdf as urdf_file
 from contactfpga.body.plan import Plan
 from contactfpga.body.pose import Pose
 from contactfpga.inputs.values import shown
+from contactfpga.surfaces import SurfaceError, mesh_file
 from contactfpga.view.picture import rgb
 from contactfpga.view.stage import Stage, light
 from contactfpga.view.tiles import MM, Tiles, quaternions
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
 
 ROOT = "/robot"
 BONE = rgb(picture_style.GRAY)
+MESHES = (*mesh_file.SUFFIXES, mesh_file.COLLADA)
+MAX_MESHES = 1000
+MAX_MESH_BYTES = 100_000_000
+"""Of all meshes of a robot; they may have as many triangles as one alone."""
+REST = "what is beyond the limit of all meshes"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +83,7 @@ class RobotStage:
         self._frames: dict[str, Any] = {}
         self.unread: set[str] = set()
         """Kinds of mesh files that could not be read."""
+        self._meshes = self._mesh_bytes = self._triangles = 0
         scene = server.scene
         light(server, (1.0, -0.5, 1.0))
         names = [plan.frame for plan in body.links.values()]
@@ -92,13 +99,19 @@ class RobotStage:
             self.stages[name].rotation, self.stages[name].point_m = plan.pose.rotation, plan.pose.point_m
 
     def _add_mesh(self, visual: Visual) -> None:
-        import trimesh
-
         try:
-            mesh: Any = trimesh.load(str(visual.path), force="mesh")
-        except Exception:  # of many kinds: a format that another package reads, or a damaged file
-            self.unread.add(visual.path.suffix)
+            self._meshes += 1
+            self._mesh_bytes += visual.path.stat().st_size
+            if self._meshes > MAX_MESHES or self._mesh_bytes > MAX_MESH_BYTES:
+                raise SurfaceError(REST)
+            mesh = mesh_file.read(visual.path, "view", MESHES)
+            self._triangles += len(mesh.faces)
+            if self._triangles > mesh_file.MAX_TRIANGLES:
+                raise SurfaceError(REST)
+        except (SurfaceError, OSError) as error:
+            self.unread.add(REST if str(error) == REST else visual.path.suffix)
             return
+        mesh.merge_vertices()
         count = len(self._frames)
         self._frames[f"{visual.link}#{count}"] = self._server.scene.add_mesh_simple(
             f"{ROOT}/{visual.link}/mesh{count}",
@@ -123,7 +136,7 @@ class RobotStage:
         kinematics = self._body.kinematics
         if kinematics is None:
             return
-        poses = {name: kinematics.pose(name, angles) for name in kinematics.robot.links}
+        poses = kinematics.poses(angles)
         turns = quaternions(np.array([pose.rotation for pose in poses.values()]))
         for name, plan in self._body.links.items():
             mine = poses[plan.frame] @ plan.pose
@@ -131,6 +144,8 @@ class RobotStage:
         for (name, pose), wxyz in zip(poses.items(), turns):
             self._frames[name].wxyz, self._frames[name].position = wxyz, pose.point_m
         joints = kinematics.robot.joints.values()
+        if not joints:
+            return
         bones = np.array([(poses[joint.parent].point_m, poses[joint.child].point_m) for joint in joints])
         if self._bones is None:
             self._bones = self._server.scene.add_line_segments(

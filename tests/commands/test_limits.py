@@ -1,0 +1,246 @@
+"""What a file from a stranger may cost: memory and processor time are bounded, and a limit is told in one line."""
+
+import io
+import time
+import tomllib
+import tracemalloc
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contactfpga import Skin, SkinError
+from contactfpga.body import Body, BodyError, packed, urdf
+from contactfpga.body.kinematics import Kinematics
+from contactfpga.inputs import tomlfile, xmlfile
+from contactfpga.surfaces import SurfaceError, mesh_file
+from contactfpga.surfaces.laying import Triangles
+
+DOTTED = f"a{'.a' * 300_000} = 1\n"
+"""The standard library's parser takes the square of this."""
+LONG_KEY = "a key has more than 16 parts with dots between; use shorter keys"
+
+
+class Cost:
+    """Seconds of this thread's processor, and the most bytes at a time, of what is done within."""
+
+    def __enter__(self):
+        tracemalloc.start()
+        self._begun_s = time.thread_time()
+        return self
+
+    def __exit__(self, *_):
+        self.cpu_s = time.thread_time() - self._begun_s
+        self.peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+
+
+# ---- TOML
+
+
+@pytest.mark.parametrize("read", [Skin.load, Body.load, lambda path: packed.pack(path)])
+def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, read):
+    path = tmp_path / "skin.toml"
+    path.write_text(DOTTED)
+    with Cost() as cost, pytest.raises((SkinError, BodyError)) as refused:
+        read(path)
+    assert str(refused.value) == f"{path}: {LONG_KEY}"
+    assert cost.cpu_s < 5
+
+
+def test_so_are_those_in_a_robot_of_a_recording(tmp_path):
+    with Cost() as cost, pytest.raises(BodyError, match=LONG_KEY):
+        packed.unpack({packed.TOML: DOTTED}, tmp_path)
+    assert cost.cpu_s < 5
+
+
+PARTS = st.sampled_from(["a", "b-1", "_", '"x.y"', '"\\""', "'#'", '"[.]"', '"a\\\\"', "1"])
+TEXTS = st.text(st.sampled_from(list("ab.\"'#\\[]{}=,\n ")), max_size=40)
+
+
+@st.composite
+def documents(draw):
+    """A TOML text, and the parts of its longest key."""
+    lines, most = [], 0
+    for number in range(draw(st.integers(1, 4))):
+        parts = [f"k{number}", *draw(st.lists(PARTS, max_size=12) | st.lists(PARTS, min_size=16, max_size=20))]
+        key = draw(st.sampled_from([".", " . ", "\t.", ". "])).join(parts)
+        text, plain = draw(TEXTS), draw(TEXTS)
+        quoted = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+        long = text.replace("\\", "\\\\").replace('"', '\\"')
+        literal = plain.replace("'", "").replace("\n", "")
+        values = [
+            f'"{quoted}"', f"'{literal}'",
+            f'"""{long}"""', f'"""a"x{long}x""\\""""', f"'''{plain.replace(chr(39), '')}'''",
+            "1.5", "[1.5, 2.5, 3.5, -1e-3, 4.5, 1.5, 2.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5]",
+            f"{{a.b = '{literal}', c = 1.5}}",
+        ]  # fmt: skip
+        comment = draw(st.sampled_from(["", f"  # {literal}", '  # """' + ".a" * 20]))
+        lines.append(f"{key} = {draw(st.sampled_from(values))}{comment}\n")
+        most = max(most, len(parts))
+    return "".join(lines), most
+
+
+@given(documents())
+@settings(max_examples=300, deadline=None)
+def test_only_keys_of_many_parts_are_refused(document):
+    """Whatever stands in strings and comments; the parser says what a text is."""
+    text, most = document
+    values = tomllib.loads(text)
+    if most > tomlfile.MAX_DEPTH:
+        with pytest.raises(SkinError, match=LONG_KEY):
+            tomlfile.parse(text.encode(), "x", SkinError)
+    else:
+        assert tomlfile.parse(text.encode(), "x", SkinError) == values
+
+
+def test_the_longest_key_is_read():
+    deep = tomlfile.parse(f"a{'.a' * 15} = 1".encode(), "x", SkinError)
+    for _ in range(16):
+        deep = deep["a"]
+    assert deep == 1
+    with pytest.raises(SkinError, match=LONG_KEY):
+        tomlfile.parse(f"a{'.a' * 16} = 1".encode(), "x", SkinError)
+
+
+# ---- XML
+
+
+def chain(links):
+    joint = '<joint name="j{0}" type="revolute"><parent link="l{0}"/><child link="l{1}"/><origin xyz="0 0 1"/></joint>'
+    inside = [f'<link name="l{number}"/>' for number in range(links)]
+    inside += [joint.format(number, number + 1) for number in range(links - 1)]
+    return f"<robot name='chain'>{''.join(inside)}</robot>"
+
+
+def test_a_robot_of_very_many_links_is_refused(tmp_path):
+    path = tmp_path / "chain.urdf"
+    path.write_text(chain(20_000))
+    with Cost() as cost, pytest.raises(BodyError, match=f"^{path}: 20,000 links; the limit is 1,000$"):
+        urdf.load(path)
+    assert cost.cpu_s < 10
+
+
+def test_the_longest_chain_is_quick(tmp_path):
+    path = tmp_path / "chain.urdf"
+    path.write_text(chain(urdf.MAX_LINKS))
+    angles = {f"j{number}": 0.0 for number in range(urdf.MAX_LINKS)}
+    with Cost() as cost:
+        kinematics = Kinematics(urdf.load(path))
+        poses = kinematics.poses(angles)
+    assert cost.cpu_s < 10
+    last = f"l{urdf.MAX_LINKS - 1}"
+    assert poses[last].point_m[2] == kinematics.pose(last, angles).point_m[2] == urdf.MAX_LINKS - 1
+    assert len(poses) == urdf.MAX_LINKS
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-16-le", "utf-16-be", "latin-1"])
+def test_no_encoding_hides_a_document_type(tmp_path, encoding):
+    laughs = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&b;"/>'
+    mark = {"utf-16-le": b"\xff\xfe", "utf-16-be": b"\xfe\xff"}.get(encoding, b"")
+    path = tmp_path / "x.urdf"
+    path.write_bytes(mark + f'<?xml version="1.0" encoding="{encoding[:6]}"?>{laughs}'.encode(encoding))
+    with pytest.raises(BodyError, match=f"^{path}: it declares a document type"):
+        urdf.load(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "latin-1"])
+def test_other_encodings_are_read(tmp_path, encoding):
+    path = tmp_path / "x.urdf"
+    text = f'<?xml version="1.0" encoding="{encoding}"?><robot name="Zoé"><link name="é"/></robot>'
+    path.write_bytes(text.encode(encoding))
+    assert urdf.load(path).links == ("é",)
+
+
+@pytest.mark.parametrize("encoding", ["utf-7", "rot13", "no-such", "utf-32"])
+def test_an_unknown_encoding_is_refused_in_one_line(tmp_path, encoding):
+    path = tmp_path / "x.urdf"
+    path.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?><robot/>'.encode())
+    with pytest.raises(BodyError, match=f"^{path}: not a URDF file: [^\n]*$"):
+        urdf.load(path)
+
+
+def test_very_many_elements_are_refused(tmp_path):
+    path = tmp_path / "x.urdf"
+    path.write_text(f"<robot>{'<a/>' * (xmlfile.MAX_ELEMENTS + 1)}</robot>")
+    with pytest.raises(BodyError, match="more than 100,000 elements"):
+        urdf.load(path)
+
+
+# ---- meshes
+
+
+def zipped(name, size):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr(name, bytes(size))
+    return data.getvalue()
+
+
+def triangles(corners, faces):
+    """Bytes of a binary STL."""
+    points = np.asarray(corners, "<f4")[np.asarray(faces)]
+    data = b"".join(bytes(12) + face.tobytes() + bytes(2) for face in points)
+    return bytes(80) + len(faces).to_bytes(4, "little") + data
+
+
+DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><library_visual_scenes>
+<visual_scene id="s"><node id="n">{}</node></visual_scene></library_visual_scenes></COLLADA>"""
+
+
+@pytest.mark.parametrize("name", ["b.zip", "b.stl", "b.obj", "b.dae", "b.3mf", "b.tar.gz", "b.glb"])
+def test_archives_of_meshes_are_not_unpacked(tmp_path, name):
+    """A robot's file may name any file."""
+    pytest.importorskip("trimesh")
+    path = tmp_path / name
+    path.write_bytes(
+        zipped("3D/3dmodel.model" if name.endswith("3mf") else "a.dae" if name == "b.dae" else "a.stl", 10**8)
+    )
+    with Cost() as cost, pytest.raises(SurfaceError, match=f"^{path}: "):
+        mesh_file.read(path, "view", (*mesh_file.SUFFIXES, mesh_file.COLLADA))
+    assert cost.peak < 50e6
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("x.stl", bytes(mesh_file.MAX_BYTES + 1), "longer than 20,000,000 bytes"),
+        ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 3\n" * (mesh_file.MAX_TRIANGLES + 1), "500,001 triangles; the limit is"),
+        ("x.obj", b"v 0 0 0\n" * 3 + b"f 1 2 9\n", "x.obj: "),
+        ("x.dae", DAE.format('<instance_node url="#n"/>' * 2).encode(), "it shows a node at several places"),
+        ("x.dae", DAE.format('<instance_geometry url="#g"/>' * 900).encode(), "it shows one part at 900 places"),
+        ("x.dae", b"<!DOCTYPE x>" + DAE.encode(), "it declares a document type"),
+    ],
+)
+def test_meshes_beyond_a_limit_are_refused(tmp_path, name, data, said):
+    pytest.importorskip("trimesh")
+    path = tmp_path / name
+    path.write_bytes(data)
+    with pytest.raises(SurfaceError) as refused:
+        mesh_file.read(path, "view", (*mesh_file.SUFFIXES, mesh_file.COLLADA))
+    assert said in str(refused.value)
+
+
+def test_objects_of_thousands_of_groups_are_one_mesh(tmp_path):
+    """The library would take minutes for them; materials beside the file are not looked for."""
+    pytest.importorskip("trimesh")
+    path = tmp_path / "x.obj"
+    groups = "".join(f"o a{number}\nusemtl b{number}\nf 1/1 2/2/2 3//3\n" for number in range(10_000))
+    path.write_text(f"mtllib /etc/passwd\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n{groups}f 1 2 \\\n3\n")
+    with Cost() as cost:
+        assert len(mesh_file.read(path, "surface").faces) == 10_001
+    assert cost.cpu_s < 5
+
+
+def test_a_fan_of_very_many_triangles_is_refused(tmp_path):
+    """The library keeps a table as wide as the busiest corner."""
+    pytest.importorskip("trimesh")
+    angles = np.linspace(0, 6, 8001)
+    rim = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    path = tmp_path / "fan.stl"
+    path.write_bytes(triangles([[0, 0, 1], *rim], [(0, one, one + 1) for one in range(1, 8001)]))
+    with Cost() as cost, pytest.raises(SurfaceError, match="8,000 of its 8,000 triangles share one corner"):
+        Triangles.load(path)
+    assert cost.peak < 100e6
