@@ -9,6 +9,7 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga_hdl.scan import raster
+from contactfpga_hdl.scan.guard import Told
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
@@ -182,3 +183,42 @@ def test_a_whole_sheet_is_never_told_whatever_is_pressed(bench, rng):
     start = len(every) * frame
     pieces += [(clock, every[rng.randrange(64)], None) for clock in range(start, start + 20 * frame, 5)]
     assert set(told_words(skin, Timeline(pieces), start + 20 * frame, bench)) == {0}
+
+
+def test_what_is_told_is_kept_until_a_renewing_round_finds_it_well(bench, rng):
+    """Checks, rounds and turns at random, many in the same clock; against what the checks were, looked up."""
+    skin, cycles = SKINS["masked"], 6_000
+    rows, columns = skin.rows, skin.columns
+    ports = {"rows": rows, "columns": columns, "stuck": columns + 1, "checks_rows": rows, "checks_columns": 1,
+             "checks_stuck": 1, "round": 1, "turn": 1}  # fmt: skip
+    often = {"checks_rows": 0.3, "checks_columns": 0.1, "checks_stuck": 0.1, "round": 0.1}
+    given = {
+        name: [rng.getrandbits(bits) & rng.getrandbits(bits) for _ in range(cycles)] for name, bits in ports.items()
+    }
+    for name, share in often.items():
+        given[name] = [word if rng.random() < share else 0 for word in given[name]]
+    given["round"] = [int(rng.random() < 0.1) for _ in range(cycles)]
+    turned = [int(rng.random() < 0.04 or (ends and rng.random() < 0.2)) for ends in given["round"]]
+    given["turn"] = [count % 2 for count in itertools.accumulate(turned)]
+    dut = Told(skin)
+    sim = bench(dut)
+    for name in ports:
+        sim.drive(getattr(dut, name), given[name].__getitem__)
+    words = sim.watch(dut.faults)
+    sim.run(cycles - 1)
+
+    round_of = [0, *itertools.accumulate(given["round"])]
+    renewing = {round_of[cycle] + 1 for cycle in range(cycles) if turned[cycle]}
+    lines = [("rows", row, lambda cycle, row=row: given["checks_rows"][cycle] >> row & 1) for row in range(rows)]
+    lines += [("columns", column, given["checks_columns"].__getitem__) for column in range(columns)]
+    lines += [("stuck", column, given["checks_stuck"].__getitem__) for column in range(columns + 1)]
+    masked = {("rows", 0), ("columns", 1), ("stuck", 1)}
+    for place, (name, line, is_checked) in enumerate(lines):
+        told, expected = 0, []
+        for cycle in range(cycles - 1):
+            expected.append(told)
+            if is_checked(cycle):
+                kept = told and round_of[cycle] not in renewing
+                told = int((given[name][cycle] >> line & 1 or kept) and (name, line) not in masked)
+        assert [word >> place & 1 for word in words.values] == expected, (name, line)
+        assert sum(expected) > 0.05 * cycles or (name, line) in masked

@@ -1,5 +1,6 @@
 """The link: which packet goes out when, and what is in it, against a replay of the rules of docs/timing.md."""
 
+import itertools
 import struct
 import zlib
 from unittest import mock
@@ -22,6 +23,7 @@ from link_bench import (
 from sample import sample
 
 from contactfpga import Skin
+from contactfpga.skin.derived import KEEP_ALIVE_BIT, Derived
 from contactfpga_hdl.link import link as link_module
 from contactfpga_hdl.link import odometer
 
@@ -243,3 +245,30 @@ def test_the_epoch_is_counted_but_not_while_a_hello_tells_it(bench):
     for taken, epoch in told:
         assert epoch == sum(cycle < taken for cycle in epochs), taken
     assert told[-1][1] > 128
+
+
+def test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them(bench, rng):
+    """Of a scan that waits. Turns of the clock's bit come in any clock, most of them as it is decided whether a frame
+    is sent; the first frame is."""
+    skin, cycles = Skin(scan="reversal", precharge_us=1.0, send="on_change", keep_alive_ms=6.0), 6_000
+    decide = [int(rng.random() < 0.2) for _ in range(cycles)]
+    wanted = {name: [int(rng.random() < 0.03) for _ in range(cycles)] for name in ("changed", "requested")}
+    turned = [int(rng.random() < (0.2 if decided else 0.02)) for decided in decide]
+    turns = [count % 2 for count in itertools.accumulate(turned)]
+    dut = link_module.Link(skin)
+    sim = bench(dut)
+    sim.drive(dut.frames.decide, decide.__getitem__)
+    sim.drive(dut.summary.changed, wanted["changed"].__getitem__)
+    sim.drive(dut.tag.requested, wanted["requested"].__getitem__)
+    sim.drive(dut.time, lambda cycle: turns[cycle] << KEEP_ALIVE_BIT)
+    due, send = sim.watch(dut.due), sim.watch(dut.frames.verdict.send)
+    sim.run(cycles - 1)
+    most = Derived(skin).keep_alive_turns
+    passed = most
+    for cycle in range(cycles - 1):
+        is_due = passed >= most
+        sends = is_due or wanted["changed"][cycle] or wanted["requested"][cycle]
+        assert (due[cycle], send[cycle]) == (is_due, sends), cycle
+        passed = 0 if decide[cycle] and sends else passed + turned[cycle]
+    assert most > 2
+    assert 100 < sum(due.values) < cycles - 100

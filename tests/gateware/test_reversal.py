@@ -4,12 +4,25 @@ import random
 
 import numpy as np
 import pytest
-from reversal import any_skin, frames, held, pressed, projected, slots, small, touches, zones
+from reversal import (
+    any_skin,
+    frames,
+    held,
+    noted_pins,
+    pressed,
+    projected,
+    selected,
+    selected_changes,
+    slots,
+    small,
+    touches,
+    zones,
+)
 from toy_labeller import TOY
 
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import Widths
-from contactfpga_sim.cosim import bench_amaranth, record
+from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.covering import REVERSAL, pairwise, skin_for, stimulus
 from contactfpga_sim.golden import Timeline, Trace, driven, predict
@@ -19,26 +32,7 @@ COVERING = pairwise(REVERSAL)
 
 @pytest.fixture
 def pins(monkeypatch) -> list[dict[str, int]]:
-    """Levels of the top's outputs to the sheet, cycle by cycle, of a board in Amaranth's simulator."""
-    noted: list[dict[str, int]] = []
-    step = record.Stimulus.pins
-
-    def note(self, cycle, levels):
-        noted.append(dict(levels))
-        return step(self, cycle, levels)
-
-    monkeypatch.setattr(record.Stimulus, "pins", note)
-    return noted
-
-
-def selected(skin: Skin, levels: dict[str, int]) -> int:
-    """Rows that are driven to the selecting level."""
-    return levels["rows_drive"] & (~levels["rows"] if skin.selects_low else levels["rows"])
-
-
-def changes(skin: Skin, pins: list[dict[str, int]]) -> list[tuple[int, int]]:
-    words = [selected(skin, levels) for levels in pins]
-    return [(cycle, word) for cycle, word in enumerate(words) if word != (words[cycle - 1] if cycle else 0)]
+    return noted_pins(monkeypatch)
 
 
 def check_pins(skin: Skin, pins: list[dict[str, int]]) -> None:
@@ -111,9 +105,9 @@ def check_life(skin: Skin, rng: random.Random, cycles: int, pins: list[dict[str,
     trace = bench_amaranth.run(skin, timeline, cycles)
     count = compare(predict(skin, timeline, cycles), trace)
     check_pins(skin, pins)
-    assert changes(skin, pins) == driven(skin, timeline, cycles)
+    assert selected_changes(skin, pins) == driven(skin, timeline, cycles)
     if skin.debounce == "none":
-        check_truth(skin, timeline, trace, changes(skin, pins))
+        check_truth(skin, timeline, trace, selected_changes(skin, pins))
     return count
 
 
@@ -125,6 +119,7 @@ SAMPLE = [
     {"rows": 5, "columns": 4, "labeller": "single", "send": "always"},
     {"rows": 4, "columns": 5, "labeller": TOY.name, "send": "always"},
     {"rows": 4, "columns": 64, "labeller": "serial", "connectivity": 4},
+    {"rows": 3, "columns": 4, "labeller": "run", "precharge_us": 1.2},
     {"rows": 6, "columns": 2, "labeller": "projection", "report": "barycenter", "send": "always", "baud": 3_000_000},
 ]
 

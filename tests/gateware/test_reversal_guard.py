@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from amaranth.hdl import Cat
-from reversal import FAST, any_skin, checked_soon, small, touches
+from reversal import FAST, any_skin, checked_soon, noted_pins, selected_changes, small, touches
 from sample import sample
 
 from contactfpga.skin import Skin
@@ -16,7 +16,7 @@ from contactfpga_sim.board.received import frames_in
 from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.cosim.record import Stimulus
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.golden import Timeline, driven, predict
 from contactfpga_sim.golden import reversal_guard as golden_guard
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.trace import Cuts
@@ -98,10 +98,22 @@ LOCKSTEP = [
 
 
 @pytest.mark.parametrize("fields", LOCKSTEP, ids=lambda fields: f"{fields['rows']}x{fields['columns']}")
-def test_the_whole_board_is_the_golden_models_in_every_clock(rng, soon, fields):
+def test_the_whole_board_is_the_golden_models_in_every_clock(rng, monkeypatch, soon, fields):
     skin, cycles = small(**fields, guard=True), 1600
-    timeline = any_life(rng, skin, cycles)
+    timeline, pins = any_life(rng, skin, cycles), noted_pins(monkeypatch)
     assert compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles)) > 150
+    assert selected_changes(skin, pins) == driven(skin, timeline, cycles)
+
+
+def test_checks_at_rest_wait_for_a_turn_after_the_check_of_a_frame(monkeypatch, soon):
+    """The frame's begins in each clock of the time between two turns, also in that of a turn."""
+    skin, spacing = small(rows=2, columns=2, project_us=2.0, **SLOW | {"baud": 500_000}), 3 * 32 + 1
+    pieces = []
+    for start in range(60, 33 * spacing, spacing):
+        pieces += [(start, np.eye(2, dtype=bool), None), (start + 9, np.zeros((2, 2), bool), None)]
+    timeline, pins, cycles = Timeline(pieces), noted_pins(monkeypatch), 33 * spacing
+    compare(predict(skin, timeline, cycles), bench_amaranth.run(skin, timeline, cycles))
+    assert selected_changes(skin, pins) == driven(skin, timeline, cycles)
 
 
 @pytest.mark.campaign

@@ -64,6 +64,7 @@ class Life:
     """Cycles in which a frame was packed."""
     contact: list[int]
     stuck: list[int]
+    motion: list[int]
 
 
 def live(skin: Skin, at, cycles: int, ready=None, late=lambda: 2) -> Life:
@@ -85,14 +86,14 @@ def live(skin: Skin, at, cycles: int, ready=None, late=lambda: 2) -> Life:
         return int(cycle in ends[-2:])
 
     bench.drive(dut.packed, is_packed)
-    contact, stuck = bench.watch(dut.contact), bench.watch(dut.tag.stuck)
+    contact, stuck, motion = (bench.watch(port) for port in (dut.contact, dut.tag.stuck, dut.tag.motion))
     bench.run(cycles)
     words = sheet.selected
     changes = [(cycle, word) for cycle, word in enumerate(words) if word != (words[cycle - 1] if cycle else 0)]
     taken = [
         (cycle, word >> last + 1, word & (1 << last) - 1, bool(word >> last & 1)) for cycle, word in sink.transfers
     ]
-    return Life(sheet, slots(changes, cycles), taken, ends, contact.values, stuck.values)
+    return Life(sheet, slots(changes, cycles), taken, ends, contact.values, stuck.values, motion.values)
 
 
 def changing(rng, skin: Skin, cycles: int, lifts: bool = False):
@@ -143,6 +144,24 @@ def check_rows(skin: Skin, life: Life, at) -> int:
     return len(given)
 
 
+def check_motion(skin: Skin, life: Life, at) -> set[bool]:
+    """A frame tells of motion where a row that it drove had no pressed cell, but not of rows with a masked switch; an
+    untouched sheet does not. Returns what frames told."""
+    told = {False}
+    driven = frames(life.slots, life.ends)
+    ends = [end for end in life.ends if end < len(life.motion)]
+    begun = [next((end for end in ends if end > frame[-1].sample), None) for frame in driven]
+    for frame, end in zip(driven, begun):
+        if end is None:
+            continue  # under way
+        clean = [slot for slot in frame if present(skin, slot.row) == (1 << skin.columns) - 1]
+        moved = any(not at(slot.sample).cells[slot.row] for slot in clean)
+        assert life.motion[end] == moved, frame
+        told.add(moved)
+    assert not any(life.motion[end] for end in ends if end not in begun)
+    return told
+
+
 def check_pins(life: Life) -> None:
     """While columns are driven, in the clock before and in the one after, no row is selected; one is at most."""
     for cycle, rows in enumerate(life.sheet.selected):
@@ -165,6 +184,7 @@ def test_a_scan_waits_for_rows_and_frames_with_its_lines_safe_and_loses_nothing(
     at = changing(rng, skin, CYCLES + 1)
     life = live(skin, at, CYCLES, lambda cycle: rng.random() >= share, lambda: rng.choice([1, 2, 30, 200]))
     assert check_rows(skin, life, at) > 3
+    check_motion(skin, life, at)
     check_pins(life)
 
 
@@ -175,6 +195,7 @@ def test_rows_that_read_touched_for_no_reason_cost_slots_and_change_nothing_else
     at = changing(rng, skin, CYCLES + 1, lifts=True)
     life = live(skin, at, CYCLES)
     assert check_rows(skin, life, at) > 3
+    assert check_motion(skin, life, at) == {False, True}
     check_pins(life)
     empty = [slot for slot in life.slots if not at(slot.sample).cells[slot.row]]
     assert len(empty) > 3

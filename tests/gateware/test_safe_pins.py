@@ -1,10 +1,13 @@
 """What a fault does to the pins: ``contact`` with ``fail_safe``, and ``alive``."""
 
+import itertools
+
 import numpy as np
 import pytest
 from sample import sample
 
 from contactfpga import Skin
+from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.scan import raster
 from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
@@ -86,3 +89,25 @@ def test_without_fail_safe_a_fault_leaves_contact_low():
     skin, cut = GUARDED.replace(fail_safe=False), Timeline([], cuts=[(100, Cuts({}, {0: 0}))])
     trace = bench_amaranth.run(skin, cut, 1_500)
     assert (trace.contact, trace.alive) == ([], [])
+
+
+def test_alive_turns_where_all_was_well_since_the_last_tick(bench, rng):
+    """Also where all is well in the clock of a tick, before it or after it, or while a fault is told."""
+    cycles, period = 6_000, 7
+    well = [int(rng.random() < 0.15) for _ in range(cycles)]
+    fault = [int(rng.random() < 0.1) for _ in range(cycles)]
+    dut = Alive(1)
+    dut.tick_clocks = period
+    sim = bench(dut)
+    sim.drive(dut.well, well.__getitem__)
+    sim.drive(dut.fault, fault.__getitem__)
+    pin = sim.watch(dut.pin)
+    sim.run(cycles - 1)
+    level, expected = 0, []
+    for cycle in range(cycles - 1):
+        expected.append(level)
+        if cycle % period == period - 1:
+            since = range(max(0, cycle - period), cycle)
+            level ^= any(well[seen] and not any(fault[seen:cycle]) for seen in since)
+    assert pin.values == expected
+    assert 100 < sum(one != other for one, other in itertools.pairwise(expected)) < cycles // period - 100

@@ -4,10 +4,14 @@ import itertools
 
 import numpy as np
 import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
 from sample import sample
 
 from contactfpga import Skin
 from contactfpga.skin.derived import SAMPLE_AT, Derived
+from contactfpga_hdl.scan.sample_at import SampleAt, sample_at_ports
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
 from contactfpga_sim.golden import Timeline, predict
@@ -82,3 +86,43 @@ def test_the_whole_board_is_the_golden_models_in_every_clock(name):
     plain = predict(skin, Timeline(timeline.pieces, (), timeline.cuts), cycles)
     assert [row[1] for row in expected.rows] != [row[1] for row in plain.rows], "no sample was moved"
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
+
+
+class Alone(wiring.Component):
+    """What obeys the command, without a scan."""
+
+    def __init__(self, skin: Skin):
+        self.derived = Derived(skin)
+        outputs = {"begins": In(1), "clock": Out(range(self.derived.settle_clocks + 1)), "early": Out(1)}
+        super().__init__(sample_at_ports(self.derived) | outputs)
+
+    def elaborate(self, platform):
+        m = Module()
+        chosen = SampleAt(m, self.derived, self.moves, self.clocks, self.begins)
+        m.d.comb += [self.clock.eq(chosen.clock), self.early.eq(chosen.early)]
+        return m
+
+
+def test_a_frame_takes_the_last_clock_that_was_asked_for_before_it_begins(bench, rng):
+    skin, cycles = SKINS["direct"], 3_000
+    settle, first = facts(skin).settle, facts(skin).first_sample
+    values = [
+        rng.choice([rng.randrange(settle + 3), rng.randrange(1 << 21), settle, settle - 1]) for _ in range(cycles)
+    ]
+    moves, begins = ([int(rng.random() < 0.3) for _ in range(cycles)] for _ in range(2))
+    dut = Alone(skin)
+    sim = bench(dut)
+    for port, given in ((dut.moves, moves), (dut.clocks, values), (dut.begins, begins)):
+        sim.drive(port, given.__getitem__)
+    clock, early = sim.watch(dut.clock), sim.watch(dut.early)
+    sim.run(cycles - 1)
+    asked = taken = settle
+    expected = []
+    for moved, value, begun in zip(moves, values, begins):
+        expected.append(taken)
+        taken = asked if begun else taken
+        if moved:
+            asked = value if first <= value < settle else settle
+    assert clock.values == expected[:-1]
+    assert early.values == [int(one < settle) for one in expected[:-1]]
+    assert {*expected} == {*range(first, settle + 1)}

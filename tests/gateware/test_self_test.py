@@ -11,6 +11,7 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.zones.self_test import SelfTest
+from contactfpga_hdl.scan import self_test as gateware
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.cosim import bench_amaranth
 from contactfpga_sim.cosim.compare import compare
@@ -201,3 +202,47 @@ def test_the_first_frame_comes_after_the_self_test_in_the_stated_time():
     without = predict(skin.replace(self_test=False), Timeline([]), 2000)
     later = (1 + 3 + 4) * (2 * known.project + known.settle + 8)
     assert trace.rows[0][0] - without.rows[0][0] == later
+
+
+def test_what_is_told_follows_from_each_slot_of_one_test_after_the_other(bench, rng):
+    """Lines that rise come and go in any clock, in most tests none. A column that rises in the first slot says nothing
+    in that test; a row that does with no column is joined with the supply. A whole test without a finding ends it."""
+    skin, cycles = small(rows=3, columns=2, self_test=True, mask=((0, 1), (1, 1), (2, 1))), 30_000
+    count, known = 3 + 2, facts(skin)
+    dut = gateware.SelfTest(skin)
+    sim = bench(dut)
+    calm = [rng.random() < 0.7 for _ in range(cycles // 200 + 1)]
+
+    def rises(bits):
+        words = [rng.getrandbits(bits) & rng.getrandbits(bits) & rng.getrandbits(bits) for _ in range(cycles)]
+        return [0 if calm[cycle // 200] and rng.random() < 0.99 else word for cycle, word in enumerate(words)]
+
+    rows, columns = rises(3), rises(2)
+    sim.drive(dut.rows, rows.__getitem__)
+    sim.drive(dut.columns, columns.__getitem__)
+    sim.drive(dut.begin, lambda cycle, asks: int(asks and rng.random() < 0.7), dut.asks)
+    sim.drive(dut.command, lambda cycle: int(rng.random() < 0.02))
+    sim.sink(dut.slots, rng, 0.3)
+    ends, number, joined = sim.watch(dut.ends), sim.watch(dut.slots.payload.number), sim.watch(dut.joined)
+    sim.run(cycles - 1)
+
+    told, expected, first, found, tests = 0, [], 0, False, []
+    for cycle in range(cycles - 1):
+        expected.append(told)
+        if not ends[cycle]:
+            continue
+        line = number[cycle] - 1
+        counts = rows[cycle] | (columns[cycle] & 1) << 3  # the other column is masked whole
+        if line < 0:
+            first, found = rows[cycle] | columns[cycle] << 3, False
+            bad = bool(counts & 7 and not counts >> 3)
+        else:
+            bad = bool(counts & ~first & ~(1 << line) & (0b11111 if line < 3 else 0b11000))
+        found |= bad
+        told |= bad
+        if line == count - 1:
+            told = int(found)
+            tests.append((bool(first), found))
+    assert joined.values == expected
+    assert {(False, False), (False, True), (True, False), (True, True)} <= {*tests}
+    assert known.project + known.settle < cycles // 200

@@ -10,15 +10,17 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.scan import raster
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.units import Units
 from contactfpga_sim.cosim import bench_amaranth, bench_native
 from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict, units
+from contactfpga_sim.golden import Timeline, guard, predict, units
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.hello import State
 from contactfpga_sim.golden.link import Link
 from contactfpga_sim.golden.request import Heard, Request, command
+from contactfpga_sim.golden.trace import Cuts
 from contactfpga_sim.sheet import converter
 
 SMALL = {"rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000}
@@ -37,9 +39,10 @@ SKINS = {
         alive=True,
     ),
     "adaptive": Skin(**SMALL | {"settle_us": 30}, units=4, scan="adaptive", unit_sums=[[1, 1, 1, 1]] * 2),
+    "guard": Skin(**SMALL | {"baud": 500_000, "send": "on_change"}, units=2, guard=True),
 }
 ALONE = {
-    "one unit": Skin(**SMALL, units=1),
+    "one unit": Skin(**SMALL, units=1, unit_sums=[[1], [-1], [2]]),
     "four sums": SKINS["sums"],
     "12 MHz at 5 V": Skin(units=2, converter_v=5.0, unit_sums=[[1, 1]]),
     "eight units": Skin(**SMALL, units=8, unit_sums=[[127] * 8]),
@@ -57,10 +60,10 @@ def readings(rng, skin, cycles):
 
 
 def setting(rng, skin):
-    """(what, value) of a command that some readings reach, now and then of a unit that is not there."""
+    """(what, value) of a command that some readings reach, now and then of a unit or a sum that is not there."""
     what = rng.choice([ZERO, THRESHOLD, THRESHOLD, SUM_THRESHOLD, SUM_THRESHOLD, 1])
     number = rng.choice([0, rng.randrange(4096), rng.randrange(2**18)])
-    return what, rng.randrange(skin.units + 1) % 8 | number << 3
+    return what, rng.randrange(max(skin.units, len(skin.unit_sums)) + 1) % 8 | number << 3
 
 
 class Inputs:
@@ -80,9 +83,14 @@ class Inputs:
         pass
 
 
-@pytest.mark.parametrize("name", sample(SKINS, quick=["sums", "fail safe"]))
-def test_board_does_what_the_golden_model_says(name):
-    skin, cycles = SKINS[name], 3_000
+@pytest.mark.parametrize("name", sample(SKINS, quick=["sums", "fail safe", "guard"]))
+def test_board_does_what_the_golden_model_says(name, monkeypatch):
+    """With guard lines for longer than the first hello. What is told of them is renewed every 256 us, so that reports
+    and readings wait together."""
+    monkeypatch.setattr(raster, "RETRY_BIT", 8)
+    monkeypatch.setattr(guard, "RETRY_US", 2**8)
+    skin = SKINS[name]
+    cycles = 5_000 if skin.guard else 3_000
     rng = random.Random(3)
     received, at, number, bit = [], 30, 129 * 128 + 1, skin.clock_hz // skin.baud
     while at < cycles:
@@ -91,7 +99,8 @@ def test_board_does_what_the_golden_model_says(name):
         at += 10 * bit * len(data) + rng.randrange(50)
         number += 2 if number % 8 == 7 else 1
     touches = [(cycle, np.array([[0, rng.random() < 0.2]] * 2, bool), None) for cycle in range(0, cycles, 700)]
-    timeline = Timeline(touches, received, units=readings(rng, skin, cycles))
+    cuts = [(at, Cuts({rng.randrange(3): rng.randrange(3)})) for at in range(0, cycles, 230)] if skin.guard else []
+    timeline = Timeline(touches, received, cuts, readings(rng, skin, cycles))
     expected = predict(skin, timeline, cycles)
     assert compare(expected, bench_amaranth.run(skin, timeline, cycles)) > 100
     assert len(expected.contact) >= 2
@@ -134,7 +143,8 @@ def sweep_of(readings, data):
 
 
 def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rng):
-    """Each sweep reads numbers that say which one it is."""
+    """Each sweep reads numbers that say which one it is. Some are complete in the clock in which the one before is
+    taken."""
     skin, cycles = SKINS["sums"], 9_000
     sweep = Derived(skin).units.sweep_clocks
     timeline = Timeline([], units=[(3 + n * sweep, [3 * n, 3 * n + 1, 3 * n + 2]) for n in range(cycles // sweep)])
@@ -149,7 +159,8 @@ def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rn
         taken = bool(due) and cycle >= state["until"]
         if taken:
             starts.append(cycle)
-            state["until"] = cycle + 20 + rng.choice([0, 1, 5, 60, 100, 119, 300])
+            meets = next((later - 1 for later in ready if later > cycle + 20 + sweep), cycles)
+            state["until"] = rng.choice([meets, cycle + 20 + rng.choice([0, 1, 5, 60, 100, 119, 300])])
         return int(taken)
 
     sim.drive(dut.packet.taken, take, dut.packet.due)
@@ -166,6 +177,7 @@ def test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it(bench, rn
         assert (read, sequence) == ([3 * newest, 3 * newest + 1, 3 * newest + 2], newest % 256)
         assert time_us == 3 + newest * sweep + 12
     assert len(whole) > 20
+    assert len({start + 1 for start in whole} & {*ready}) > 3
 
 
 LIMITS = {2.7: (1_000_000, 1e-6), 3.3: (1_000_000, 1e-6), 5.0: (2_000_000, 0.5e-6)}

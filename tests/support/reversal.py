@@ -10,6 +10,7 @@ from contactfpga import examples
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.precharge import Precharge
+from contactfpga_sim.cosim import record
 from contactfpga_sim.golden import Timeline, requests
 from contactfpga_sim.golden import reversal as golden
 from contactfpga_sim.golden import reversal_guard as golden_guard
@@ -51,6 +52,30 @@ def never_let_go(monkeypatch) -> None:
         return m
 
     monkeypatch.setattr(Precharge, "elaborate", wrong)
+
+
+def noted_pins(monkeypatch) -> list[dict[str, int]]:
+    """Levels of the top's outputs to the sheet, cycle by cycle, of each board that is put into Amaranth's simulator."""
+    noted: list[dict[str, int]] = []
+    step = record.Stimulus.pins
+
+    def note(self, cycle, levels):
+        noted.append(dict(levels))
+        return step(self, cycle, levels)
+
+    monkeypatch.setattr(record.Stimulus, "pins", note)
+    return noted
+
+
+def selected(skin: Skin, levels: dict[str, int]) -> int:
+    """Rows that are driven to the selecting level."""
+    return levels["rows_drive"] & (~levels["rows"] if skin.selects_low else levels["rows"])
+
+
+def selected_changes(skin: Skin, pins: list[dict[str, int]]) -> list[tuple[int, int]]:
+    """(cycle, rows) of every change of the rows that are driven to the selecting level."""
+    words = [selected(skin, levels) for levels in pins]
+    return [(cycle, word) for cycle, word in enumerate(words) if word != (words[cycle - 1] if cycle else 0)]
 
 
 def any_skin(rng) -> Skin:

@@ -31,11 +31,11 @@ def keep_alive(m: Module, link: wiring.Component) -> None:
             m.d.sync += turns.eq(0)
         return
     limit = link.derived.keep_alive_frames
-    idle = Signal(range(limit), init=limit - 1)  # since the last frame sent
-    waited, due = _wait(link, idle, limit)
+    pause = Signal(range(limit), init=limit - 1)  # since the last frame sent
+    waited, due = _wait(link, pause, limit)
     m.d.comb += link.due.eq(due)
     with m.If(decide):
-        m.d.sync += idle.eq(Mux(sends, 0, waited))
+        m.d.sync += pause.eq(Mux(sends, 0, waited))
 
 
 def _turns(m: Module, link: wiring.Component, bit: int) -> Value:

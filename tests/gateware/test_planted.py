@@ -1,0 +1,170 @@
+"""Faults that once passed the default tests: each is planted in a copy of the gateware, and its tests fail there."""
+
+from typing import NamedTuple
+
+import planted
+import pytest
+
+
+class Fault(NamedTuple):
+    """``old``, which is there once, is replaced by ``new``; then one of ``tests`` fails."""
+
+    file: str
+    old: str
+    new: str
+    tests: tuple[str, ...]
+
+
+GATEWARE = "tests/gateware"
+FORMAL = "tests/proofs/test_formal.py::test_the_claim_holds"
+FAULTS = {
+    "readings go out with a report": Fault(
+        "link/link.py",
+        "hello_due | wire.take_report | regions.waits & ~turn",
+        "hello_due | regions.waits & ~turn",
+        (f"{GATEWARE}/test_units.py::test_board_does_what_the_golden_model_says",),
+    ),
+    "a sweep's region is written as it goes out": Fault(
+        "units/pack.py",
+        "filling.eq(Mux(packet.taken, sending, waiting))",
+        "filling.eq(waiting)",
+        (f"{GATEWARE}/test_units.py::test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it",),
+    ),
+    "a threshold of one high bit is none": Fault(
+        "units/settings.py",
+        "given[place].eq(number != 0)",
+        "given[place].eq(number[:17] != 0)",
+        (f"{FORMAL}[thresholds of units, 3 units]",),
+    ),
+    "sums of a lone unit go on": Fault(
+        "units/sums.py",
+        "Mux(first, 0, totals[0])",
+        "Mux(first & (self.sum == 0), 0, totals[0])",
+        (f"{GATEWARE}/test_units.py::test_readings_and_thresholds_are_the_golden_models_in_every_clock",),
+    ),
+    "a test keeps the finding of the one before": Fault(
+        "scan/self_test.py",
+        "found.eq(bad | found & ~first)",
+        "found.eq(bad | found)",
+        (f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other",),
+    ),
+    "a line that rises by itself follows others": Fault(
+        "scan/self_test.py",
+        " & ~line & ~rises)",
+        " & ~line)",
+        (f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other",),
+    ),
+    "a row that rises with a column is bad": Fault(
+        "scan/self_test.py",
+        "rows.any() & ~columns.any()",
+        "rows.any()",
+        (f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other",),
+    ),
+    "a long precharge is cut": Fault(
+        "scan/reversal_turns.py",
+        "min(charge - 1, charge - derived.precharge_clocks + self.listened)",
+        "charge - 1",
+        (f"{GATEWARE}/test_reversal.py::test_gateware_does_what_the_golden_model_says_and_frames_are_true",),
+    ),
+    **{
+        f"motion without {left_out}": Fault(
+            "scan/reversal_rows.py",
+            "m.If(turn.strobe & ~pressed.any() & counts)",
+            f"m.If({condition})",
+            (f"{GATEWARE}/test_reversal_scanner.py",),
+        )
+        for left_out, condition in {
+            "a sample": "~pressed.any() & counts",
+            "an empty row": "turn.strobe & counts",
+            "a whole row": "turn.strobe & ~pressed.any()",
+        }.items()
+    },
+    "motion stays": Fault(
+        "scan/reversal_rows.py",
+        "        m.d.sync += moved.eq(0)\n",
+        "        m.d.sync += moved.eq(moved)\n",
+        (f"{GATEWARE}/test_reversal_scanner.py",),
+    ),
+    "a turn in a check asks for another one": Fault(
+        "scan/reversal_guard.py",
+        "checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts)",
+        "checks.asked.eq(checks.asked & ~checks.starts | turned(m, scan.time[CHECK_BIT]))",
+        (f"{GATEWARE}/test_reversal_guard.py::test_checks_at_rest_wait_for_a_turn_after_the_check_of_a_frame",),
+    ),
+    "a turn in a round's last clock is lost": Fault(
+        "scan/guard.py",
+        "renewing.eq(turned | turns)",
+        "renewing.eq(turned)",
+        (f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well",),
+    ),
+    "a turn in a round's last clock counts twice": Fault(
+        "scan/guard.py",
+        "renewing.eq(turned | turns), turned.eq(0)]",
+        "renewing.eq(turned | turns), turned.eq(turns)]",
+        (f"{GATEWARE}/test_guard.py::test_what_is_told_is_kept_until_a_renewing_round_finds_it_well",),
+    ),
+    "a clock early is not early": Fault(
+        "scan/sample_at.py",
+        "self.early.eq(asked != settle)",
+        "self.early.eq(asked < settle - 1)",
+        (f"{GATEWARE}/test_sample_at.py::test_a_frame_takes_the_last_clock_that_was_asked_for_before_it_begins",),
+    ),
+    "a turn in a decision is lost": Fault(
+        "link/due.py",
+        "m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due)",
+        "m.If(_turns(m, link, KEEP_ALIVE_BIT) & ~link.due & ~decide)",
+        (f"{GATEWARE}/test_link.py::test_a_keep_alive_is_due_after_its_turns_whatever_comes_with_them",),
+    ),
+    "what was well in a fault counts": Fault(
+        "link/alive.py",
+        "(seen & ~ticks | self.well) & ~self.fault",
+        "(seen & ~ticks & ~self.fault) | self.well",
+        (f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick",),
+    ),
+}
+
+PROVED = {
+    "a restart is over with a frame that is packed, not with one that is left out": Fault(
+        "top.py",
+        "blind & ~_packed(packer)",
+        "blind & ~packer.frames.commit",
+        (f"{FORMAL}[the first frame is sent, raster]",),
+    ),
+}
+"""Faults that change nothing, and the proofs that say why. Here the first frame after a restart is always packed."""
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_planted_fault_is_noticed(name):
+    fault = FAULTS[name]
+    with planted.planted({fault.file: planted.replaced(fault.file, fault.old, fault.new)}) as root:
+        noticed, said = planted.notice(root, fault.tests, 250)
+    assert noticed, said
+
+
+@pytest.mark.parametrize("name", [*FAULTS, *PROVED])
+def test_a_fault_can_be_planted(name):
+    """Its text is in the source, once."""
+    fault = {**FAULTS, **PROVED}[name]
+    assert planted.replaced(fault.file, fault.old, fault.new)
+
+
+def test_text_that_is_not_there_once_cannot_be_replaced():
+    with pytest.raises(ValueError, match=r"link/alive\.py has 0 times, not once: no such text"):
+        planted.replaced("link/alive.py", "no such text", "")
+    with pytest.raises(ValueError, match="not once: self"):
+        planted.replaced("link/alive.py", "self", "")
+
+
+def test_a_copy_is_what_is_tested():
+    """Of a test that needs no gateware but for its import."""
+    test = [f"{GATEWARE}/test_safe_pins.py::test_alive_turns_where_all_was_well_since_the_last_tick"]
+    with planted.planted({}) as root:
+        assert planted.notice(root, test, 250)[0] is False
+    with planted.planted({"link/alive.py": "raise ValueError('planted')"}) as root:
+        noticed, said = planted.notice(root, test, 250)
+        assert noticed
+        assert "planted" in said
+        with pytest.raises(RuntimeError, match="status 4"):
+            planted.notice(root, ["tests/gateware/test_no_such_file.py"], 250)
