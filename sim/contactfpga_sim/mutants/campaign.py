@@ -169,7 +169,8 @@ def _run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> 
 def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
     """As :func:`examine`, or what it found before with the same code."""
     skin = OPTIONS[name][0] if name in OPTIONS else SKINS[name]
-    key = f"{name}, {each} of {seed}, {long_s} s, {kept.sources(skin)}"
+    code = kept.made_by("contactfpga_sim.mutants.campaign", skin)  # this module, which may have been run
+    key = f"{name}, {each} of {seed}, {long_s} s, {code}"
     found = kept.kept(
         "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]
     )

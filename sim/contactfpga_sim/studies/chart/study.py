@@ -178,7 +178,7 @@ def _size(skin: Skin) -> sizes.Size:
 
 
 def _key(task: Task, kind: str, number: int) -> str:
-    return f"{kept.sources(task.skin)} {kind} {number} {task.count} {task.seed} {task.checked} {task.family}"
+    return f"{kept.made_by(__name__, task.skin)} {kind} {number} {task.count} {task.seed} {task.checked} {task.family}"
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[int]:

@@ -68,6 +68,6 @@ def _method(trial: Trial) -> list[tuple[str, object]]:
 
 def luts_of(skin: Skin) -> int:
     """LUT4 of the whole design on the :data:`DEVICE`; takes some seconds where they are not kept."""
-    key = f"{kept.sources(skin)} {DEVICE}"  # spares looking at the netlist of the same Skin again
+    key = f"{kept.made_by(__name__, skin)} {size.tools(DEVICE)}"  # spares looking at the netlist of the same Skin again
     found: int = kept.kept("fit-luts", key, lambda: size.luts(lambda: Top(skin), DEVICE))
     return found

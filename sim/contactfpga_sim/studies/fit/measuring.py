@@ -47,4 +47,4 @@ def speed_of(task: Task, source: Source, skin: Skin, others: bool, checked: int)
 
 
 def _key(task: Task, source: Source, skins: Sequence[Skin], *more: Any) -> str:
-    return "\n".join((*map(kept.sources, (*skins, task.base)), repr(source), repr(more)))
+    return "\n".join((kept.made_by(__name__, *skins, task.base), repr(source), repr(more)))

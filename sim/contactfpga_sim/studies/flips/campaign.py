@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import functools
-import hashlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -12,8 +11,6 @@ from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import NamedTuple
 
-import contactfpga
-from contactfpga_sim.board import native
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.flips import designs, flip
 from contactfpga_sim.studies.flips.flip import Found
@@ -59,7 +56,7 @@ def _block(design: str, memory: bool, block: int) -> list[Found]:
 
 
 def _key(design: str, memory: bool, block: int) -> str:
-    return repr((_sources(), native.skin_key(designs.skin(design)), memory, block))
+    return repr((kept.made_by(__name__, designs.skin(design)), memory, block))
 
 
 def finished(names: Iterable[str]) -> list[Row]:
@@ -77,19 +74,6 @@ def finished(names: Iterable[str]) -> list[Row]:
 @functools.lru_cache(maxsize=len(designs.DESIGNS))
 def _reference(design: str) -> Reference:
     return Reference(designs.skin(design))
-
-
-@functools.cache
-def _sources() -> str:
-    """Digest of what decides how flips are drawn, followed and judged, beside the gateware."""
-    digest = hashlib.sha256()
-    here, host = Path(__file__).parent, Path(str(contactfpga.__file__)).parent
-    files = [here / f"{name}.py" for name in ("touches", "reference", "flip")]
-    for folder in ("driver", "wire", "zones"):
-        files += sorted((host / folder).glob("*.py"))
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def write(rows: Iterable[Row], path: Path) -> None:

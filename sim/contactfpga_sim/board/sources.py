@@ -1,0 +1,198 @@
+"""What something was made by, for keys of what is kept: modules with all that they import, and the packages they use.
+
+Imports are read out of the text, and nothing is imported for it.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import functools
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import re
+import sys
+import sysconfig
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from contactfpga.errors import MissingExtra
+
+HOST, GATEWARE, SIMULATION = PACKAGES = ("contactfpga", "contactfpga_hdl", "contactfpga_sim")
+
+# What only types need does nothing.
+_TYPES = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t]+.*\n|\n)+", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*((?:from[ \t]+\S+[ \t]+import[ \t]*\([^)]*\)|from\b|import\b).*)", re.MULTILINE)
+_WORD = re.compile(r"\bimport\b")
+# Where a choice is; it is loaded from there.
+_PLACE = re.compile(r"""\b(contactfpga\w*(?:\.\w+)+):\w+["']""")
+
+_taken: dict[tuple[str, tuple[str, ...]], str] = {}
+"""Digests by module and packages. A module is imported once in a process, so it is read once."""
+_read: dict[Path, object] = {}
+"""Modules of ours that were read, and what tells that they were written to."""
+
+
+def digest(root: str, packages: tuple[str, ...] = PACKAGES) -> str:
+    """Stands for a module, or all modules of a package, and what they import: text of ``packages`` and of data in
+    folders beside their modules, versions of others."""
+    key = root, packages
+    if key not in _taken:
+        _taken[key] = _digest(*key)
+    return _taken[key]
+
+
+def changed() -> bool:
+    """Whether a module of ours was written to since it was read: what runs here may be neither version."""
+    return any(_stamp(file) != before for file, before in _read.items())
+
+
+def own(files: Iterable[Path]) -> str:
+    """The same for files of a user's own, and what they import from our packages and from beside themselves."""
+    files = sorted(files)
+    return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
+
+
+def package(name: str) -> Path:
+    """Folder of a package, which is not imported. Raises :class:`MissingExtra`."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or not spec.submodule_search_locations:
+        raise MissingExtra("the virtual board", "sim")
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+@functools.cache
+def version(name: str) -> str:
+    """Of an installed package; empty where no package is called so."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+def _digest(root: str, packages: tuple[str, ...]) -> str:
+    folders = _folders(packages)
+    found = _find(root, folders)
+    if found is None:
+        raise ModuleNotFoundError(f"no module named {root!r}", name=root)
+    roots = found.parent.rglob("*.py") if found.name == "__init__.py" else [found]
+    return _hashed(_marks(map(_name, roots), folders, ours=True))
+
+
+def _hashed(marks: Iterable[str]) -> str:
+    return hashlib.sha256("\n".join((sys.implementation.cache_tag, *marks)).encode()).hexdigest()
+
+
+def _folders(packages: Iterable[str]) -> dict[str, Path]:
+    """Where each package is found."""
+    return {name: package(name).parent for name in packages}
+
+
+def _beside(files: Iterable[Path]) -> dict[str, Path]:
+    """Where the packages are found that users' files can reach: their own, and what lies beside it unless it was
+    installed; what was has a version."""
+    installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
+    found = {}
+    for file in files:
+        top = _top(file)
+        found[top.stem] = top.parent
+        if top.parent.resolve() not in installed:
+            found |= {path.stem: top.parent for path in top.parent.iterdir() if path.suffix == ".py" or path.is_dir()}
+    return found
+
+
+def _top(file: Path) -> Path:
+    """The folder of the outermost package that a file is in, or the file itself."""
+    while (file.parent / "__init__.py").is_file():
+        file = file.parent
+    return file
+
+
+def _name(file: Path) -> str:
+    """Of a module."""
+    parts = file.relative_to(_top(file).parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
+    """The file of a module, None where there is none in these folders."""
+    top = name.partition(".")[0]
+    if top not in folders:
+        return None
+    path = f"{folders[top]}/{name.replace('.', '/')}"
+    return next((Path(file) for file in (f"{path}/__init__.py", f"{path}.py") if os.path.isfile(file)), None)
+
+
+def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False) -> list[str]:
+    """A line for each module that is reached and for each other package. Of packages of ``ours`` also for each file of
+    data beside a module; users' modules may be changed and loaded again."""
+    todo, seen, files, marks = set(roots), set[str](), list[Path](), list[str]()
+    while todo:
+        name = todo.pop()
+        seen.add(name)
+        if file := _find(name, folders):
+            if ours:
+                _read.setdefault(file, _stamp(file))
+            text = file.read_bytes()
+            files.append(file)
+            marks.append(f"{name} {hashlib.sha256(text).hexdigest()}")
+            todo |= _imported(text.decode(errors="replace"), name, file.name == "__init__.py")
+        # A package's own file runs before its modules. The outermost one only gathers names for users.
+        if name.count(".") > 1:
+            todo.add(name.rpartition(".")[0])
+        todo -= seen
+    tops = {name.partition(".")[0] for name in seen}
+    marks += (f"{top} {_hash(file)}" for top in tops - seen if (file := _find(top, folders)))
+    for folder in {file.parent for file in files} if ours else ():
+        marks += (f"{file.name} {_hash(file)}" for file in _data(folder))
+    others = tops - set(folders) - set(PACKAGES) - sys.stdlib_module_names
+    return sorted((*marks, *(f"{other} {version(other)}" for other in others)))
+
+
+def _stamp(file: Path) -> object:
+    with contextlib.suppress(OSError):
+        found = file.stat()
+        return found.st_mtime_ns, found.st_size, found.st_ino
+    return None
+
+
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _data(folder: Path) -> Iterator[Path]:
+    """Files in those of a package's folders that are no packages."""
+    with os.scandir(folder) as entries:
+        inner = [Path(entry) for entry in entries if entry.is_dir() and entry.name != "__pycache__"]
+    for each in inner:
+        if not (each / "__init__.py").is_file():
+            yield from (file for file in each.rglob("*") if file.is_file())
+
+
+def _imported(text: str, name: str, is_package: bool) -> set[str]:
+    """Names of modules that a module imports anywhere, or loads as a choice, and of attributes it imports from them."""
+    found = set(_PLACE.findall(text))
+    for statement in _statements(text):
+        if isinstance(statement, ast.Import):
+            found.update(alias.name for alias in statement.names)
+        elif isinstance(statement, ast.ImportFrom):
+            parts = name.split(".") if statement.level else []
+            above = parts[: len(parts) - statement.level + is_package]
+            module = ".".join((*above, *filter(None, (statement.module,))))
+            found.update((module, *(f"{module}.{alias.name}" for alias in statement.names)))
+    return found - {""}
+
+
+def _statements(text: str) -> Iterator[ast.AST]:
+    """All import statements. They are looked for by themselves, as to parse all of a file takes ten times as long;
+    where the word stands elsewhere, too, that is done."""
+    parts = _IMPORT.split(_TYPES.sub("", text))
+    try:
+        if any(map(_WORD.search, parts[::2])):
+            raise SyntaxError
+        yield from ast.parse("\n".join(parts[1::2])).body
+    except SyntaxError:
+        with contextlib.suppress(SyntaxError):  # nothing can import it
+            yield from ast.walk(ast.parse(text))

@@ -1,0 +1,314 @@
+"""Keys of compiled boards and kept results: all that decides what they are, and nothing else."""
+
+import dis
+import os
+import random
+import shutil
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+from sample import sample
+
+from contactfpga_sim.board import sources
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = {"contactfpga": "py", "contactfpga_hdl": "hdl", "contactfpga_sim": "sim"}
+
+# The package's own file gathers names for users; without it only those modules are there that something needs.
+LOADED = """
+import sys, types
+from pathlib import Path
+stub = types.ModuleType("contactfpga")
+stub.__path__ = [sys.argv[1]]
+sys.modules["contactfpga"] = stub
+from amaranth.back import rtlil
+from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
+from contactfpga_hdl.several import SeveralTop
+from contactfpga_hdl.top import Top
+
+small = Skin(rows=3, columns=3)
+fast = small.replace(scan="reversal", precharge_us=0.5)
+chains = {"row_drive": "74hc595", "column_read": "74hc165", "settle_us": 20.0, "fail_safe": True}
+round = {"surface": "cylinder", "radius_mm": 20.0, "closed": True}
+skins = [
+    small.replace(scan="adaptive", labeller="serial", debounce="sym_defer_pk", dual=True),
+    small.replace(labeller="projection", guard=True, alive=True, units=3, converter="mcp3208"),
+    small.replace(labeller="single", debounce="asym_eager_defer_pk", units=2, converter="ads131m08"),
+    fast.replace(guard=True, self_test=True, labeller="serial", **round),
+    fast.replace(report="barycenter", send="on_change"),
+]
+for skin in skins:
+    rtlil.convert(Top(skin), name="top")
+rtlil.convert(SeveralTop(Several((small.replace(**chains),) * 2)), name="top")
+for name, module in sorted(sys.modules.items()):
+    if name.split(".")[0] in ("contactfpga", "contactfpga_hdl") and module is not stub:
+        print(module.__file__)
+"""
+
+# Prints a key for each of the files it is told, each changed in turn, and first the one of all as they are.
+KEYS = """
+import functools, sys
+from pathlib import Path
+from contactfpga.skin import Skin
+from contactfpga_sim.board import native, sources
+sources._imported = functools.cache(sources._imported)  # it knows the text only
+for line in ["", *sys.stdin.read().splitlines()]:
+    file = Path(line) if line else None
+    if file:
+        before = file.read_bytes()
+        file.write_bytes(before + b"#")
+    sources._taken.clear()
+    print(eval(sys.argv[1], {"native": native, "skin": Skin()}))
+    if file:
+        file.write_bytes(before)
+assert "amaranth" not in sys.modules
+"""
+SIZING = ("sizes.py", "placed.py", "synthesis.py", "tools.py")
+BOARD = "native.skin_key(skin)"
+
+
+@pytest.fixture(autouse=True)
+def _own_memory(monkeypatch):
+    """What is changed here is nothing that other tests have read."""
+    monkeypatch.setattr(sources, "_taken", {})
+    monkeypatch.setattr(sources, "_read", {})
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """All sources, to be changed."""
+    folder = tmp_path_factory.mktemp("copy")
+    for package, inside in PACKAGES.items():
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / inside / package, folder / inside / package, ignore=ignored)
+    return folder
+
+
+def run(folder, code, *arguments, said="", **environment):
+    """What Python says with the packages of ``folder``."""
+    path = os.pathsep.join(str(folder / inside) for inside in PACKAGES.values())
+    environment = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(
+        command, cwd=folder, env=environment, input=said, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def keys(folder, expression, files):
+    """The key as things are, and by file the one when it is changed."""
+    first, *others = run(folder, KEYS, expression, said="\n".join(map(str, files)))
+    return first, dict(zip(files, others, strict=True))
+
+
+@pytest.fixture(scope="module")
+def loaded(copy):
+    """Files that Python itself loads to elaborate the gateware."""
+    return [Path(line) for line in run(copy, LOADED, copy / "py/contactfpga")]
+
+
+def test_python_loads_all_gateware_but_that_of_boards(copy, loaded):
+    gateware = copy / "hdl/contactfpga_hdl"
+    there = {path for path in gateware.rglob("*.py") if path.parent != gateware / "board"}
+    assert there <= set(loaded)
+
+
+def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board(copy, loaded):
+    now, changed = keys(copy, BOARD, loaded)
+    assert [str(file) for file, key in changed.items() if key == now] == []
+    assert len(set(changed.values())) == len(loaded)
+    for named in ("row_times", "rates", "limits"):
+        assert copy / f"py/contactfpga/skin/{named}.py" in changed
+
+
+def test_a_file_that_the_gateware_does_not_need_leaves_the_key(copy):
+    others = [
+        *("py/contactfpga/driver/board.py", "py/contactfpga/tracking/tracker.py", "py/contactfpga/cover/hertz.py"),
+        *("py/contactfpga/cli.py", "py/contactfpga/skin/latency.py", "py/contactfpga/zones/zone.py"),
+        *("sim/contactfpga_sim/golden/reversal.py", "sim/contactfpga_sim/pages/writer.py"),
+    ]
+    now, changed = keys(copy, BOARD, [copy / name for name in others])
+    assert [str(file) for file, key in changed.items() if key != now] == []
+
+
+BUILT = """native._cache_key(__import__('contactfpga_sim.board.compiled', fromlist=['']).model_of(skin),
+    native.find_compiler())"""
+
+
+def test_what_a_library_is_compiled_from_changes_its_key(copy):
+    drivers = copy / "sim/contactfpga_sim/board/drivers"
+    taken = [*drivers.glob("*.h"), drivers / "board.cpp", drivers.parent / "native.py"]
+    others = [drivers / "label.cpp", drivers.parent / "received.py"]
+    now, changed = keys(copy, BUILT, [*taken, *others])
+    assert len(taken) > 5
+    assert [file.name for file, key in changed.items() if key == now] == [file.name for file in others]
+
+
+@pytest.mark.parametrize(
+    ("module", "files"),
+    [
+        (
+            "contactfpga_sim.studies.flips.campaign",
+            ["flips/touches.py", "flips/flip.py", "../board/drivers/state.h", "../../../hdl/contactfpga_hdl/top.py"],
+        ),
+        ("contactfpga_hdl.board.sizes", ["../../../hdl/contactfpga_hdl/board/" + name for name in SIZING]),
+        (
+            "contactfpga_sim.studies.chart.study",
+            ["chart/errors.py", "chart/speed.py", "../golden/label.py", "../../../py/contactfpga/skin/row_times.py"],
+        ),
+        ("contactfpga_sim.studies.fit.measuring", ["fit/sources.py", "chart/study.py", "../scenes/shapes.py"]),
+        ("contactfpga_sim.studies.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../board/compiled.py"]),
+        ("contactfpga_sim.mutants.campaign", ["../mutants/trial.py", "../mutants/stimuli.py", "../board/native.py"]),
+    ],
+)
+def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
+    key = f"__import__('contactfpga_sim.studies.kept', fromlist=['']).made_by({module!r})"
+    paths = [(copy / "sim/contactfpga_sim/studies" / name).resolve() for name in files]
+    page = copy / "sim/contactfpga_sim/pages/flips_page.py"
+    now, changed = keys(copy, key, [*paths, page])
+    assert [file for file, key in changed.items() if key == now] == [page]
+
+
+def imports_of(code, package):
+    """Modules that compiled code imports, and those that attributes could be, as Python's own compiler has them."""
+    loaded = list(dis.get_instructions(code))
+    for at, one in enumerate(loaded):
+        if one.opname == "IMPORT_NAME":
+            constants = [each.argval for each in loaded[:at] if each.opname == "LOAD_CONST"]
+            level, names = constants[-2:]
+            above = package.split(".")[: len(package.split(".")) - level + 1] if level else []
+            name = ".".join((*above, *([one.argval] if one.argval else [])))
+            yield name
+            yield from (f"{name}.{each}" for each in names or () if each != "*")
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from imports_of(constant, package)
+
+
+@pytest.mark.parametrize("top", sample(PACKAGES, quick=["contactfpga_hdl"], slow=["contactfpga", "contactfpga_sim"]))
+def test_imports_are_those_that_python_compiles(top):
+    missing, root = {}, ROOT / PACKAGES[top]
+    for path in (root / top).rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        module = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+        is_package = path.name == "__init__.py"
+        package = module if is_package else module.rpartition(".")[0]
+        code = compile(text.replace("if TYPE_CHECKING:", "if False:"), str(path), "exec")
+        missing[module] = set(imports_of(code, package)) - sources._imported(text, module, is_package)
+    assert len(missing) > 50
+    assert {name: left for name, left in missing.items() if left} == {}
+
+
+STATEMENTS = [
+    "import {0}",
+    "import os, {0} as other",
+    "from {0} import {1}",
+    "from {0} import ({1},  # not (all)\n    {2} as x)",
+    "from {0} import {1}, \\\n    {2}",
+    "from . import {1}",
+    "from .. import {1}",
+    "from .{0} import {1}",
+    "if True: import {0}",
+    "x = 1; import {0}",
+    "import {0}; from {1} import {2}",
+    "def f():\n    from {0} import {1}\n    return {1}",
+    "try:\n\timport {0}\nexcept ImportError: from {1} import {2}",
+    "class C:\n  def f(self):\n\n    if True:\n        import {0}",
+    "from {0} import *",
+    'x = """\nfrom here on import nothing\nimport {0}\n"""',
+    "# import of nothing\nx = 'import'",
+    "if TYPE_CHECKING:\n    import {0}\n\n    from {1} import {2}\n",
+    "if x:\n    pass\nelif TYPE_CHECKING:\n    pass\n",
+]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_imports_in_whatever_form_are_found(seed):
+    rng = random.Random(seed)
+    names = ["a", "a.b", "pkg.c", "d_e", "fromage", "importer"]
+    lines = ["TYPE_CHECKING = x = False"]
+    for statement in rng.choices(STATEMENTS, k=rng.randint(1, 6)):
+        plain = [rng.choice(names).rpartition(".")[2] for _ in range(3)]
+        lines.append(statement.format(rng.choice(names), *plain[1:]))
+    text = "\n".join(lines) + "\n"
+    code = compile(text.replace("if TYPE_CHECKING:", "if False:"), "x.py", "exec")
+    assert set(imports_of(code, "pkg.inner")) <= sources._imported(text, "pkg.inner.module", False), text
+
+
+def test_files_of_ones_own_count_with_what_they_import_from_beside_them(tmp_path):
+    texts = {"lab.py": "import helper\nfrom parts import one", "helper.py": "", "parts/one.py": "from . import two"}
+    texts |= {"parts/two.py": "", "parts/__init__.py": "", "unused.py": ""}
+    (tmp_path / "parts").mkdir()
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    before = sources.own([tmp_path / "lab.py"])
+    assert before == sources.own([tmp_path / "lab.py"]) != sources.own([])
+    for name in texts:
+        (tmp_path / name).write_text(texts[name] + "\n")
+        assert (sources.own([tmp_path / "lab.py"]) != before) == (name != "unused.py"), name
+        (tmp_path / name).write_text(texts[name])
+
+
+def test_code_that_changed_while_it_ran_is_seen(tmp_path, monkeypatch):
+    (tmp_path / "moving.py").write_text("x = 1")
+    monkeypatch.setattr(sources, "_folders", lambda packages: {"moving": tmp_path})
+    before = sources.digest("moving")
+    assert not sources.changed()
+    (tmp_path / "moving.py").write_text("x = 2")
+    assert sources.digest("moving") == before
+    assert sources.changed()
+
+
+def test_another_compiler_version_or_option_is_another_library(tmp_path, monkeypatch):
+    from contactfpga_sim.board import native
+
+    def key(command):
+        monkeypatch.setenv("CXX", command)
+        native._said.cache_clear()
+        return native._cache_key(native.Model("a sum", "label.cpp", "key", lambda: None), native.find_compiler())
+
+    script = tmp_path / "cxx"
+    script.write_text("#!/bin/sh\nsed -n 2p $0.version\n")
+    script.chmod(0o755)
+    found = set()
+    for version in ("12.2.0-14", "12.2.0-15"):
+        (tmp_path / "cxx.version").write_text(f"g++\n{version}\n")
+        found |= {key(str(script)), key(f"{script} -O1")}
+    assert len(found) == 4
+    script.touch()
+    assert key(str(script)) in found
+    native._said.cache_clear()
+
+
+COUNTED = """
+import numpy as np
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.board.compiled import CompiledBoard
+skin = Skin(rows=2, columns=2)
+with CompiledBoard(skin, capture=("rows",)) as board:
+    board.run(2000)
+    print(Derived(skin).row_clocks, int(np.diff(board.take("rows")["cycle"])[4]))
+"""
+
+
+@pytest.mark.slow  # it compiles two boards
+def test_host_and_board_count_the_same_clocks_when_the_settle_time_is_changed(copy, tmp_path):
+    row_times = copy / "py/contactfpga/skin/row_times.py"
+    before = row_times.read_text(encoding="utf-8")
+    counted = [run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache"))]
+    longer = before.replace(
+        "return max(self.clocks(self.skin.settle_us),", "return 3 + max(self.clocks(self.skin.settle_us),"
+    )
+    assert longer != before
+    row_times.write_text(longer, encoding="utf-8")
+    counted.append(run(copy, COUNTED, CONTACTFPGA_CACHE=str(tmp_path / "cache")))
+    row_times.write_text(before, encoding="utf-8")
+    (host, board), (later_host, later_board) = (map(int, lines[-1].split()) for lines in counted)
+    assert (host, later_host) == (board, later_board)
+    assert later_host == host + 3
