@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -78,51 +79,71 @@ def pairwise(choices: dict[str, tuple[Any, ...]], seed: int = 0) -> list[dict[st
     """A small list of assignments in which every pair of values of two choices occurs; the same for a seed."""
     names = list(choices)
     pick = random.Random(seed)
-    open_pairs = {
-        (a, i, b, j)
-        for a, b in itertools.combinations(range(len(names)), 2)
-        for i in range(len(choices[names[a]]))
-        for j in range(len(choices[names[b]]))
-    }
+    open_pairs = _Open([len(values) for values in choices.values()])
     rows = []
-    while open_pairs:
-        firsts = sorted(open_pairs)
-        candidates = [_candidate(choices, names, open_pairs, pick.choice(firsts), pick) for _ in range(20)]
-        best = max(candidates, key=lambda row: len(_pairs(row) & open_pairs))
-        open_pairs -= _pairs(best)
-        rows.append({name: choices[name][value] for name, value in zip(names, best, strict=True)})
+    while firsts := open_pairs.pairs():
+        best = max((_candidate(open_pairs, pick.choice(firsts), pick) for _ in range(20)), key=open_pairs.closed_by)
+        open_pairs.close(best)
+        rows.append({name: choices[name][value] for name, value in zip(names, best.values(), strict=True)})
     return rows
 
 
-def _candidate(
-    choices: dict[str, tuple[Any, ...]], names: list[str], open_pairs: set[Pair], first: Pair, pick: random.Random
-) -> list[int]:
-    """One open pair, the first, then value by value what closes most of the rest."""
-    row: list[int | None] = [None] * len(names)
+class _Open:
+    """Pairs that occur in no row yet. Each test process makes hundreds of rows while it collects tests, so they are
+    bits: each value of each choice has a number, and its open partners are the bits of an integer."""
+
+    def __init__(self, counts: Sequence[int]):
+        self.counts = counts
+        self._first = list(itertools.accumulate(counts, initial=0))
+        every = (1 << self._first[-1]) - 1
+        own = [((1 << count) - 1) << first for count, first in zip(counts, self._first, strict=False)]
+        self._partners = [every & ~own[place] for place, count in enumerate(counts) for _ in range(count)]
+
+    def pairs(self) -> list[Pair]:
+        """All of them, in order."""
+        return [
+            (a, i, b, j)
+            for a, count in enumerate(self.counts)
+            for i in range(count)
+            for b in range(a + 1, len(self.counts))
+            for j in range(self.counts[b])
+            if self._partners[self._first[a] + i] >> (self._first[b] + j) & 1
+        ]
+
+    def bits(self, row: Mapping[int, int]) -> int:
+        """The values (by place) of a row, or of a part of one."""
+        return sum(1 << (self._first[place] + value) for place, value in row.items())
+
+    def closed_with(self, bits: int, place: int, value: int) -> int:
+        """How many a value would close beside those of ``bits``."""
+        return (self._partners[self._first[place] + value] & bits).bit_count()
+
+    def closed_by(self, row: Mapping[int, int]) -> int:
+        """Twice as many as a whole row would close."""
+        bits = self.bits(row)
+        return sum(self.closed_with(bits, place, value) for place, value in row.items())
+
+    def close(self, row: Mapping[int, int]) -> None:
+        """A row was taken."""
+        bits = self.bits(row)
+        for place, value in row.items():
+            self._partners[self._first[place] + value] &= ~bits
+
+
+def _candidate(open_pairs: _Open, first: Pair, pick: random.Random) -> dict[int, int]:
+    """One open pair, the first, then value by value what closes most of the rest; the value of each choice."""
     a, i, b, j = first
-    row[a], row[b] = i, j
-    for place in pick.sample(range(len(names)), len(names)):
-        if row[place] is not None:
-            continue
-        values = pick.sample(range(len(choices[names[place]])), len(choices[names[place]]))
-        row[place] = max(values, key=lambda value: len(_pairs(row, place, value) & open_pairs))
-    return row  # type: ignore[return-value]
-
-
-def _pairs(row: Sequence[Any], place: int | None = None, value: int = 0) -> set[Pair]:
-    """The pairs in a row, or those that ``value`` at ``place`` would add."""
-    if place is None:
-        return {(a, row[a], b, row[b]) for a, b in itertools.combinations(range(len(row)), 2)}
-    return {
-        (other, chosen, place, value) if other < place else (place, value, other, chosen)
-        for other, chosen in enumerate(row)
-        if chosen is not None
-    }
+    row = {a: i, b: j}
+    for place in pick.sample(range(len(open_pairs.counts)), len(open_pairs.counts)):
+        if place not in row:
+            values = pick.sample(range(open_pairs.counts[place]), open_pairs.counts[place])
+            row[place] = max(values, key=partial(open_pairs.closed_with, open_pairs.bits(row), place))
+    return dict(sorted(row.items()))
 
 
 def pairs_in(rows: list[list[int]]) -> set[Pair]:
     """All pairs (choice, value, choice, value), as indices, that occur in the rows of a covering set."""
-    return set().union(*map(_pairs, rows))
+    return {(a, row[a], b, row[b]) for row in rows for a, b in itertools.combinations(range(len(row)), 2)}
 
 
 def skin_for(choice: dict[str, Any]) -> Skin:
