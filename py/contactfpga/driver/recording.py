@@ -10,7 +10,8 @@ from typing import BinaryIO, Protocol
 from urllib.parse import unquote
 
 from contactfpga.driver.mcap_bytes import McapStream
-from contactfpga.driver.mcap_part import MAGIC, files_of
+from contactfpga.driver.mcap_part import files_of
+from contactfpga.driver.mcap_records import MAGIC
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import number_in

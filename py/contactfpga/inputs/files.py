@@ -1,10 +1,14 @@
-"""Files that can be read to an end: a FIFO would be waited for, a device read forever."""
+"""Files that can be read to an end: no FIFO, no device. Files that are whole or not there."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import secrets
+import shutil
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, TypeGuard
 
@@ -30,6 +34,27 @@ def read_small(path: str | Path, most: int, what: str, refused: type[Exception])
     if len(data) > most:
         raise refused(f"{path}: longer than {most:,} bytes; is it {what}?")
     return data
+
+
+@contextlib.contextmanager
+def replaced(path: str | Path) -> Iterator[Path]:
+    """A name in the folder of ``path`` that nobody knows, and no file there yet: make one. After the block it is
+    ``path``, with all that was written; if the block fails, nothing is left of it and ``path`` is as it was. What is
+    there and no regular file, such as /dev/stdout into a pipe, is written itself. Raises OSError."""
+    place = Path(os.path.realpath(path))  # a link that the user names is followed, as any program does
+    if place.exists() and not place.is_file():
+        yield place
+        return
+    new = place.with_name(f".contactfpga-{secrets.token_hex(8)}{place.suffix}")
+    try:
+        yield new
+        if place.exists():
+            shutil.copymode(place, new)
+        os.replace(new, place)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise
 
 
 def names_robot(port: str | None) -> TypeGuard[str]:
