@@ -23,6 +23,8 @@ SKIN = Skin()
 LONG = 60.0
 LOST_BYTES, LOST_S = 1 << 16, 0.2  # what the issue allows
 KIND = "contactfpga_msgs/Bytes"
+UNKEPT = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+"""Where files may not grow, Python would keep modules cut short."""
 
 
 def record(file, port, **options):
@@ -161,7 +163,7 @@ def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
 
     with FakeBoard(SKIN) as board:
         file = tmp_path / "x.mcap"
-        process = record(file, board.path, preexec_fn=limited)
+        process = record(file, board.path, preexec_fn=limited, env=UNKEPT)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
         with Sender(board, frames, 0.002):
             _, errors = process.communicate(timeout=LONG)
@@ -345,7 +347,7 @@ def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
 
     command = [sys.executable, "-m", "contactfpga", "recover", str(path)]
-    done = subprocess.run(command, preexec_fn=limited, capture_output=True, text=True)
+    done = subprocess.run(command, preexec_fn=limited, capture_output=True, text=True, env=UNKEPT)
     assert done.returncode == 1
     new = path.with_name("closed_recovered.mcap")
     assert " ".join(done.stderr.split()) == (

@@ -73,6 +73,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
 
 def _copy_all(file: BinaryIO, new: Path, found: Recovered) -> None:
     definitions = _definitions(file)
+    new.unlink()  # as it will be made
     copy = _Copy(new)
     try:
         for number, kind, data in _walk(file, found):
