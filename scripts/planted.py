@@ -35,26 +35,30 @@ def replaced(file: str, old: str, new: str) -> str:
     return text.replace(old, new)
 
 
-def notice(root: Path, tests: Sequence[str], seconds: float) -> tuple[bool, str]:
-    """Whether tests that belong to ``make test`` fail with the gateware of this source root, and what they say.
-
-    They notice as well if the gateware cannot be imported or if they take longer than ``seconds``. Compiled boards go
-    into a cache beside the gateware. Raises RuntimeError if there are no such tests.
-    """
+def environment(root: Path) -> dict[str, str]:
+    """In which Python takes the gateware from this source root. Compiled boards go into a cache beside it."""
     folders = [str(root), str(ROOT / "py"), str(ROOT / "sim")]
-    environment = {
+    return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(folders),
         "PYTHONDONTWRITEBYTECODE": "1",
         "CONTACTFPGA_CACHE": str(root / "cache"),
     }
-    options = ["-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--tb=line", "--timeout", "120"]
+
+
+def notice(root: Path, tests: Sequence[str], seconds: float) -> tuple[bool, str]:
+    """Whether tests that belong to ``make test`` fail with the gateware of this source root, and what they say.
+
+    They notice as well if the gateware cannot be imported or if they take longer than ``seconds``. Raises RuntimeError
+    if there are no such tests.
+    """
+    options = ["-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--tb=line", "--timeout", "600"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         result = subprocess.run(
             command,
             cwd=ROOT,
-            env=environment,
+            env=environment(root),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

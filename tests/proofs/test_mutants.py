@@ -12,8 +12,8 @@ from contactfpga_sim.cosim.compare import Mismatch
 from contactfpga_sim.golden import Timeline, units
 from contactfpga_sim.golden.facts import facts
 from contactfpga_sim.golden.request import heard
-from contactfpga_sim.mutants import aig, campaign, netlist, options, proof, solve, stimuli, trial
-from contactfpga_sim.mutants.skins import OPTIONS, SKINS
+from contactfpga_sim.mutants import aig, campaign, netlist, options, proof, sheets, solve, stimuli, trial
+from contactfpga_sim.mutants.skins import OPTIONS, SEVERAL, SKINS
 from contactfpga_sim.mutants.stimuli import Stimulus
 
 SAMPLE = 40
@@ -61,6 +61,8 @@ def test_every_stage_of_the_design_has_mutants(sample):
         (r"-cell $flatten\label.\walk.$130 -port A -src /site-packages/amaranth/lib/memory.py:9", "label"),
         (r"-cell $auto$ff.cc:337:slice$2260 -port D -src /hdl/contactfpga_hdl/scan/self_test.py:43", "self-test"),
         (r"-cell $auto$opt_expr.cc:277$1863 -port Y -wire audit$7.counts -wirebit 3", "report"),
+        (r"-cell $flatten\sheet_1.\request$99.$182 -port A -wire bits", "serial"),
+        (r"-cell $flatten\turns.$4 -port A -src /hdl/contactfpga_hdl/link/turns.py:20", "several"),
         (r"-cell $auto$simple.cc:194:make_patterns_logic$2090 -port B", None),
         (r"-cell $auto$ff.cc:337:slice$2260 -port CLK -src /hdl/contactfpga_hdl/scan/self_test.py:43", None),
     ],
@@ -75,7 +77,7 @@ def test_a_mutant_counts_for_the_stage_of_its_source_else_of_its_module(line, st
     [
         (["--skin", "8x8"], []),
         (["--group", "options"], ["options"]),
-        ([], ["mutants", "options"]),
+        ([], ["mutants", "options", "several"]),
     ],
 )
 def test_a_table_is_written_only_when_all_of_its_skins_were_run(tmp_path, monkeypatch, flags, written):
@@ -117,6 +119,19 @@ def test_stimuli_of_units_notice_amounts_one_off_and_thresholds_without_a_bit(mo
 
     monkeypatch.setattr(units._Settings, "reached", reached)
     assert units.play(facts(skin), timeline, asked, cycles).over != right
+
+
+@pytest.mark.slow
+def test_mutants_of_several_sheets_are_told_from_the_golden_model_s_line():
+    several, _ = SEVERAL["two sheets"]
+    found = netlist.candidates(several)
+    places = {mutant.place.partition(":")[0] for mutant in found if mutant.stage in ("several", "serial")}
+    assert {"several.py", "link/turns.py", "link/request.py"} <= places
+    assert not any("upset" in mutant.place for mutant in found)
+    mutants = netlist.draw([mutant for mutant in found if mutant.stage == "several"], 20)
+    nothing = Stimulus("nothing", Timeline([]), 0, others=[Timeline([])])
+    assert campaign.left_by(several, mutants, [nothing]) == mutants
+    assert len(campaign.left_by(several, mutants, [next(sheets.quick(several))])) < 10
 
 
 def test_what_only_a_flip_can_reach_has_no_mutants(sample):

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, outputs
 from contactfpga.console.interrupt import Interrupted
-from contactfpga.inputs.files import write_text
 
 if TYPE_CHECKING:
     from contactfpga_sim.studies.failures.knob import Turned
@@ -55,7 +54,7 @@ def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
     from contactfpga_sim.pages import failures_page
 
     both = failures_page.table(turned), failures_page.unnoticed(turned)
-    write_text(path, "\n\n".join(both) + "\n")
+    path.write_text("\n\n".join(both) + "\n", encoding="utf-8")
     return path
 
 
@@ -73,7 +72,7 @@ def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
     from contactfpga_sim.studies.failures.catalogue import STUDIES
 
     for name, methods in turned.items():
-        write_text(folder / f"{name}.svg", knob_pictures.svg(STUDIES[name], methods))
+        (folder / f"{name}.svg").write_text(knob_pictures.svg(STUDIES[name], methods), encoding="utf-8")
         print(folder / f"{name}.svg")
 
 

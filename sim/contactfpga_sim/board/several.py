@@ -28,11 +28,18 @@ CAPTURED = ("line", "contact", "received")
 
 
 class CompiledSheets(Running):
-    """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on."""
+    """The gateware of several sheets as native code, each with its switches, stepped by the clock from power-up on.
 
-    def __init__(self, several: Several):
+    ``model`` is the gateware, by default what :func:`model_of` says.
+    """
+
+    def __init__(self, several: Several, model: native.Model | None = None):
         self.several = several
-        super().__init__(model_of(several), CAPTURED)
+        super().__init__(model or model_of(several), CAPTURED)
+
+    def restart(self, mutant: int = 0) -> None:
+        """As :meth:`contactfpga_sim.board.compiled.CompiledBoard.restart`."""
+        self._call("restart", ctypes.c_uint(mutant))
 
     def press(self, number: int, cells: np.ndarray) -> None:
         """From the next cycle on these (rows, columns) bool cells of a sheet are pressed."""

@@ -17,11 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from contactfpga.console import interrupt, numbers
-from contactfpga.skin import Skin
-from contactfpga_sim.mutants import netlist, proof, trial
-from contactfpga_sim.mutants.netlist import STAGES, Mutant
-from contactfpga_sim.mutants.skins import OPTIONS, SKINS
-from contactfpga_sim.mutants.stimuli import Stimulus, quick, thorough, until_time_wraps
+from contactfpga.skin.several import Several
+from contactfpga_sim.mutants import netlist, proof, sheets, stimuli, trial
+from contactfpga_sim.mutants.netlist import STAGES, Design, Mutant
+from contactfpga_sim.mutants.skins import OPTIONS, SEVERAL, SKINS
+from contactfpga_sim.mutants.stimuli import Stimulus
 from contactfpga_sim.pages import writer
 from contactfpga_sim.studies import kept
 
@@ -35,8 +35,8 @@ CHECKED = 2
 EACH = numbers.whole(1, 1_000_000, "mutants")
 PROOF_S = numbers.whole(1, 3600, "seconds")
 
-GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS}
-"""Skins by the table of the page that they fill."""
+GROUPS: dict[str, Mapping[str, object]] = {"mutants": SKINS, "options": OPTIONS, "several": SEVERAL}
+"""Skins, or several sheets, by the table of the page that they fill."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,41 +48,48 @@ class Result:
     fate: str
 
 
-def left_by(skin: Skin, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) -> list[Mutant]:
+def chosen(name: str) -> tuple[Design, tuple[str, ...]]:
+    """The Skin or the sheets of this name, and the stages whose mutants are drawn."""
+    if name in SKINS:
+        return SKINS[name], tuple(STAGES)
+    return SEVERAL[name] if name in SEVERAL else OPTIONS[name]
+
+
+def left_by(design: Design, mutants: Sequence[Mutant], stimuli: Iterable[Stimulus]) -> list[Mutant]:
     """The mutants that behave as the golden model says under every stimulus."""
     given = list(stimuli)
     left: list[Mutant] = []
     for start in range(0, len(mutants), BATCH):
         batch = mutants[start : start + BATCH]
-        model = netlist.model(skin, batch)
-        left += [batch[n - 1] for n in trial.survivors(skin, model, range(1, len(batch) + 1), given)]
+        model = netlist.model(design, batch)
+        left += [batch[n - 1] for n in trial.survivors(design, model, range(1, len(batch) + 1), given)]
     return left
 
 
 def examine(
     name: str, count: int, seed: int, long_s: int = proof.LONG_S, say: Callable[[str], None] = lambda _: None
 ) -> list[Result]:
-    """The fates of ``count`` mutants of the Skin of this name in :data:`SKINS`, or of the stages that go with it in
-    :data:`OPTIONS`; ``long_s`` are the seconds of a longer proof.
+    """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof.
 
     Raises :class:`contactfpga_sim.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
     """
-    skin, stages = OPTIONS[name] if name in OPTIONS else (SKINS[name], tuple(STAGES))
+    design, stages = chosen(name)
+    given = sheets if isinstance(design, Several) else stimuli
     say("draw")
-    drawn = netlist.draw([mutant for mutant in netlist.candidates(skin) if mutant.stage in stages], count, seed)
+    drawn = netlist.draw([mutant for mutant in netlist.candidates(design) if mutant.stage in stages], count, seed)
     say(f"{len(drawn)} mutants, short stimuli")
-    left = left_by(skin, drawn, quick(skin))
+    left = left_by(design, drawn, given.quick(design))
     say(f"{len(left)} left, proofs")
     killed = [mutant for mutant in drawn if mutant not in left][:CHECKED]
-    proved = _proved(skin, [*left, *killed], proof.QUICK_S)
+    proved = _proved(design, [*left, *killed], proof.QUICK_S)
     if wrong := proved & {*killed}:
         raise proof.ProofFailed(f"killed, yet proved equivalent: {', '.join(map(str, wrong))}")
     left = [mutant for mutant in left if mutant not in proved]
     say(f"{len(left)} left, long stimuli")
-    longest = [until_time_wraps(skin)] if name in SKINS else []  # minutes in the golden model of an option
-    left = left_by(skin, left, [*thorough(skin), *longest])
+    longest = [stimuli.until_time_wraps(SKINS[name])] if name in SKINS else []  # minutes in the model of an option
+    left = left_by(design, left, [*given.thorough(design), *longest])
     say(f"{len(left)} left, longer proofs")
-    proved |= _proved(skin, left, long_s)
+    proved |= _proved(design, left, long_s)
     alive = {*left} - proved
     say(f"{len(alive)} alive")
     fates = (
@@ -91,8 +98,8 @@ def examine(
     return [Result(name, mutant, fate) for mutant, fate in fates]
 
 
-def _proved(skin: Skin, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
-    return {mutant for mutant, same in zip(mutants, proof.equivalent(skin, mutants, limit_s)) if same}
+def _proved(design: Design, mutants: Sequence[Mutant], limit_s: int) -> set[Mutant]:
+    return {mutant for mutant, same in zip(mutants, proof.equivalent(design, mutants, limit_s)) if same}
 
 
 def table(results: Sequence[Result]) -> str:
@@ -119,7 +126,8 @@ def main() -> int:
     parser.add_argument("--each", type=EACH, default=40, help="mutants of each Skin (default %(default)s)")
     parser.add_argument("--seed", type=numbers.SEED, default=0, help="for the choice of mutants (default %(default)s)")
     parser.add_argument("--group", action="append", choices=GROUPS, help="only these Skins; can be repeated")
-    parser.add_argument("--skin", action="append", choices=[*SKINS, *OPTIONS], help="only this Skin; can be repeated")
+    named = [*SKINS, *OPTIONS, *SEVERAL]
+    parser.add_argument("--skin", action="append", choices=named, help="only this Skin; can be repeated")
     parser.add_argument("--proof-s", type=PROOF_S, default=proof.LONG_S, help="of a longer proof (default %(default)s)")
     parser.add_argument("--jobs", type=numbers.JOBS, default=2, help="Skins at once (default %(default)s)")
     parser.add_argument("--page", type=Path, help="write the tables into this page")
@@ -168,8 +176,9 @@ def _run(names: Sequence[str], each: int, seed: int, long_s: int, jobs: int) -> 
 
 def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], None]) -> list[Result]:
     """As :func:`examine`, or what it found before with the same code."""
-    skin = OPTIONS[name][0] if name in OPTIONS else SKINS[name]
-    code = kept.made_by("contactfpga_sim.mutants.campaign", skin)  # this module, which may have been run
+    design = chosen(name)[0]
+    skins = design.skins if isinstance(design, Several) else (design,)
+    code = kept.made_by("contactfpga_sim.mutants.campaign", *skins)  # this module, which may have been run
     key = f"{name}, {each} of {seed}, {long_s} s, {code}"
     found = kept.kept(
         "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]

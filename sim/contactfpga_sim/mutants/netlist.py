@@ -10,7 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board import compiled, native
+from contactfpga.skin.several import Several
+from contactfpga_sim.board import compiled, native, several
+
+Design = Skin | Several
 
 STAGES = {
     "scan": ("scan",),
@@ -25,6 +28,7 @@ STAGES = {
     "link": ("link",),
     "faults": ("link", "alive"),
     "serial": ("transmitter", "receiver", "request"),
+    "several": ("turns",),
     "top": (),
 }
 """Stages, and the modules of the design, as Top names them, that hold their registers."""
@@ -48,7 +52,9 @@ _FILES = {
     "label/": "label",
     "report/": "report",
     "units/": "units",
+    "link/turns.py": "several",
     "link/": "link",
+    "several.py": "several",
     "top.py": "top",
 }
 _MODULES = {module: stage for stage, modules in reversed(STAGES.items()) for module in modules}
@@ -57,8 +63,8 @@ _MODULES = {module: stage for stage, modules in reversed(STAGES.items()) for mod
 # is asked for is proved. What does nothing is dropped, as a mutant of it would be none. Memories stay whole: what is in
 # them is no logic.
 PREPARE = (
-    "delete -port w:rst; delete w:restarts; setundef -undriven -zero; opt -full; wreduce; peepopt; opt -full; "
-    "memory -nomap; opt -full"
+    "delete -port w:rst; delete w:restarts w:*.restarts; setundef -undriven -zero; opt -full; wreduce; peepopt; "
+    "opt -full; memory -nomap; opt -full"
 )
 # A fault at Q is one at D a clock later, one at a clock no change of the logic; no memory here has a reset.
 _LEFT_OUT = ("Q", "CLK", "RD_CLK", "WR_CLK", "RD_ARST", "RD_SRST")
@@ -80,11 +86,16 @@ class Mutant:
         return f"{self.stage} {self.place}: {self.change}"
 
 
-def candidates(skin: Skin) -> list[Mutant]:
-    """Every mutant of the stages of a Skin's board."""
+def plain(design: Design) -> native.Model:
+    """The board without mutants."""
+    return several.model_of(design) if isinstance(design, Several) else compiled.model_of(design)
+
+
+def candidates(design: Design) -> list[Mutant]:
+    """Every mutant of the stages of a board."""
     with tempfile.TemporaryDirectory(prefix="contactfpga-") as name:
         folder = Path(name)
-        (folder / "model.il").write_text(_with_places(native.rtlil(compiled.model_of(skin).elaborate(), sources=True)))
+        (folder / "model.il").write_text(_with_places(native.rtlil(plain(design).elaborate(), sources=True)))
         commands = ("read_rtlil model.il", native.FLATTEN, PREPARE, f"mutate -list {_ALL} -o list.txt")
         native.yosys("; ".join(commands), folder)
         lines = (folder / "list.txt").read_text().splitlines()
@@ -96,15 +107,15 @@ def draw(mutants: Sequence[Mutant], count: int, seed: int = 0) -> list[Mutant]:
     return random.Random(seed).sample(mutants, min(count, len(mutants)))
 
 
-def model(skin: Skin, mutants: Sequence[Mutant]) -> native.Model:
-    """The board in which ``CompiledBoard.restart(n)`` picks ``mutants[n - 1]``."""
-    plain = compiled.model_of(skin)
+def model(design: Design, mutants: Sequence[Mutant]) -> native.Model:
+    """The board in which ``restart(n)`` picks ``mutants[n - 1]``."""
+    found = plain(design)
     return dataclasses.replace(
-        plain,
-        title=f"{len(mutants)} mutants of {plain.title}",
+        found,
+        title=f"{len(mutants)} mutants of {found.title}",
         passes="\n".join((PREPARE, *switches(mutants), "opt_expr; opt_merge; opt_clean")),
         quiet=True,
-        defines={**plain.defines, "MUTANTS": len(mutants)},
+        defines={**found.defines, "MUTANTS": len(mutants)},
     )
 
 
@@ -140,9 +151,15 @@ def _stage(place: str, *names: str) -> str | None:
 
 
 def module_of(name: str) -> str:
-    """The module of Top that holds this cell, wire or register of the flattened design. Where a signal of Top has its
-    name, a number follows it."""
-    return re.sub(r"\$\d+$", "", name.removeprefix("$flatten").replace("\\", "").partition(".")[0])
+    """The module of Top that holds this cell, wire or register of the flattened design, or of one of several sheets.
+    Where a signal of Top has its name, a number follows it."""
+    inside = in_sheet(name.removeprefix("$flatten").replace("\\", ""))
+    return re.sub(r"\$\d+$", "", inside.partition(".")[0])
+
+
+def in_sheet(name: str) -> str:
+    """The name without that of the sheet, among several ones, that it is in."""
+    return re.sub(r"^sheet_\d+\.", "", name)
 
 
 def _with_places(rtlil: str) -> str:

@@ -20,10 +20,9 @@ from pathlib import Path
 from types import TracebackType
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.skin import Skin
-from contactfpga_sim.board import compiled, native
+from contactfpga_sim.board import native
 from contactfpga_sim.mutants import aig
-from contactfpga_sim.mutants.netlist import PREPARE, STAGES, Mutant, module_of, switches
+from contactfpga_sim.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
 from contactfpga_sim.mutants.solve import reached
 
 QUICK_S, LONG_S = 4, 45
@@ -53,11 +52,11 @@ class ProofFailed(ContactFPGAError):
 class Prover:
     """Gateware and some mutants of it, as one circuit whose inputs ``mutant`` pick one."""
 
-    def __init__(self, skin: Skin, mutants: Sequence[Mutant]):
+    def __init__(self, design: Design, mutants: Sequence[Mutant]):
         self._mutants = list(mutants)
         self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
         folder = Path(self._folder.name)
-        (folder / "model.il").write_text(native.rtlil(compiled.model_of(skin).elaborate()))
+        (folder / "model.il").write_text(native.rtlil(plain(design).elaborate()))
         native.yosys("\n".join(("read_rtlil model.il", native.FLATTEN, PREPARE, *switches(mutants), _GATES)), folder)
         self._circuit = aig.read(folder / "design.aig", folder / "names.txt")
         self._graph = aig.Graph(len(self._circuit.inputs) + len(self._circuit.latches))
@@ -145,7 +144,7 @@ class Prover:
 
     def _named(self, *prefixes: str) -> frozenset[int]:
         names = enumerate(self._circuit.latches)
-        return frozenset(index for index, some in names if any(name.startswith(prefixes) for name in some))
+        return frozenset(index for index, some in names if any(in_sheet(name).startswith(prefixes) for name in some))
 
 
 def _value(values: dict[int, int], literal: int) -> int:
@@ -153,13 +152,13 @@ def _value(values: dict[int, int], literal: int) -> int:
 
 
 def equivalent(
-    skin: Skin, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
+    design: Design, mutants: Sequence[Mutant], limit_s: int = QUICK_S, done: Callable[[], None] = lambda: None
 ) -> list[bool]:
     """For each mutant whether it is proved equivalent; ``done()`` is called after each."""
     verdicts = []
     if not mutants:
         return []
-    with Prover(skin, mutants) as prover:
+    with Prover(design, mutants) as prover:
         for mutant in mutants:
             verdicts.append(prover.equivalent(mutant, limit_s))
             done()

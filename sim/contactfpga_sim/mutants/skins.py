@@ -3,6 +3,7 @@
 from typing import Any
 
 from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
 
 # Slow clocks bring what comes once in half a second within reach.
 SKINS: dict[str, Skin] = {
@@ -245,3 +246,29 @@ OPTIONS: dict[str, tuple[Skin, tuple[str, ...]]] = {
     ),
 }
 """Skins of options, and the stages whose mutants are drawn: those that the option changes."""
+
+_CHAINED: dict[str, Any] = {"row_drive": "74hc595", "column_read": "74hc165", "settle_us": 30.0} | _TINY
+
+SEVERAL: dict[str, tuple[Several, tuple[str, ...]]] = {
+    "two sheets": (
+        Several(
+            (
+                Skin(rows=2, columns=3, send="on_change", keep_alive_ms=5.0, **_CHAINED),
+                Skin(rows=3, columns=2, report="cells", diodes="row2col", row_order=(2, 0, 1), **_CHAINED),
+            )
+        ),
+        ("several", "serial", "link"),
+    ),
+    "three sheets, requests as pulses": (
+        Several(
+            (
+                Skin(rows=2, columns=2, report="cells", **_CHAINED | {"baud": 500_000}),
+                Skin(rows=1, columns=3, labeller="single", send="on_change", **_CHAINED | {"baud": 500_000}),
+                Skin(rows=2, columns=2, **_CHAINED | {"baud": 500_000}),
+            )
+        ),
+        ("several", "serial", "link"),
+    ),
+}
+"""Sheets at one FPGA, and the stages whose mutants are drawn: whose turn it is, the reader of requests that say which
+sheet they are for, and links that wait for their turn."""

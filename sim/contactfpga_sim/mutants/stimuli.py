@@ -39,6 +39,8 @@ class Stimulus(NamedTuple):
     shorts: Sequence[tuple[int, Shorts]] = ()
     """From which cycle on which lines are joined. The golden model knows no such sheet: a mutant is compared with the
     gateware, whose findings ``tests/gateware/test_self_test.py`` holds to the list of faults."""
+    others: Sequence[Timeline] = ()
+    """What is done to the sheets after the first one, where there are several. What is received is the first one's."""
 
 
 def quick(skin: Skin) -> Iterator[Stimulus]:

@@ -1,7 +1,7 @@
 // Several sheets at one FPGA: the gateware, a sheet of switches on shift registers at the pins of each, and a UART at the
 // other end of its line. Compiled for BIT_CLOCKS and EACH_SHEET, which has an entry SHEET(number, rows, columns, chains of
 // rows, chains of columns, whether a selected row is low, lines of rows, lines of columns) for each; lists of lines are
-// LINES(first, ...).
+// LINES(first, ...). With MUTANTS the gateware has an input that picks a mutant.
 #include <algorithm>
 #include <vector>
 
@@ -78,6 +78,7 @@ public:
     Sender sender;
     Reader reader;
     uint64_t cycle = 0;
+    unsigned mutant = 0;
     std::vector<Event> events[BOUNDARIES];
 
     void press(unsigned number, const uint64_t *cells) {
@@ -91,6 +92,9 @@ public:
     void run(uint64_t cycles) {
         for (const uint64_t end = cycle + cycles; cycle < end; cycle++) {
             put(model_.top.p_rx, sender.level());
+#ifdef MUTANTS
+            put(model_.top.p_mutant, mutant);
+#endif
             model_.settle();
             if (put_columns())
                 model_.settle();  // lines enter flip-flops only
@@ -118,6 +122,11 @@ private:
 EXPORT Board *board_new() { return new Board; }
 EXPORT void board_free(Board *board) { delete board; }
 EXPORT uint64_t board_cycle(Board *board) { return board->cycle; }
+EXPORT void board_restart(Board *board, unsigned mutant) {
+    board->~Board();
+    new (board) Board;
+    board->mutant = mutant;
+}
 EXPORT void board_press(Board *board, unsigned number, const uint64_t *cells) { board->press(number, cells); }
 EXPORT void board_run(Board *board, uint64_t cycles) { board->run(cycles); }
 EXPORT void board_send(Board *board, const uint8_t *bytes, size_t count) {
