@@ -8,6 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from contactfpga.inputs.files import replaced
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -85,5 +87,6 @@ def new(height_in: float) -> Figure:
 def save(figure: Figure, path: Path) -> Path:
     """Write a picture without the time at which it was drawn."""
     drawn_with = {".svg": {"Date": None}, ".png": {"Software": None}}
-    figure.savefig(path, dpi=2 * 96, metadata=drawn_with.get(path.suffix.lower()))
+    with replaced(path) as new:
+        figure.savefig(new, dpi=2 * 96, metadata=drawn_with.get(path.suffix.lower()))
     return path

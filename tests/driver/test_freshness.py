@@ -125,8 +125,25 @@ def test_no_number_is_sent_that_a_frame_on_its_way_can_carry():
         lows.append(number % 8)
     assert len(set(lows)) == MOST_APART + 1
     requests.ask(0.0, 1.0)
+    assert not requests.data_to_send(), "the seventh could be taken for the one last seen"
+    requests.take_frame(lows[0], 0.01)
+    ((number, hello),) = numbers(requests.data_to_send())
+    assert (number % 8, hello) == (lows[-1] % 7 + 1, False), "a frame with the first one makes room"
+    assert requests.answered == 2  # `known` asked first
+    requests.take_frame(number % 8, 0.02)
+    assert requests.answered == MOST_APART + 3
+
+
+def test_many_that_ask_while_all_requests_are_lost_are_asked_for_anew():
+    requests = known()
+    for _ in range(MOST_APART + 5):
+        requests.ask(0.0, 2.0)
+    assert len(numbers(requests.data_to_send())) == MOST_APART + 1
+    requests.ask(0.4, 2.0)
+    assert not requests.data_to_send()
+    requests.poll(0.6)
     ((_, hello),) = numbers(requests.data_to_send())
-    assert hello, "the seventh could be taken for the one last seen"
+    assert hello
 
 
 def test_a_hello_that_repeats_another_number_is_none_of_ours():

@@ -23,6 +23,8 @@ SKIN = Skin()
 LONG = 60.0
 LOST_BYTES, LOST_S = 1 << 16, 0.2  # what the issue allows
 KIND = "contactfpga_msgs/Bytes"
+UNKEPT = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+"""Where files may not grow, Python would keep modules cut short."""
 
 
 def record(file, port, **options):
@@ -161,7 +163,7 @@ def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
 
     with FakeBoard(SKIN) as board:
         file = tmp_path / "x.mcap"
-        process = record(file, board.path, preexec_fn=limited)
+        process = record(file, board.path, preexec_fn=limited, env=UNKEPT)
         wait_until(lambda: file.exists() and file.stat().st_size > 0)
         with Sender(board, frames, 0.002):
             _, errors = process.communicate(timeout=LONG)
@@ -250,6 +252,108 @@ def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys, numbe
     assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
     assert "Left out in between: 1 damaged piece;" in capsys.readouterr().out
     assert read(tmp_path / "new.mcap")[0] == messages[: 2 * number] + messages[2 * number + 2 :]
+
+
+@pytest.mark.parametrize("cut", [5, 30, 100])
+def test_a_file_that_ends_within_its_index_is_not_called_whole(closed, tmp_path, capsys, cut):
+    """All messages are there, and yet it cannot be read as it is."""
+    path, messages, _ = closed
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    out = capsys.readouterr().out
+    assert "Nothing is missing" not in out
+    assert "Left out at the end: " in out
+    assert read(tmp_path / "new.mcap")[0] == messages
+
+
+def recording(path, link, data):
+    """A closed file with one message of another link, whose numbers are those of the others' links."""
+    file = McapFile(path)
+    file.metadata("contactfpga", {"link": link, "skin": ""})
+    file.write(f"/{link}", KIND, link, 100, data, 0.0)
+    file.close()
+    return path.read_bytes()
+
+
+def topics(path):
+    from mcap.reader import make_reader
+
+    with open(path, "rb") as file:
+        return [(channel.topic, message.data) for _, channel, message in make_reader(file).iter_messages()]
+
+
+def test_two_recordings_in_one_file_are_both_recovered(closed, tmp_path, capsys):
+    path, messages, _ = closed
+    path.write_bytes(path.read_bytes() + recording(tmp_path / "b.mcap", "b", b"second"))
+    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"{path} holds 2 recordings, one after the other; the new file has them all." in out
+    assert "Nothing is missing" not in out
+    assert "Left out" not in out
+    kept, texts = read(tmp_path / "new.mcap")
+    assert kept == [*messages, b"second"]
+    assert [text["link"] for text in texts] == ["a", "b"]
+    assert topics(tmp_path / "new.mcap") == [*(("/a", data) for data in messages), ("/b", b"second")]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_definitions_of_one_recording_are_not_taken_for_another(closed, tmp_path, first):
+    """Its first piece, with the definitions, is damaged; links of both have the same numbers."""
+    path, messages, ends = closed
+    mine, other = bytearray(path.read_bytes()), recording(tmp_path / "b.mcap", "b", b"second")
+    mine[ends[0] - 400] ^= 1
+    path.write_bytes(mine + other if first else other + mine)
+    found = recover(path, tmp_path / "new.mcap")
+    assert (found.recordings, found.damaged) == (2, 1)
+    assert sorted(topics(found.path)) == sorted([*(("/a", data) for data in messages[2:]), ("/b", b"second")])
+
+
+def test_a_recording_behind_one_that_was_not_closed_is_recovered(closed, tmp_path):
+    path, messages, ends = closed
+    path.write_bytes(path.read_bytes()[: ends[1]] + recording(tmp_path / "b.mcap", "b", b"second"))
+    found = recover(path, tmp_path / "new.mcap")
+    assert (found.recordings, found.closed) == (2, False)
+    assert topics(found.path) == [*(("/a", data) for data in messages[:4]), ("/b", b"second")]
+
+
+def test_bytes_behind_the_end_are_counted(closed, tmp_path, capsys):
+    path, messages, _ = closed
+    path.write_bytes(path.read_bytes() + b"x" * 1234)
+    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    out = capsys.readouterr().out
+    assert "Nothing is missing" not in out
+    assert "Left out after the end: 1,234 bytes that are no recording." in out
+    assert read(tmp_path / "new.mcap")[0] == messages
+
+
+def test_messages_outside_of_chunks_are_copied(tmp_path):
+    """Other programs write such files."""
+    from mcap.writer import Writer
+
+    with open(tmp_path / "x.mcap", "wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start()
+        writer.add_message(writer.register_channel("/a", "cdr", 0), 5, b"abc", 5)
+        writer.finish()
+    assert read(recover(tmp_path / "x.mcap").path)[0] == [b"abc"]
+
+
+def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):
+    """A limit on the size of files stands for a full disk."""
+    path, *_ = closed
+
+    def limited():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+    command = [sys.executable, "-m", "contactfpga", "recover", str(path)]
+    done = subprocess.run(command, preexec_fn=limited, capture_output=True, text=True, env=UNKEPT)
+    assert done.returncode == 1
+    new = path.with_name("closed_recovered.mcap")
+    assert " ".join(done.stderr.split()) == (
+        f"contactfpga: {new} cannot be written: there is no room for more (File too large); nothing of it is left"
+    )
+    assert list(path.parent.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(

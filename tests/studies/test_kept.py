@@ -32,4 +32,4 @@ def test_what_fails_is_not_kept(folder):
     with pytest.raises(ZeroDivisionError):
         kept.kept("one", "key", lambda: 1 // 0)
     assert kept.kept("one", "key", lambda: 2) == 2
-    assert len(list(folder.iterdir())) == 1
+    assert len(list(folder.glob("*.json"))) == 1

@@ -1,6 +1,7 @@
 """The cache of compiled gateware: what others could have written is not loaded."""
 
 import os
+import random
 import signal
 import stat
 import subprocess
@@ -49,10 +50,23 @@ def test_a_umask_that_takes_everything_is_no_trouble(tmp_path):
 
 
 @pytest.mark.parametrize("bits", [0o777, 0o770, 0o722, 0o1777])
-def test_a_folder_that_others_can_write_is_refused(tmp_path, bits):
+@pytest.mark.parametrize("named", [False, True])
+def test_a_folder_that_others_can_write_is_refused(tmp_path, monkeypatch, bits, named):
     tmp_path.chmod(bits)
-    with pytest.raises(CacheError, match=r"can be written by others \(mode 1?7\d+\).*rm -r .*CONTACTFPGA_CACHE"):
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path) if named else "")
+    advice = "" if named else r"what lies there .* \(rm -r .*\), or "
+    says = rf"can be written by others \(mode 1?7\d+\); {advice}name another folder with CONTACTFPGA_CACHE$"
+    with pytest.raises(CacheError, match=says):
         cache.ready(tmp_path)
+
+
+@pytest.mark.parametrize("path", ["/dev/null", "file", "pipe"])
+def test_what_is_no_folder_is_refused_and_nobody_is_told_to_delete_it(tmp_path, monkeypatch, path):
+    (tmp_path / "file").touch()
+    os.mkfifo(tmp_path / "pipe")
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path / path))
+    with pytest.raises(CacheError, match=r"is not a folder; name another folder with CONTACTFPGA_CACHE$"):
+        cache.ready(cache.cache_folder())
 
 
 def test_a_folder_in_one_that_anybody_can_write_is_refused(tmp_path):
@@ -78,6 +92,20 @@ def test_what_belongs_to_another_is_refused(tmp_path, not_mine):
     for check, path in ((cache.trusted, library), (cache.ready, tmp_path)):
         with pytest.raises(CacheError, match=r"belongs to user \d+, not to you or root"):
             check(path)
+
+
+@pytest.mark.skipif(ME != 0, reason="only root can give a folder away")
+@pytest.mark.parametrize("depth", [1, 2])
+def test_a_folder_in_one_of_another_user_is_refused(tmp_path, depth):
+    """Who owns a folder can replace what lies in it, though it belongs to somebody else."""
+    folder = tmp_path.joinpath(*"abc"[: depth + 1])
+    cache.ready(folder)
+    other = folder.parents[depth - 1]
+    os.chown(other, OTHER, OTHER)
+    with pytest.raises(CacheError, match=rf"lies in {other}, where user {OTHER} can replace it; name another folder"):
+        cache.ready(folder)
+    other.chmod(0o1777)
+    assert cache.ready(folder) == folder
 
 
 def test_what_belongs_to_root_is_trusted_by_all(monkeypatch):
@@ -132,6 +160,89 @@ def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
         process.send_signal(signal.SIGKILL)
     with cache.scratch(tmp_path, "build") as work:
         assert {path.name for path in tmp_path.iterdir()} == {work.name, "build-just-begun"}
+
+
+ANSWER = """
+import ctypes, subprocess, sys
+from pathlib import Path
+from contactfpga_sim.board import cache, native
+
+def build(model, compiler, library):
+    with cache.scratch(library.parent, "build") as work:
+        code = 'extern "C" const char zeros[100000] = {}; extern "C" int answer() { return 42; }'
+        command = [*compiler, "-shared", "-fPIC", "-xc++", "-", "-o", work / "a.so"]
+        subprocess.run(command, input=code, text=True, check=True)
+        cache.put(work / "a.so", library)
+    print("built")
+
+native._build = build
+print(native.load(native.Model("the answer", "label.cpp", "answer", None)).answer())
+"""
+
+
+def answer(folder):
+    """What a process says that loads a library from the cache, and makes it there is none."""
+    environment = os.environ | {"CONTACTFPGA_CACHE": str(folder)}
+    command = [sys.executable, "-c", ANSWER]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100, check=False)
+    return done.returncode, done.stdout.split(), done.stderr
+
+
+def damages():
+    yield "emptied", lambda data: b""
+    yield from ((f"cut to {size}", lambda data, size=size: data[:size]) for size in (63, 3000))
+    yield "cut by a byte", lambda data: data[:-1]
+    yield "longer", lambda data: data + b"\0"
+    rng = random.Random(5)
+    for share in (0.0, rng.random(), 0.9999):
+        bit = 1 << rng.randrange(8)
+
+        def flipped(data, share=share, bit=bit):
+            at = int(share * len(data))
+            return data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
+
+        yield f"flipped at {share:.2f}", flipped
+
+
+def test_a_damaged_library_is_not_loaded_but_built_again(tmp_path):
+    assert answer(tmp_path) == (0, ["built", "42"], "")
+    assert answer(tmp_path) == (0, ["42"], "")
+    (library,) = tmp_path.glob("*.so")
+    good = library.read_bytes()
+    for what, damaged in damages():
+        library.write_bytes(damaged(good))
+        told = f"contactfpga: {library} in the cache is damaged; it is made again\n"
+        assert answer(tmp_path) == (0, ["built", "42"], told), what
+        assert library.read_bytes() == good, what
+    assert answer(tmp_path) == (0, ["42"], "")
+
+
+@pytest.mark.parametrize("damaged", [b"", b"0" * 64, None])
+def test_a_library_without_its_sum_is_built_again(tmp_path, damaged):
+    answer(tmp_path)
+    (total,) = tmp_path.glob("*.so.sum")
+    if damaged is None:
+        total.unlink()
+    else:
+        total.write_bytes(damaged)
+    status, said, told = answer(tmp_path)
+    assert (status, said) == (0, ["built", "42"])
+    assert "is damaged; it is made again" in told
+    total.chmod(0o666)
+    status, said, told = answer(tmp_path)
+    assert status == 1
+    assert "can be written by others (mode 666)" in told
+
+
+def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path))
+    assert kept.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+    (path,) = tmp_path.glob("*.json")
+    for damaged in (b"", b"[1, 2", b"[1, 23]"):
+        path.write_bytes(damaged)
+        assert kept.kept("kind", "key", lambda: [1, 22]) == [1, 22]
+        assert capsys.readouterr().err == f"contactfpga: {path} in the cache is damaged; it is made again\n"
+    assert kept.kept("kind", "key", lambda: 5) == [1, 22]
 
 
 @pytest.mark.campaign  # it compiles a board in a cache of its own

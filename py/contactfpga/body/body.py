@@ -14,6 +14,7 @@ from contactfpga.body.joints import Joints
 from contactfpga.body.kinematics import Kinematics
 from contactfpga.body.plan import Plan
 from contactfpga.choices.choice import trusted
+from contactfpga.driver.mcap_part import MAX_LINKS
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 
@@ -54,6 +55,8 @@ class Body:
         tables = values.get("links")
         if not isinstance(tables, list) or not tables:
             raise BodyError("there is no link; give a table [[links]] with name, skin and port for each")
+        if len(tables) > MAX_LINKS:
+            raise BodyError(f"{len(tables)} links; the limit is {MAX_LINKS}")
         urdf = urdf_file.located(plan.text(values, "urdf"), folder) if "urdf" in values else None
         kinematics = None if urdf is None else Kinematics(urdf_file.load(urdf))
         return cls(_by_name([plan.read(one, folder) for one in tables], kinematics), kinematics, urdf)

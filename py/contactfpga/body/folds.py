@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactfpga.body.answer import BodyError
-from contactfpga.inputs.files import read_small
+from contactfpga.inputs.files import read_small, write_text
 from contactfpga.inputs.values import is_finite, shown, whole
 from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
@@ -62,7 +62,7 @@ class Folds:
             for step, count in sorted(self.frames.items())
         ]
         values = {"joint": self.joint, "step_rad": self.step_rad, "lines": self.lines, "steps": steps}
-        Path(path).write_text(json.dumps(values) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(values) + "\n")
 
     @classmethod
     def load(cls, path: str | Path) -> Folds:

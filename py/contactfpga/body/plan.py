@@ -17,6 +17,7 @@ from contactfpga.body.folds import Folds
 from contactfpga.body.pose import Pose
 from contactfpga.choices.choice import trusting
 from contactfpga.driver import sheets, sim_address
+from contactfpga.driver.mcap_part import MAX_NAME
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics.units import LoadCells
@@ -97,6 +98,8 @@ def read(values: Any, folder: Path) -> Plan:
     if not isinstance(values, dict):
         raise BodyError(f"a link is {shown(values)}; it must be a table, [[links]]")
     name = text(values, "name")
+    if len(name) > MAX_NAME:
+        raise BodyError(f"name is {shown(name)}; it has at most {MAX_NAME} characters")
     try:
         return _plan(name, values, folder)
     except ContactFPGAError as error:

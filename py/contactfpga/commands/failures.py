@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, outputs
 from contactfpga.console.interrupt import Interrupted
+from contactfpga.inputs.files import write_text
 
 if TYPE_CHECKING:
     from contactfpga_sim.studies.failures.knob import Turned
@@ -54,7 +55,7 @@ def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
     from contactfpga_sim.pages import failures_page
 
     both = failures_page.table(turned), failures_page.unnoticed(turned)
-    path.write_text("\n\n".join(both) + "\n", encoding="utf-8")
+    write_text(path, "\n\n".join(both) + "\n")
     return path
 
 
@@ -72,7 +73,7 @@ def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
     from contactfpga_sim.studies.failures.catalogue import STUDIES
 
     for name, methods in turned.items():
-        (folder / f"{name}.svg").write_text(knob_pictures.svg(STUDIES[name], methods), encoding="utf-8")
+        write_text(folder / f"{name}.svg", knob_pictures.svg(STUDIES[name], methods))
         print(folder / f"{name}.svg")
 
 

@@ -15,6 +15,7 @@ from contactfpga.console import flags, numbers, outputs
 from contactfpga.console.interrupt import Interrupted
 from contactfpga.cover import load_cover
 from contactfpga.errors import UNSOLVED
+from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         show.printed(found)
     if output and found.answer:
         command = shlex.join(["contactfpga", *sys.argv[1:]]) if sys.argv[1:] else "contactfpga fit"
-        output.write_text(show.toml(found, command), encoding="utf-8")
+        write_text(output, show.toml(found, command))
         if not args.json:
             print(f"Skin: {output}")
     return 0 if found.answer and not found.broken else UNSOLVED

@@ -23,12 +23,18 @@ def run(args: argparse.Namespace) -> int:
 
     found = recover(args.file, args.into)
     terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
-    if found.closed and not found.damaged:
+    if found.recordings > 1:
+        terminal.say(
+            f"{args.file} holds {found.recordings} recordings, one after the other; the new file has them all."
+        )
+    elif found.closed and not found.damaged and not found.beyond:
         terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
     if found.cut:
         terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
     if found.damaged:
         terminal.say(f"Left out in between: {_pieces(found.damaged)}; frames are missing there.")
+    if found.beyond:
+        terminal.say(f"Left out after the end: {found.beyond:,} bytes that are no recording.")
     return 0
 
 

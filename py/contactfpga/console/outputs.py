@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import tempfile
 from pathlib import Path
@@ -40,15 +39,15 @@ def file(path: str | Path, option: str = "--output") -> Path:
     _made(place.parent, place, option)
     if place.is_dir():
         raise OutputError(f"{option} is {str(place)!r}; that is a folder, and a file is needed")
-    new = not os.path.lexists(place)
     try:
-        with open(place, "ab"):
-            pass
+        os.lstat(place)  # which refuses what can be no name
+        if place.exists():  # and is no link to what does not
+            with open(place, "ab"):
+                pass
+    except FileNotFoundError:
+        pass
     except (OSError, ValueError) as error:
         raise OutputError(_refused(option, place, error)) from None
-    if new:
-        with contextlib.suppress(OSError):
-            place.unlink()
     return place
 
 

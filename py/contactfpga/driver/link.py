@@ -75,12 +75,13 @@ class Link:
         """When it came."""
         self._last_bytes = 0  # that had come by then
         self._asked_s = -math.inf  # by :meth:`ask`
-        self._sending = threading.Lock()
         self._commanding = threading.Lock()
         self._waiters: list[_Waiter] = []
         self._failure: BaseException | None = None
         self._closing = False
         self._turning: int | None = None  # the thread that reads
+        self._writing: int | None = None  # the thread that writes
+        self._closers = 0  # threads that wait in :meth:`close`
         if transport.threaded:
             threading.Thread(target=self._read_all, name=f"reader of {transport.name}", daemon=True).start()
 
@@ -165,11 +166,26 @@ class Link:
         with self.changed:
             self._closing = True
             self.changed.notify_all()
-            if self._turning == threading.get_ident():  # a scene's callback closes: its turn does the rest
-                return
-            while self._turning is not None:
-                self.changed.wait(1.0)
-            with self._sending:
+            if threading.get_ident() in (self._turning, self._writing):  # a scene's callback closes
+                return  # what it was called by does the rest
+            self._closers += 1
+            try:
+                while self._in_use():
+                    self.changed.wait(1.0)
+            finally:
+                self._closers -= 1
+            self.transport.close()
+
+    def _in_use(self) -> bool:
+        """Whether a thread is in the transport; the lock is held."""
+        return self._turning is not None or self._writing is not None
+
+    def _leave(self) -> None:
+        """What a thread does that was in the transport, with the lock held: the last one of a board that was closed
+        gives the port back, unless :meth:`close` waits to do so and to tell its caller what fails."""
+        if self._closing:
+            self.changed.notify_all()
+            if not self._in_use() and not self._closers:
                 self.transport.close()
 
     def check_open(self) -> None:
@@ -205,8 +221,7 @@ class Link:
             self.changed.acquire()
             self._turning = None
             self.changed.notify_all()
-            if self._closing:
-                self.transport.close()
+            self._leave()
         self.check_open()
         if self._breaks() != breaks:
             self.conversation.doubt(self.transport.clock())
@@ -258,12 +273,19 @@ class Link:
                 waiter.found = event
 
     def _send(self) -> None:
+        """Write what has to be sent, in the order in which the conversation made it: one thread writes at a time, and
+        what others ask meanwhile it writes next. A caller that holds the lock keeps it; else others go on."""
         with self.changed:
-            data = self.conversation.data_to_send()
-        if data:
-            with self._sending:
-                self.check_open()
-                self.transport.write(data)
+            while self._writing is None and not self._closing and (data := self.conversation.data_to_send()):
+                self._writing = threading.get_ident()
+                self.changed.release()
+                try:
+                    self.transport.write(data)
+                finally:
+                    self.changed.acquire()
+                    self._writing = None
+                    self._leave()
+            self.check_open()
 
     def _read_all(self) -> None:
         """What the reader thread does, until the board is closed or the port is lost."""
@@ -273,7 +295,7 @@ class Link:
                     self.check_open()
                     self._turn(TURN_S)
                 except BoardClosed:
-                    self.transport.close()
+                    self._leave()
                     return
                 except BaseException as error:  # whoever calls next gets it
                     self._failure = error

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from contactfpga.driver.mcap_part import METADATA, McapPart, RecordingError, files_of
+from contactfpga.driver.mcap_part import METADATA, McapPart, files_of
+from contactfpga.driver.mcap_records import RecordingError
+from contactfpga.skin.widths import LONGEST_PACKET
 from contactfpga.wire.hellos import find_hello
 
 HELLO_NS = 600_000_000
@@ -58,14 +60,11 @@ class McapBytes:
         if start_ns is None:
             yield from self._read(link)
             return
-        begin_ns = start_ns
+        begin_ns, at = start_ns, -1
         for begin_ns in (start_ns - HELLO_NS, start_ns - 8 * HELLO_NS, self.start_ns):
-            pieces = list(self._read(link, begin_ns, start_ns + 1))
-            if (at := find_hello(b"".join(data for _, data in pieces), last=True)) >= 0:
-                yield from _after(pieces, at)
+            if (at := _last_hello(self._read(link, begin_ns, start_ns + 1))) >= 0:
                 break
-        else:
-            yield from pieces
+        yield from _after(self._read(link, begin_ns, start_ns + 1), max(0, at))
         yield from self._read(link, start_ns + 1)
 
     def _read(self, link: str, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[tuple[int, bytes]]:
@@ -83,15 +82,16 @@ class McapStream:
             lasts_s = (file.end_ns - file.start_ns) / 1e9
             raise RecordingError(f"{path} lasts {lasts_s:.3f} s; it cannot start at {start_s:g} s")
         self._pieces = file.pieces(file.checked(link), start_ns if start_s else None)
-        self._rest = b""
+        self._piece, self._taken = b"", 0
 
     def read(self, count: int) -> bytes:
         """At most ``count`` bytes; b"" at the end."""
-        while not self._rest:
+        while self._taken >= len(self._piece):
             if (piece := next(self._pieces, None)) is None:
                 return b""
-            self._rest = piece[1]
-        data, self._rest = self._rest[:count], self._rest[count:]
+            self._piece, self._taken = piece[1], 0
+        data = self._piece[self._taken : self._taken + count]
+        self._taken += count
         return data
 
     def close(self) -> None:
@@ -99,7 +99,19 @@ class McapStream:
         self._pieces.close()  # type: ignore[attr-defined]
 
 
-def _after(pieces: list[tuple[int, bytes]], at: int) -> Iterator[tuple[int, bytes]]:
+def _last_hello(pieces: Iterable[tuple[int, bytes]]) -> int:
+    """Where in all bytes together the last whole hello begins; -1: there is none."""
+    found, before, held = -1, 0, b""
+    for _, data in pieces:
+        data = held + data
+        if (at := find_hello(data, last=True)) >= 0:
+            found = before + at
+        held = data[data.rfind(0) + 1 :][-LONGEST_PACKET:]
+        before += len(data) - len(held)
+    return found
+
+
+def _after(pieces: Iterable[tuple[int, bytes]], at: int) -> Iterator[tuple[int, bytes]]:
     """The pieces without their first ``at`` bytes."""
     for moment, data in pieces:
         if at < len(data):

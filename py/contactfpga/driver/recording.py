@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
+import os
 import re
+import stat
 from pathlib import Path
 from typing import BinaryIO, Protocol
 from urllib.parse import unquote
 
 from contactfpga.driver.mcap_bytes import McapStream
-from contactfpga.driver.mcap_part import MAGIC, files_of
+from contactfpga.driver.mcap_part import files_of
+from contactfpga.driver.mcap_records import MAGIC
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import number_in
@@ -139,8 +143,8 @@ def open_recorded(name: str) -> Recorded:
 def check(path: str | Path) -> None:
     """Refuse a file that cannot be made or holds something, before a board is opened or built for it."""
     place = Path(path)
-    if place.is_file() and place.stat().st_size:
-        raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")
+    if place.is_file():
+        _check_empty(path, place.stat())
     if place.is_dir():
         raise ContactFPGAError(f"{path} cannot be written: it is a folder; name a file")
     if not place.parent.is_dir():
@@ -151,6 +155,17 @@ def create(path: str | Path) -> BinaryIO:
     """A file for every byte from a port; never one that holds something."""
     check(path)
     try:
-        return open(path, "wb")
+        # Not cut short where there came to be one after the look.
+        file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "wb")
+        with contextlib.ExitStack() as refused:
+            refused.callback(file.close)
+            _check_empty(path, os.fstat(file.fileno()))
+            refused.pop_all()
+        return file
     except OSError as error:
         raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
+
+
+def _check_empty(path: str | Path, found: os.stat_result) -> None:
+    if stat.S_ISREG(found.st_mode) and found.st_size:
+        raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")

@@ -8,6 +8,7 @@ import time
 from contactfpga.driver import recording
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, ReplayEnded
+from contactfpga.skin.widths import LONGEST_PACKET
 
 
 class ReplayTransport:
@@ -52,9 +53,10 @@ class _Pace:
 
     def read(self, file: recording.Recorded, timeout_s: float) -> bytes:
         if not self._held:
-            self._held = _more(file, 1, self._name)
-            while not self._held.endswith(b"\0") and (more := file.read(1)):
-                self._held += more
+            packet = bytearray(_more(file, 1, self._name))
+            while packet[-1] and len(packet) <= LONGEST_PACKET and (more := file.read(1)):
+                packet += more
+            self._held = bytes(packet)
             for event in self._conversation.receive(self._held, 0.0):
                 if isinstance(event, Arrival):
                     self._schedule(event.zones.time_us)

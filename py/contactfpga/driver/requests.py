@@ -46,6 +46,7 @@ class Requests:
         self._out = bytearray()
         self._stage = _Stage.UNKNOWN
         self._tickets = 0
+        self._asked = 0  # all tickets up to this one have a request that was sent since the stage is known
         self._until = 0.0
         self._sent_at = 0.0
         self._number = 0
@@ -125,13 +126,13 @@ class Requests:
             self._seen = step
             if self._command is not None and self._commanding <= self.answered:
                 self.end_command()
-                if self._tickets > self.answered:
-                    self._send(now, hello=False)
+            if self._tickets > self._asked and not self._in_flight:
+                self._send(now, hello=False)
 
     def _send(self, now: float, hello: bool) -> None:
         if self._stage is _Stage.KNOWN and self._step - self._seen <= MOST_APART:
             self._send_next(now, hello)
-        elif self._stage in (_Stage.UNKNOWN, _Stage.KNOWN) or now >= self._sent_at + self.retry_s:
+        elif self._stage is _Stage.UNKNOWN or now >= self._sent_at + self.retry_s:
             self._stage, self._in_flight = _Stage.GREETING, False
             self._put(self._random(), now, hello=True)
 
@@ -141,6 +142,7 @@ class Requests:
             number += 1
         self._step += 1
         self._stands_for[self._step] = self._tickets, now
+        self._asked = self._tickets
         self._in_flight = self._command is not None and now < self._command_until
         self._put(number % _NUMBERS, now, hello, self._command if self._in_flight else None)
 

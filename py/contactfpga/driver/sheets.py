@@ -90,6 +90,7 @@ class SharedPort:
         self.baud = baud
         self.failure: Exception | None = None
         self._changed = threading.Condition()
+        self._writing = threading.Lock()
         self._reading = False
         self._sorter = Sorter()
         self._waiting: dict[SheetPort, deque[bytes]] = {}
@@ -128,6 +129,11 @@ class SharedPort:
                 came = self._turn(max(0.0, min(left, TURN_S)))
                 if not came and timeout_s <= 0:
                     return b""
+
+    def write(self, data: bytes) -> None:
+        """Send this as a whole: requests of two sheets that mingle are none."""
+        with self._writing:
+            self.inner.write(data)
 
     def _check(self, sheet: SheetPort) -> None:
         if self.failure is not None:
@@ -173,7 +179,7 @@ class SheetPort:
         return self._shared.read(self, timeout_s)
 
     def write(self, data: bytes) -> None:
-        self._shared.inner.write(numbered_requests(data, self.number))
+        self._shared.write(numbered_requests(data, self.number))
 
     def close(self) -> None:
         _give_back(self, self._shared)

@@ -1,10 +1,14 @@
-"""Files that can be read to an end: a FIFO would be waited for, a device read forever."""
+"""Files that can be read to an end: no FIFO, no device. Files that are whole or not there."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import secrets
+import shutil
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, TypeGuard
 
@@ -30,6 +34,36 @@ def read_small(path: str | Path, most: int, what: str, refused: type[Exception])
     if len(data) > most:
         raise refused(f"{path}: longer than {most:,} bytes; is it {what}?")
     return data
+
+
+@contextlib.contextmanager
+def replaced(path: str | Path) -> Iterator[Path]:
+    """A new, empty file in the folder of ``path``, whose name nobody knows: write it. After the block it takes the
+    place of ``path``, whole; if the block fails, nothing is left of it and ``path`` is as it was. What is there and no
+    regular file, such as /dev/stdout into a pipe, is written itself. Raises OSError, which names ``path``."""
+    if Path(path).exists() and not Path(path).is_file():
+        yield Path(path)
+        return
+    place = Path(os.path.realpath(path))  # a link that the user names is followed, as any program does
+    new = place.with_name(f".contactfpga-{secrets.token_hex(8)}{Path(path).suffix}")
+    try:
+        os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        yield new
+        if place.exists():
+            shutil.copymode(place, new)
+        os.replace(new, place)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        if isinstance(error, OSError) and error.filename in (None, str(new), new):
+            error.filename, error.filename2 = os.fspath(path), None
+        raise
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a file of this text in UTF-8, whole or not at all. Raises OSError."""
+    with replaced(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def names_robot(port: str | None) -> TypeGuard[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.inputs.files import told
+from contactfpga.inputs.files import replaced, told
 from contactfpga.recordings import table
 from contactfpga.recordings.recording import Recording
 from contactfpga.recordings.table import COLUMNS, Piece
@@ -30,15 +29,12 @@ def export(recording: Recording, path: str | Path) -> int:
     write = _WRITERS.get(target.suffix.lower())
     if write is None:
         raise ContactFPGAError(f"{path}: its name ends in {target.suffix!r}; take one of: {', '.join(_WRITERS)}")
-    part = target.with_name(f"{target.name}.part")
     counted = _Counted(table.pieces(recording))
     try:
-        write(part, counted, table.facts(recording))
-        os.replace(part, target)
+        with replaced(target) as new:
+            write(new, counted, table.facts(recording))
     except OSError as error:
         raise ContactFPGAError(f"{path} cannot be written: {error.strerror or told(error)}") from None
-    finally:
-        part.unlink(missing_ok=True)
     return counted.rows
 
 

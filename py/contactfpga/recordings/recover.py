@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver.mcap_part import LARGEST, MAGIC, RecordingError
+from contactfpga.driver import mcap_records
+from contactfpga.driver.mcap_part import Summary
+from contactfpga.driver.mcap_records import MAGIC, Cut, RecordingError, Unreadable
 from contactfpga.errors import MissingExtra
-from contactfpga.inputs.files import open_regular, told
+from contactfpga.inputs.files import open_regular, replaced, told
 from contactfpga.recordings.mcap_file import McapFile
-
-_HEAD = 9
-"""Bytes before a record: what it is, and how long."""
+from contactfpga.recordings.whole_file import RecordingFailed
 
 
 @dataclasses.dataclass
@@ -26,60 +28,107 @@ class Recovered:
     seconds: float = 0.0
     """From the first message to the last one."""
     damaged: int = 0
-    """Pieces in the middle that were left out."""
+    """Pieces in the middle that were left out, as they are damaged or larger than they may be."""
     cut: int = 0
     """Bytes of a piece at the end that is not whole."""
     closed: bool = False
-    """It was closed as it should be."""
+    """It was closed as it should be; of several, the last one."""
+    recordings: int = 1
+    """Recordings in the file, one after the other."""
+    beyond: int = 0
+    """Bytes after the end of the last one that are no recording."""
 
 
 def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
     """Copy what is whole into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``; the old one stays
-    as it is. Raises :class:`RecordingError` where there is nothing to copy, or a file of the new one's name."""
+    as it is. The new one is there once it is whole. Raises :class:`RecordingError` where there is nothing to copy, no
+    room, or a file of the new one's name."""
     source = Path(path)
     target = source.parent / f"{source.stem}_recovered{source.suffix}" if into is None else Path(into)
     try:
         file = open_regular(source)
     except OSError as error:
         raise RecordingError(f"{source} cannot be opened: {error.strerror or told(error)}") from None
+    try:
+        import mcap.records  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"recovering a recording ({error})", "record") from None
     with file:
         if file.read(len(MAGIC)) != MAGIC:
             raise RecordingError(f"{source} is no MCAP file")
+        if os.path.lexists(target):
+            raise RecordingError(f"{target} is there already; name a new file, or remove it first")
         found = Recovered(target)
-        copy = _Copy(target, *_definitions(file))
-        file.seek(len(MAGIC))
         try:
-            for record in _records(file, found):
-                copy.take(record, found)
-        finally:
-            copy.close()
-    if not found.messages:
-        target.unlink()
-        raise RecordingError(f"{source} holds not one whole message; there is nothing to recover")
+            with replaced(target) as new:
+                _copy_all(file, new, found)
+                if not found.messages:
+                    raise RecordingError(f"{source} holds not one whole message; there is nothing to recover")
+        except RecordingFailed as error:
+            raise RecordingError(f"{target} cannot be written: {error.reason}; nothing of it is left") from None
+        except OSError as error:
+            raise RecordingError(f"{target} cannot be written: {error.strerror or told(error)}") from None
     return found
+
+
+def _copy_all(file: BinaryIO, new: Path, found: Recovered) -> None:
+    definitions = _definitions(file)
+    new.unlink()  # as it will be made
+    copy = _Copy(new)
+    try:
+        for number, kind, data in _walk(file, found):
+            if number >= len(copy.definitions):
+                copy.definitions.append(definitions[number])
+            try:
+                for record in _inside(kind, data):
+                    copy.take(record, found)
+            except Unreadable:
+                found.damaged += 1
+    finally:
+        copy.close()
+    try:
+        Summary(file)
+    except Unreadable:
+        found.closed = False
+
+
+class _Definitions:
+    """Schemas and channels of one recording, by their numbers."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Any] = {}
+        self.channels: dict[int, Any] = {}
+
+    def take(self, record: Any) -> None:
+        """A record that may be one of them."""
+        from mcap.records import Channel, Schema
+
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
 
 
 class _Copy:
     """The new file."""
 
-    def __init__(self, path: Path, schemas: dict[int, Any], channels: dict[int, Any]):
+    def __init__(self, path: Path):
         self._file = McapFile(path)
-        self._schemas, self._channels = dict(schemas), dict(channels)
+        self.definitions: list[_Definitions] = []
+        """Of each recording that has begun; numbers of the last one count."""
         self._first_ns: int | None = None
 
     def take(self, record: Any, found: Recovered) -> None:
         """Add a record of the old one."""
-        from mcap.records import Channel, Message, Metadata, Schema
+        from mcap.records import Message, Metadata
 
+        known = self.definitions[-1]
+        known.take(record)
         if isinstance(record, Metadata):
             self._file.metadata(record.name, record.metadata)
-        elif isinstance(record, Schema):
-            self._schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self._channels[record.id] = record
-        elif isinstance(record, Message) and record.channel_id in self._channels:
-            channel = self._channels[record.channel_id]
-            self._file.copy(channel, self._schemas.get(channel.schema_id), record.log_time, record.data)
+        elif isinstance(record, Message) and record.channel_id in known.channels:
+            channel = known.channels[record.channel_id]
+            self._file.copy(channel, known.schemas.get(channel.schema_id), record.log_time, record.data)
             self._first_ns = record.log_time if self._first_ns is None else self._first_ns
             found.messages += 1
             found.seconds = max(found.seconds, (record.log_time - self._first_ns) / 1e9)
@@ -88,46 +137,65 @@ class _Copy:
         self._file.close()
 
 
-def _definitions(file: BinaryIO) -> tuple[dict[int, Any], dict[int, Any]]:
-    """Schemas and channels, which a closed file repeats at its end: else all is lost where their first piece is
-    damaged. None where it has no end."""
-    try:
-        from mcap.reader import SeekingReader
+def _definitions(file: BinaryIO) -> list[_Definitions]:
+    """Of each recording in the file. A closed one repeats its schemas and channels at its end: else all is lost where
+    their first piece is damaged."""
+    from mcap.opcode import Opcode
 
-        file.seek(0)
-        summary = SeekingReader(file).get_summary()
-    except Exception:  # whatever the library stumbles over in a file without an end, or where it is not installed
-        summary = None
-    return ({}, {}) if summary is None else (summary.schemas, summary.channels)
+    found: list[_Definitions] = []
+    for number, kind, data in _walk(file, counts := Recovered(Path())):
+        found += [_Definitions() for _ in range(len(found), number + 1)]
+        if kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+            with contextlib.suppress(Unreadable):
+                for record in _inside(kind, data):
+                    found[number].take(record)
+    if len(found) == 1 and counts.cut:  # it may have an end all the same
+        with contextlib.suppress(Unreadable):
+            summary = Summary(file)
+            found[0].schemas, found[0].channels = dict(summary.schemas), dict(summary.channels)
+    return found
 
 
-def _records(file: BinaryIO, found: Recovered) -> Iterator[Any]:
-    """Records up to the end of the data, or of what is whole."""
-    try:
-        from mcap.data_stream import ReadDataStream
-        from mcap.opcode import Opcode
-        from mcap.records import Channel, Chunk, Metadata, Schema
-        from mcap.stream_reader import breakup_chunk
-    except ModuleNotFoundError as error:
-        raise MissingExtra(f"recovering a recording ({error})", "record") from None
-    import io
+def _walk(file: BinaryIO, found: Recovered) -> Iterator[tuple[int, int, bytes]]:
+    """(number of the recording, kind, content) of records up to the end of the last recording, or of what is whole."""
+    from mcap.opcode import Opcode
 
-    kinds = {Opcode.METADATA: Metadata, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.CHUNK: Chunk}
-    while head := file.read(_HEAD):
-        kind, size = head[0], int.from_bytes(head[1:], "little")
-        if kind == Opcode.DATA_END:
-            found.closed = True
-            return
-        data = file.read(size) if len(head) == _HEAD and size <= LARGEST else b""
-        if len(data) < size or len(head) < _HEAD:
-            found.cut = len(head) + len(data)
-            return
-        if kind not in kinds:
+    number = 0
+    file.seek(len(MAGIC))
+    while True:
+        at = file.tell()
+        head = file.read(len(MAGIC))
+        if head == MAGIC:  # another one follows
+            number += 1
+            found.recordings, found.closed = number + 1, False
             continue
+        file.seek(at)
+        if found.closed:
+            found.beyond = os.fstat(file.fileno()).st_size - at
+            return
         try:
-            record = kinds[kind].read(ReadDataStream(io.BytesIO(data)))
-            inside = breakup_chunk(record, validate_crc=True) if kind == Opcode.CHUNK else [record]
-        except Exception:  # whatever the library stumbles over in a piece that is damaged
-            found.damaged += 1
-            continue
-        yield from inside
+            one = mcap_records.record(file)
+        except Cut as cut:
+            found.cut = cut.size
+            return
+        if one is None:
+            return
+        yield number, *one
+        if one[0] == Opcode.FOOTER:
+            found.closed = file.read(len(MAGIC)) == MAGIC
+            if not found.closed:
+                found.cut = os.fstat(file.fileno()).st_size - at
+                return
+
+
+def _inside(kind: int, data: bytes) -> Iterator[Any]:
+    """The records that a copy needs. Raises :class:`Unreadable`."""
+    from mcap.opcode import Opcode
+    from mcap.records import Channel, Chunk, Metadata, Schema
+
+    if kind == Opcode.CHUNK:
+        yield from mcap_records.inside(mcap_records.parsed(Chunk, data))
+    elif kind == Opcode.MESSAGE:
+        yield mcap_records.message(data)
+    elif kind in (kinds := {Opcode.METADATA: Metadata, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}):
+        yield mcap_records.parsed(kinds[Opcode(kind)], data)

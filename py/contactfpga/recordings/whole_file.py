@@ -12,7 +12,11 @@ from contactfpga.inputs.files import told
 
 
 class RecordingFailed(ContactFPGAError):
-    """A recording could not be written any further; what was written is whole."""
+    """A recording could not be written any further; what was written is whole. ``reason``: why."""
+
+    def __init__(self, message: str, reason: str):
+        super().__init__(message)
+        self.reason = reason
 
 
 class WholeFile:
@@ -25,9 +29,11 @@ class WholeFile:
         try:
             self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
         except FileExistsError:
-            raise RecordingFailed(f"{path} is there already; name a new file, or remove it first") from None
+            reason = "is there already; name a new file, or remove it first"
+            raise RecordingFailed(f"{path} {reason}", reason) from None
         except OSError as error:
-            raise RecordingFailed(f"{path} cannot be written: {error.strerror or told(error)}") from None
+            reason = error.strerror or told(error)
+            raise RecordingFailed(f"{path} cannot be written: {reason}", reason) from None
 
     def tell(self) -> int:
         """Bytes so far, also those that wait."""
@@ -63,5 +69,6 @@ class WholeFile:
         reason = f"there is no room for more ({error.strerror})" if full else error.strerror or told(error)
         return RecordingFailed(
             f"{self.path}: {reason}; the {self._whole / 1e6:.1f} MB that are there are whole. "
-            f"Make room, then close the file with: contactfpga recover {self.path}"
+            f"Make room, then close the file with: contactfpga recover {self.path}",
+            reason,
         )

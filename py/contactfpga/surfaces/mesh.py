@@ -11,7 +11,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from contactfpga.inputs.files import read_small
+from contactfpga.inputs.files import read_small, replaced
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.surfaces.answer import SurfaceError, length
 from contactfpga.surfaces.shapes import Floats, Vector, is_one, vector
@@ -78,7 +78,7 @@ class Mesh:
     def save(self, path: str | Path) -> None:
         """Write the table as a NPZ file."""
         pitch = np.array([self.pitch_x_mm, self.pitch_y_mm])
-        with open(path, "wb") as file:
+        with replaced(path) as new, open(new, "wb") as file:
             np.savez(file, points_mm=self.points_mm, normals=self.normals, pitch_mm=pitch, closed=np.array(self.closed))
 
     @property

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 from contactfpga.driver import driver, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_part import MAGIC, SUFFIX, files_of
+from contactfpga.driver.mcap_part import SUFFIX, files_of
+from contactfpga.driver.mcap_records import MAGIC
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl  # not on Windows, where only the host part runs
+import hashlib
 import os
 import shlex
 import shutil
@@ -45,11 +46,13 @@ def ready(folder: Path) -> Path:
     try:
         _make(folder)
         folder = folder.resolve(strict=True)
-        _check(folder, folder.stat())
+        if not folder.is_dir():
+            raise CacheError(f"the cache {folder} is not a folder; {_another()}")
+        # What a user has named may hold anything, so nobody is told to delete it.
+        _check(folder, folder.stat(), _another() if os.environ.get("CONTACTFPGA_CACHE") else _remove(folder))
         for above in folder.parents:
-            mode = above.stat().st_mode
-            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
-                raise CacheError(f"the cache {folder} lies in {above}, where anybody can replace it; {_another()}")
+            if who := _replaces(above.stat()):
+                raise CacheError(f"the cache {folder} lies in {above}, where {who} can replace it; {_another()}")
     except OSError as error:
         raise CacheError(f"the cache {folder} cannot be used: {error.strerror}; {_another()}") from None
     return folder
@@ -63,8 +66,39 @@ def trusted(file: Path) -> bool:
         return False
     if not stat.S_ISREG(found.st_mode):
         raise CacheError(f"{file} in the cache is not a regular file; {_remove(file)}")
-    _check(file, found)
+    _check(file, found, _remove(file))
     return True
+
+
+def whole(file: Path, tell: bool = False) -> bool:
+    """Whether the file is there as it was :func:`put`, of which its sum beside it tells; with ``tell`` one that was
+    damaged since is named on stderr. Raises :class:`CacheError` if somebody else could have written either."""
+    if not trusted(file):
+        return False
+    total = _sum(file)
+    if trusted(total) and total.read_bytes() == _sum_of(file):
+        return True
+    if tell:
+        print(f"contactfpga: {file} in the cache is damaged; it is made again", file=sys.stderr)
+    return False
+
+
+def put(made: Path, file: Path) -> None:
+    """Move a file that was made in a folder of :func:`scratch` to its place, whole or not at all."""
+    total = made.with_name(f"{made.name}.sum")
+    total.write_bytes(_sum_of(made))
+    # The sum goes first: a file without its own is never taken.
+    for new, place in ((total, _sum(file)), (made, file)):
+        new.chmod(FILE_MODE)
+        os.replace(new, place)
+
+
+def _sum(file: Path) -> Path:
+    return file.with_name(f"{file.name}.sum")
+
+
+def _sum_of(file: Path) -> bytes:
+    return hashlib.sha256(file.read_bytes()).hexdigest().encode()
 
 
 @contextlib.contextmanager
@@ -107,12 +141,23 @@ def _make(folder: Path) -> None:
             path.chmod(FOLDER_MODE)  # whatever the umask took away
 
 
-def _check(path: Path, found: os.stat_result) -> None:
+def _check(path: Path, found: os.stat_result, advice: str) -> None:
     if found.st_uid not in (os.geteuid(), 0):
-        raise CacheError(f"{path} in the cache belongs to user {found.st_uid}, not to you or root; {_remove(path)}")
+        raise CacheError(f"{path} in the cache belongs to user {found.st_uid}, not to you or root; {advice}")
     if found.st_mode & OTHERS_WRITE:
         mode = stat.S_IMODE(found.st_mode)
-        raise CacheError(f"{path} in the cache can be written by others (mode {mode:o}); {_remove(path)}")
+        raise CacheError(f"{path} in the cache can be written by others (mode {mode:o}); {advice}")
+
+
+def _replaces(above: os.stat_result) -> str:
+    """Who else can replace what lies in a folder, empty for nobody."""
+    if above.st_mode & stat.S_ISVTX:
+        return ""
+    if above.st_mode & stat.S_IWOTH:
+        return "anybody"
+    # Who owns the root folder owns all. In a sandbox that need not be user 0.
+    others = above.st_uid not in (os.geteuid(), 0, os.stat("/").st_uid)
+    return f"user {above.st_uid}" if others else ""
 
 
 @contextlib.contextmanager

@@ -114,11 +114,14 @@ def load(model: Model) -> ctypes.CDLL:
     """
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"
-    if not cache.trusted(library):
+    if not cache.whole(library):
         with cache.locked(library.with_suffix(".lock")):
-            if not cache.trusted(library):
+            if not cache.whole(library, tell=True):
                 _build(model, compiler, library)
-    return ctypes.CDLL(str(library))
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        raise cache.CacheError(f"{library} in the cache cannot be loaded: {error}") from None
 
 
 def array_at(address: int | None, count: int, dtype: np.dtype[Any]) -> np.ndarray:
@@ -181,8 +184,7 @@ def _build(model: Model, compiler: list[str], library: Path) -> None:
             includes = [f"-I{folder}", f"-I{_DRIVERS}", f"-I{runtime}"]
             driver = str(_DRIVERS / model.driver)
             _run([*compiler, *_FLAGS, *defines, *includes, driver, "-o", str(folder / "model.so")])
-            (folder / "model.so").chmod(cache.FILE_MODE)
-            os.replace(folder / "model.so", library)
+            cache.put(folder / "model.so", library)
 
 
 def _write(design: Any, folder: Path) -> str:

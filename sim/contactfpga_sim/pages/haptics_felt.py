@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 
 from contactfpga import picture_style as style
+from contactfpga.inputs.files import write_text
 from contactfpga_sim.pages import failures_page, writer
 from contactfpga_sim.studies.failures import knob_pictures
 from contactfpga_sim.studies.failures.knob import Turned
@@ -107,7 +108,7 @@ def draw(folder: Path) -> list[Path]:
     (folder / "haptics").mkdir(exist_ok=True)
     for name, methods in turned().items():
         path = folder / "haptics" / f"{name}.svg"
-        path.write_text(knob_pictures.svg(breaks.STUDIES[name], methods), encoding="utf-8")
+        write_text(path, knob_pictures.svg(breaks.STUDIES[name], methods))
         drawn.append(path)
     return drawn
 

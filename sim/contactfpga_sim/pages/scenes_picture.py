@@ -18,6 +18,7 @@ import numpy as np
 from contactfpga import picture_style as style
 from contactfpga.console import interrupt
 from contactfpga.cover import Cover, Ellipse, Part
+from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import contacts
 from contactfpga_sim.scenes.families import placements
@@ -137,7 +138,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Draw scenes, what touches and which switches close.")
     parser.add_argument("picture", type=Path)
     picture = parser.parse_args().picture
-    picture.write_text(svg(panels()), encoding="utf-8")
+    write_text(picture, svg(panels()))
     print(f"drew {picture}")
     return 0
 

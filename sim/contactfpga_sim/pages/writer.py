@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from contactfpga.console import outputs
+from contactfpga.inputs.files import write_text
 
 Tables = Mapping[str, Callable[[], str]]
 """What makes each table, by its name."""
@@ -44,7 +45,7 @@ def write(path: Path, tables: Tables) -> None:
     for name, measure in tables.items():
         before = path.read_text(encoding="utf-8")
         if f"<!-- figures: {name} -->" in before:
-            path.write_text(update(before, {name: measure}), encoding="utf-8")
+            write_text(path, update(before, {name: measure}))
 
 
 def page(path: str | Path, option: str = "page") -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 from contactfpga.choices.choice import own_files
 from contactfpga.skin import Skin
 from contactfpga_sim.board import sources
-from contactfpga_sim.board.cache import FILE_MODE, cache_folder, ready, scratch, trusted
+from contactfpga_sim.board.cache import cache_folder, put, ready, scratch, whole
 
 
 def made_by(module: str, *skins: Skin) -> str:
@@ -25,7 +24,7 @@ def made_by(module: str, *skins: Skin) -> str:
 def found(kind: str, key: str) -> Any:
     """What is kept for a key, None if nothing is."""
     path = _path(kind, key)
-    return json.loads(path.read_text()) if trusted(path) else None
+    return json.loads(path.read_text()) if whole(path, tell=True) else None
 
 
 def _path(kind: str, key: str) -> Path:
@@ -40,9 +39,7 @@ def kept(kind: str, key: str, new: Callable[[], Any]) -> Any:
     value = json.loads(json.dumps(new()))
     if sources.changed():  # while it was worked out, so nobody can say by which code
         return value
-    # Whole or not at all, whoever else writes it at the same time.
     with scratch(path.parent, "unkept") as work:
         (work / "value").write_text(json.dumps(value))
-        (work / "value").chmod(FILE_MODE)
-        os.replace(work / "value", path)
+        put(work / "value", path)
     return value

@@ -13,6 +13,7 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.haptics import HapticsError, WithReadings
 from contactfpga.haptics.answer import Floats
 from contactfpga.haptics.table import write
+from contactfpga.inputs.files import write_text
 
 HELP = "Read the zeros of a board's pressure units while nothing touches, and set them on the board."
 
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
             spread = float(read[:, unit].std(ddof=1))
             terminal.say(f"unit {unit}: zero {mean:.1f} steps, spread {spread:.2f}; the board took {round(mean)}")
     if output is not None and better is not None:
-        output.write_text(write(better))
+        write_text(output, write(better))
         terminal.say(f"wrote {output}")
     return 0
 

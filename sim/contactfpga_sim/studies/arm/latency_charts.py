@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
+from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.arm import sweep
 from contactfpga_sim.studies.arm.case import Case, CaseError
@@ -168,7 +169,7 @@ def _thickness(case: Case, tasks: Plan, found: dict[Task, Point]) -> Figure:
 def write_csv(found: dict[Task, Point], path: Path) -> Path:
     """All numbers, a line per run, in SI units."""
     names = [field.name for field in dataclasses.fields(Point)]
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(["way", "latency_s", "speed_m_s", "torque_limit_nm", *names])
         for task, point in found.items():

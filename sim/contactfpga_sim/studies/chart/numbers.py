@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
 from contactfpga_sim.studies.chart.errors import METRICS, Interval
 from contactfpga_sim.studies.chart.methods import METHODS
@@ -29,7 +30,7 @@ def command(point: Point) -> str:
 
 def write(points: Iterable[Point], path: Path) -> None:
     """Errors with their 95 % intervals, times in us, LUT4 and clock on the UP5K."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    with replaced(path) as new, open(new, "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         errors = [f"{kind}_{name}{end}" for kind in KINDS for name in METRICS for end in ENDS]
         head = ("family", "method", "placements", "seed", *TIMES, "host_us", "luts", "fmax_mhz")

@@ -11,6 +11,7 @@ from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import NamedTuple
 
+from contactfpga.inputs.files import replaced
 from contactfpga_sim.studies import kept
 from contactfpga_sim.studies.flips import designs, flip
 from contactfpga_sim.studies.flips.flip import Found
@@ -78,7 +79,7 @@ def _reference(design: str) -> Reference:
 
 def write(rows: Iterable[Row], path: Path) -> None:
     """One line per flip."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(("design", *Found._fields))
         for row in rows:

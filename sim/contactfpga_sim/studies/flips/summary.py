@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from contactfpga.inputs.files import replaced
 from contactfpga_sim.board.state import StateBoard
 from contactfpga_sim.studies.flips import designs
 from contactfpga_sim.studies.flips.campaign import Row, wilson
@@ -57,7 +58,7 @@ def measured(names: Iterable[str]) -> list[Design]:
 
 def write(found: Iterable[Design], path: Path) -> None:
     """A line for each design."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replaced(path) as new, new.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([Design._fields, *found])
 
 

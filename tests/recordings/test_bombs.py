@@ -1,0 +1,232 @@
+"""Recordings from strangers: what is packed in them costs no more memory and time than the limits say."""
+
+import struct
+import subprocess
+import sys
+import time
+import tracemalloc
+
+import pytest
+from fake_board import wait_until
+from recorded_stream import StreamPort
+
+pytest.importorskip("mcap")
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+
+import contactfpga
+from contactfpga import Skin
+from contactfpga.driver import mcap_part, mcap_records
+from contactfpga.driver.mcap_records import MAGIC, RecordingError
+from contactfpga.recordings import Recording, Session, messages
+from contactfpga.recordings.mcap_file import McapFile
+from contactfpga.recordings.recover import recover
+
+BIG = 300 << 20
+PEAK = 150e6
+LONG_S = 60.0
+ALONE = """import resource, sys
+from contactfpga import cli
+status = cli.main(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+sys.exit(status)"""
+
+
+def record(one):
+    builder = RecordBuilder()
+    one.write(builder)
+    return builder.end()
+
+
+def packed(compression, size):
+    """A message of zeros, packed without ever holding it."""
+    head = struct.pack("<BQHIQQ", Opcode.MESSAGE, size - 9, 0, 0, 5, 5)
+    pieces = [head, *[bytes(1 << 20)] * ((size - len(head)) >> 20), bytes((size - len(head)) & 0xFFFFF)]
+    if compression == "zstd":
+        # With no size in its head, as whoever packs a stream does not know it.
+        packer = zstandard.ZstdCompressor(write_content_size=False).compressobj()
+        return b"".join(map(packer.compress, pieces)) + packer.flush()
+    if compression == "lz4":
+        packer = lz4.frame.LZ4FrameCompressor()
+        return packer.begin() + b"".join(map(packer.compress, pieces)) + packer.flush()
+    return b"".join(pieces)
+
+
+def chunk(compression, size, declared=None):
+    data = packed(compression, size)
+    return Chunk(compression, data, 5, 5, 0, size if declared is None else declared)
+
+
+def mcap(chunks, links=("a",), texts=(), repeat=1, in_summary=()):
+    """A closed file of these chunks, each named ``repeat`` times at its end."""
+    schema = Schema(1, b"", "ros2msg", mcap_part.KIND)
+    channels = [Channel(number, f"/{number}", "cdr", {"link": link}, 1) for number, link in enumerate(links)]
+    body, index = MAGIC + record(Header("ros2", "x")), b""
+    for one in texts:
+        data = record(one)
+        index += record(MetadataIndex(len(data), len(body), one.name))
+        body += data
+    for one in chunks:
+        data = record(one)
+        index += repeat * record(
+            ChunkIndex(len(data), len(body), one.compression, len(one.data), 5, 0, {0: 1}, 5, one.uncompressed_size)
+        )
+        body += data
+    body += record(DataEnd(0))
+    end = record(schema) + b"".join(map(record, channels)) + index + b"".join(map(record, in_summary))
+    end += record(Statistics(0, len(channels), {}, len(chunks), 1, 5, 5, len(texts), 1))
+    return body + end + record(Footer(len(body), 0, 0)) + MAGIC
+
+
+BOMBS = {
+    "zstd": lambda: mcap([chunk("zstd", BIG)]),
+    "lz4": lambda: mcap([chunk("lz4", BIG)]),
+    "zstd that says little": lambda: mcap([chunk("zstd", BIG, 1000)]),
+    "lz4 that says little": lambda: mcap([chunk("lz4", BIG, 1000)]),
+    "zstd that says all": lambda: mcap([chunk("zstd", 1000, BIG)]),
+    "one chunk many times": lambda: mcap([chunk("zstd", mcap_records.UNPACKED)], repeat=100),
+    "many chunks": lambda: mcap([chunk("zstd", mcap_records.UNPACKED)] * 60),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_is_refused_by_all_that_read_it(tmp_path, name):
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(BOMBS[name]())
+    assert path.stat().st_size < 2_000_000
+    tracemalloc.start()
+    try:
+        for use in (
+            lambda: list(Recording(path).frames()),
+            lambda: list(Recording(path).raw_bytes()),
+            lambda: list(Recording(path).frames(1.0)),
+            lambda: Recording(path).skins,
+            lambda: contactfpga.open(f"replay://{path}", timeout=1).read(),
+            lambda: contactfpga.open(f"replay://{path}?pace=1000", timeout=1).read(),
+            lambda: recover(path),
+        ):
+            with pytest.raises(contactfpga.ContactFPGAError):
+                use()
+        assert tracemalloc.get_traced_memory()[1] < PEAK
+    finally:
+        tracemalloc.stop()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "command",
+    [["recover", "X"], ["export", "X", "o.csv"], ["plot", "X"], ["zones", "--once", "replay://X"], ["view", "X"]],
+)
+def test_commands_end_in_one_line_with_little_memory(tmp_path, command):
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(BOMBS["zstd"]())
+    words = [word.replace("X", str(path)) for word in command]
+    done = subprocess.run([sys.executable, "-c", ALONE, *words], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("contactfpga: ")
+    assert done.stderr.count("\n") <= 3
+    assert int(done.stdout.split()[-1]) < 500_000  # KiB
+
+
+def test_a_bomb_at_the_end_of_a_file_is_passed_over(tmp_path):
+    """The library's reader unpacks it to find the file's pieces."""
+    path = tmp_path / "x.mcap"
+    path.write_bytes(mcap([chunk("zstd", 1000)], in_summary=[chunk("zstd", BIG)]))
+    tracemalloc.start()
+    try:
+        assert list(Recording(path).raw_bytes()) == [(0.0, b"")]
+        assert recover(path).messages == 1
+        assert tracemalloc.get_traced_memory()[1] < PEAK
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+@pytest.mark.parametrize("size", [100, 5_000, mcap_records.FREE])
+def test_a_chunk_within_the_limits_is_read(compression, size):
+    (found,) = mcap_records.inside(chunk(compression, size))
+    assert isinstance(found, Message)
+    assert found.data == bytes(size - 31)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+@pytest.mark.parametrize("more", [-1, 1])
+def test_a_chunk_of_another_size_than_it_says_is_damaged(compression, more):
+    with pytest.raises(mcap_records.Unreadable):
+        list(mcap_records.inside(chunk(compression, 5_000, 5_000 + more)))
+
+
+def test_an_unknown_way_to_pack_is_damaged():
+    with pytest.raises(mcap_records.Unreadable):
+        list(mcap_records.inside(Chunk("xz", b"", 0, 0, 0, 0)))
+
+
+@pytest.mark.parametrize(
+    "links", [[str(number) for number in range(mcap_part.MAX_LINKS + 1)], ["x" * (mcap_part.MAX_NAME + 1)]]
+)
+def test_too_many_links_or_names_too_long_are_told(tmp_path, links):
+    """Each link is read on its own, and its name stands in each row of a table."""
+    path = tmp_path / "x.mcap"
+    path.write_bytes(mcap([chunk("zstd", 1000)], links))
+    with pytest.raises(RecordingError, match=f"{len(links)} links, the longest name {len(links[-1])} characters"):
+        Recording(path)
+
+
+@pytest.mark.parametrize("kind", ["bin", "mcap"])
+def test_bytes_without_an_end_of_a_packet_are_no_packet(tmp_path, kind):
+    """Each more byte took a copy of all before it."""
+    path = tmp_path / f"x.{kind}"
+    junk = b"\1" * 2_000_000
+    if kind == "bin":
+        path.write_bytes(junk)
+    else:
+        file = McapFile(path)
+        file.write("/a/bytes", messages.BYTES, "a", 5, messages.of_bytes(junk, 5, "a"), 0.0)
+        file.close()
+    begun_s = time.thread_time()
+    with pytest.raises(contactfpga.ContactFPGAError):
+        contactfpga.open(f"replay://{path}?pace=1", timeout=LONG_S)
+    assert time.thread_time() - begun_s < 10
+
+
+def test_very_many_texts_are_refused(tmp_path):
+    path = tmp_path / "x.mcap"
+    texts = [Metadata("contactfpga", {"link": str(number)}) for number in range(mcap_part.MAX_TEXTS + 1)]
+    path.write_bytes(mcap([chunk("zstd", 1000)], texts=texts))
+    with pytest.raises(RecordingError, match="damaged"):
+        Recording(path)
+
+
+def test_a_long_recording_is_read_a_chunk_at_a_time(tmp_path):
+    """The library's reader keeps every chunk that it will hand out."""
+    path = tmp_path / "long.mcap"
+    port = StreamPort(Skin(), frames=5_000)
+    with Session(path, bytes_only=True) as session:
+        session.add(port)
+        session.start()
+        wait_until(lambda: session.wait(0.005) or not port.left)
+    whole = sum(len(data) for _, data in Recording(path).raw_bytes())
+    assert whole > 90_000
+    tracemalloc.start()
+    try:
+        assert sum(len(data) for _, data in Recording(path).raw_bytes()) == whole
+        assert tracemalloc.get_traced_memory()[1] < whole
+    finally:
+        tracemalloc.stop()
