@@ -32,7 +32,7 @@ def test_bad_skin_file_is_named(tmp_path, run):
     file.write_text("rows = 65\n")
     status, _, errors = run("zones", f"sim://?skin={file}")
     assert status == 1
-    assert errors == "contactfpga: rows is 65; it must lie between 1 and 64\n"
+    assert errors == f"contactfpga: {file}: rows is 65; it must lie between 1 and 64\n"
 
 
 EXTRAS = [

@@ -239,3 +239,17 @@ def test_fields_are_plain_values():
         "column_order": [],
         "unit_sums": [],
     }
+
+
+def test_a_file_may_begin_with_a_byte_order_mark_as_some_editors_write_it(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 9\n", encoding="utf-8-sig")
+    assert Skin.load(path).rows == 9
+
+
+def test_a_value_that_cannot_be_is_named_with_its_file(tmp_path):
+    path = tmp_path / "skin.toml"
+    path.write_text("rows = 0\n")
+    with pytest.raises(SkinError) as caught:
+        Skin.load(path)
+    assert str(caught.value) == f"{path}: rows is 0; it must lie between 1 and 64"

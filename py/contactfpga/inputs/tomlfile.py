@@ -37,7 +37,7 @@ def parse(data: bytes, path: str | Path, refused: type[ValueError]) -> dict[str,
     if len(data) > MAX_BYTES:
         raise refused(f"{path}: longer than {MAX_BYTES:,} bytes; is it a TOML file?")
     try:
-        text = data.decode()
+        text = data.decode("utf-8-sig")  # some editors begin with a byte order mark
     except UnicodeDecodeError as error:
         raise refused(f"{path}: not a TOML file: it is not UTF-8 ({error.reason} at byte {error.start})") from None
     if _LONG_KEY.search(_NO_KEY.sub("", text)):

@@ -168,7 +168,10 @@ class Skin:
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             tables = "and the tables [cover] and [circuit]"
             raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, {tables}")
-        return cls(**values)
+        try:
+            return cls(**values)
+        except SkinError as error:
+            raise SkinError(f"{path}: {error}") from None
 
     def replace(self, **changes: Any) -> Skin:
         """A copy with some fields changed, checked again. A changed sheet gets its default capacity again, and so does
