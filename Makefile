@@ -164,6 +164,9 @@ soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does an
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]
 	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.mutants.campaign --page docs/mutants.md $(ARGS)
 
+mutants-tested: $(VENV)/.stamp-test | compiler ## change the gateware's source: does what `make test` runs notice? (an hour) [ARGS="--count 20"]
+	$(PY) scripts/tested_mutants.py --page docs/mutants.md $(ARGS)
+
 lint: $(VENV)/.stamp-lint ## check style, types and who imports whom
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
