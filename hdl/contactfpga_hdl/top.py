@@ -48,9 +48,9 @@ class Top(wiring.Component):
     labeller, zone records (or with ``report = "cells"`` bitmap rows), with ``report = "barycenter"`` what becomes of
     the records, and bytes.
 
-    Where the scan finds that a register of it turned by itself, all begins again within two clocks but for what sends
-    bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin ``contact`` is high
-    until a frame after that is packed.
+    Where the scan or the link finds that a register of it turned by itself, all begins again within two clocks but for
+    what sends bytes: a hello follows the byte on the line, with its counters at 0. With ``fail_safe`` the pin
+    ``contact`` is high until a frame after that is packed.
 
     A Skin with ``dual`` makes two of it, see :class:`~contactfpga_hdl.dual.Dual`; each is a ``copy``, whose ``contact``
     is not from a register with ``fail_safe``.
@@ -102,7 +102,7 @@ class Top(wiring.Component):
         number = None if self.place is None else self.place.number
         request = RequestReader(bool(self.derived.commands), number)
         self._connect_line(m, request, link)
-        m.d.sync += self._restarts.eq(scan.upset)
+        m.d.sync += self._restarts.eq(scan.upset | link.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
         connect_lines(m, self.skin, scan.pins, self)

@@ -124,6 +124,15 @@ def test_a_register_of_the_scan_that_turned_starts_the_board_again(plain, place,
     assert {(one.outcome, one.kind) for one in found} == {("told", "restarts")}
 
 
+@pytest.mark.parametrize("region", ["filling", "waiting", "sending"])
+def test_frames_that_lost_their_places_start_the_board_again(plain, region):
+    """Two of the three would share one from then on, and be sent mixed."""
+    place = place_of(plain.board, f"link.{region}")
+    clocks = [plain.step_clocks * 24 + clock for clock in (17, 2345, 9876, 15_011)]
+    found = [flip.follow(plain, Flip(Bit(place, 0, bit), clock)) for bit in range(2) for clock in clocks]
+    assert {(one.outcome, one.kind) for one in found} == {("told", "restarts")}
+
+
 @pytest.mark.parametrize("place", ["backlog.queue.put", "backlog.queue.taken"])
 def test_a_queue_that_lost_its_place_is_right_again(plain, place):
     index, number = place_of(plain.board, place), 24

@@ -17,7 +17,7 @@ from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout
 from contactfpga_hdl.units.pack import packet_signature
 
 HELLO_REGION = 3
-"""The others hold frames."""
+"""The others hold frames; it is the exclusive or of the three."""
 
 FRAMES_BEFORE_UNITS = 4
 """As many frames go in a row while readings of units wait."""
@@ -75,6 +75,8 @@ class Link(wiring.Component):
     faults, slots (in): of a Skin with ``guard`` or ``self_test``, see :class:`~contactfpga_hdl.link.faults.Reporter`.
     units (in): of a Skin with units, see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
+    upset (out): high while two frames share a region, as after a bit of its number turned by itself: one would be sent
+    while another is written over it. Never with ``dual``, which finds more.
     turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.link.turns.Turns`;
     packets then say the sheet's number.
     """
@@ -100,6 +102,7 @@ class Link(wiring.Component):
                 **({"slots": In(stream.Signature(slots_layout(self.derived)))} if skin.self_test else {}),
                 **({"units": In(packet_signature())} if skin.units else {}),
                 **({} if place is None else {"turn": In(1), "holds": Out(1)}),
+                "upset": Out(1),
                 "bytes": Out(stream.Signature(8)),
             }
         )
@@ -109,6 +112,8 @@ class Link(wiring.Component):
         wire, regions = _Wire(self._offset_bits), _Regions(self._offset_bits)
         hello_due = Signal(init=1)
         self._place_frames(m, wire, regions)
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(regions.filling ^ regions.waiting ^ regions.sending != HELLO_REGION)
         frames_sent = self._decide(m, wire, regions)
         with m.If(wire.take_hello):
             m.d.sync += hello_due.eq(0)

@@ -32,7 +32,7 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
     sent. After as many bytes as a packet has come the check bytes and one delimiter, and only then the next packet
     begins. A byte stays until it is taken; the next one is offered two clocks later. Each complete frame is sent or
     counted as overwritten, and sequence numbers have no gap. The packer is told these numbers from the clock after
-    ``decide`` until ``commit``.
+    ``decide`` until ``commit``. The link never asks for a restart.
     """
     m = proof.m
     with mock.patch.object(protocol, "encode_hello", return_value=hello):
@@ -75,6 +75,7 @@ def packed_frames_are_sent(proof: Proof, hello: bytes) -> None:
     with m.If(frames.closing):
         proof.claim(packed.verdict.sequence == frames.sent[: len(packed.verdict.sequence)])
         proof.claim(packed.verdict.overwritten == frames.dropped)
+    proof.claim(~inside["link.upset"])
     _lemmas(proof, inside, place, frames, wire)
     hello_region = Const(first_word)
     proof.lemma(inside.word("link.store", (hello_region + hello_place)[: len(hello_region)]) == hello_byte)
