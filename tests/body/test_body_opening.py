@@ -22,7 +22,7 @@ def opened(tmp_path, monkeypatch):
     (tmp_path / "robot.toml").write_text("".join(texts))
     calls, lock = [], threading.Lock()
 
-    def fails(port, skin, timeout):
+    def fails(port, *_, **__):
         begun = time.monotonic()
         time.sleep(0.05)
         with lock:
