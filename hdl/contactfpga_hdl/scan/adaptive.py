@@ -181,7 +181,8 @@ class AdaptiveScanner(wiring.Component):
         """Time and request at the first strobe, and how many slots there were up to the last."""
         per_us = self.derived.clocks_per_us
         prescaler = Signal(range(max(2, per_us)))
-        time, begun = Signal(TIME_BITS), Signal(TIME_BITS)
+        time = Signal(TIME_BITS)
+        begun = Signal(TIME_BITS)
         waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
         slots = Signal.like(self.tag.slots)
         m.d.sync += prescaler.eq(prescaler + 1)

@@ -4,6 +4,7 @@ from functools import partial
 
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
+from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
@@ -31,14 +32,22 @@ def none_is_found(proof: Proof, scan: str) -> None:
         proof.lemma((following != 0) & (following & (following - 1) == 0))
 
 
-_BUGS = {
-    "raster": Bug("a bit of the time turns", Scanner, "time", lambda time, inside: time ^ inside.component.request),
-    "adaptive": Bug("a row turns", DirectRows, "selected",
-        lambda rows, inside: rows ^ ~(inside.component.drive | inside.component.release)),
-    "reversal": Bug("a bit of the time turns", ReversalScanner, "time",
-        lambda time, inside: time ^ inside.component.request),
-}  # fmt: skip
+_ROW = Bug("a row turns", DirectRows, "selected",
+    lambda rows, inside: rows ^ ~(inside.component.drive | inside.component.release))  # fmt: skip
+_SCANNERS = {"raster": Scanner, "adaptive": AdaptiveScanner, "reversal": ReversalScanner}
+
+
+def _bugs(scan: str) -> tuple[Bug, ...]:
+    def time(bit: int) -> Bug:
+        return Bug(f"bit {bit} of the time turns", _SCANNERS[scan], "time",
+            lambda time, inside: time ^ inside.component.request << bit)  # fmt: skip
+
+    slot = Bug("a bit of the slot's row turns", Scanner, "following",
+        lambda rows, inside: rows ^ inside.component.request << 1)  # fmt: skip
+    return (time(0), time(7), *{"raster": (slot, _ROW), "adaptive": (_ROW,), "reversal": ()}[scan])
+
+
 CASES = tuple(
-    Case("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, (bug,))
-    for scan, bug in _BUGS.items()
+    Case("no register is found wrong", f"4x2, {scan}", partial(none_is_found, scan=scan), 2, _bugs(scan))
+    for scan in SKINS
 )
