@@ -1,12 +1,16 @@
 """Frames that wait to be written as messages when a recording ends."""
 
+import random
 import re
 import time
 
 import pytest
+import ros_types
 from net_processes import Streaming
+from recorded_stream import StreamPort, recorded
 
 import contactfpga
+from contactfpga.driver.conversation import Conversation
 from contactfpga.recordings import link_recorder
 from contactfpga.recordings.link_messages import LinkMessages
 from contactfpga.recordings.session import Session
@@ -31,8 +35,74 @@ def test_each_has_a_message_or_is_told(monkeypatch, tmp_path, slow_s, end_s):
         time.sleep(0.5)
     (link,) = session.links
     told = sum(int(re.search(r"(\d+) frames came faster", note)[1]) for note in link.notes)
-    with contactfpga.open(f"replay://{file}") as again:
-        recorded = sum(1 for _ in again)
     assert (told > 10) == (end_s < 1)
     assert link.frames > 5
-    assert 0 <= recorded - link.frames - told <= 60, "but for what came while it was opened"
+    times_us = messages(file)
+    assert len(times_us) == link.frames
+    assert frames(file)[: link.frames] == times_us
+    assert len(frames(file)) == link.frames + told
+
+
+def frames(file):
+    """Device times of the frames in its bytes, as the driver reads them."""
+    with contactfpga.open(f"replay://{file}") as again:
+        return [zones.time_us for zones in again]
+
+
+def messages(file):
+    """Those of its messages, as other programs read them."""
+    from mcap.reader import make_reader
+
+    kind = ros_types.full("contactfpga_msgs/Zones")
+    with open(file, "rb") as opened:
+        found = make_reader(opened).iter_messages(log_time_order=False)
+        return [
+            ros_types.store().deserialize_cdr(message.data, kind).device_time_us
+            for _, channel, message in found
+            if channel.topic.endswith("/zones")
+        ]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_frame_has_a_message_whenever_it_ends(monkeypatch, tmp_path, seed):
+    """Threads pause where bytes are taken, where frames are made of them, and where the recording ends."""
+    rng = random.Random(seed)
+
+    def paused(where, name):
+        before = getattr(where, name)
+
+        def pausing(*arguments):
+            if rng.random() < 0.2:
+                time.sleep(rng.random() * 0.02)
+            return before(*arguments)
+
+        monkeypatch.setattr(where, name, pausing)
+
+    paused(link_recorder.Buffer, "take")
+    paused(link_recorder.Buffer, "end_at")
+    paused(Conversation, "receive_runs")
+    file = tmp_path / "touches.mcap"
+    with Streaming(contactfpga.Skin()) as board, Session(file) as session:
+        session.add(board.path, timeout=60.0)
+        time.sleep(rng.random() * 0.1)
+        session.start()
+        time.sleep(rng.random() * 0.3)
+    assert session.links[0].notes == []
+    assert len(messages(file)) > 1
+    assert messages(file) == frames(file)
+
+
+@pytest.mark.parametrize("seconds", [None, 0.1])
+def test_so_has_every_frame_of_a_recording_that_is_recorded_again(tmp_path, seconds):
+    first = recorded(tmp_path, StreamPort(frames=300), name="first.mcap")
+    assert first.links[0].notes == []
+    assert messages(tmp_path / "first.mcap") == frames(tmp_path / "first.mcap")
+    with Session(tmp_path / "second.mcap") as session:
+        session.add(f"replay://{tmp_path / 'first.mcap'}")
+        session.start(seconds)
+        while session.running:
+            session.wait(0.05)
+    again = frames(tmp_path / "second.mcap")
+    assert messages(tmp_path / "second.mcap") == again
+    assert again == frames(tmp_path / "first.mcap")[: len(again)]
+    assert len(again) > 100

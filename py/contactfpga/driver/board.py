@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
 from typing import NoReturn
 
@@ -38,12 +38,15 @@ class Board:
     process. After :meth:`close` every method raises :class:`BoardClosed`, even one that was already waiting.
     """
 
-    def __init__(self, transport: Transport, skin: Skin | None = None):
+    def __init__(self, transport: Transport, skin: Skin | None = None, opened: Callable[[Board], object] | None = None):
         self._expected = skin
         self._live = transport.live
         self._threaded = transport.threaded
         self._link = Link(transport, skin)
         self._frames = Subscription(self._link, QUEUE)
+        if opened is not None:
+            opened(self)
+        self._link.start()
 
     def __repr__(self) -> str:
         try:

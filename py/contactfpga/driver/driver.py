@@ -11,7 +11,7 @@ from pathlib import Path
 from contactfpga.choices.choice import trusted
 from contactfpga.driver import finding, recording
 from contactfpga.driver.board import Board
-from contactfpga.driver.recording import FileTap, Tap
+from contactfpga.driver.recording import FileTap, Opening, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortLost
@@ -69,7 +69,7 @@ def open(
         if record is not None:
             tap = FileTap(record) if isinstance(record, (str, Path)) else record
             transport = RecordingTransport(transport, tap)
-        board = Board(transport, skin)
+        board = Board(transport, skin, record.opened if isinstance(record, Opening) else None)
     except BaseException:
         transport.close()
         raise

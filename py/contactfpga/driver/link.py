@@ -82,8 +82,11 @@ class Link:
         self._turning: int | None = None  # the thread that reads
         self._writing: int | None = None  # the thread that writes
         self._closers = 0  # threads that wait in :meth:`close`
-        if transport.threaded:
-            threading.Thread(target=self._read_all, name=f"reader of {transport.name}", daemon=True).start()
+
+    def start(self) -> None:
+        """Begin to read, once those listen who want to hear all from the first byte on."""
+        if self.transport.threaded:
+            threading.Thread(target=self._read_all, name=f"reader of {self.transport.name}", daemon=True).start()
 
     def clock(self) -> float:
         """Seconds on the clock that timeouts run on."""

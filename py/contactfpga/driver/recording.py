@@ -9,7 +9,7 @@ import os
 import re
 import stat
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
 from urllib.parse import unquote
 
 from contactfpga.driver.mcap_bytes import McapStream
@@ -18,6 +18,9 @@ from contactfpga.driver.mcap_records import MAGIC
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
 from contactfpga.inputs.values import number_in
+
+if TYPE_CHECKING:
+    from contactfpga.driver.board import Board
 
 SCHEME = "replay://"
 _OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
@@ -45,6 +48,14 @@ class Tap(Protocol):
 
     def close(self) -> None:
         """No more will come; may be called twice."""
+
+
+@runtime_checkable
+class Opening(Protocol):
+    """A tap that wants to know whose bytes these are."""
+
+    def opened(self, board: Board) -> None:
+        """Called before the first byte comes."""
 
 
 class FileTap:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Generic, TypeVar, cast
 
 from contactfpga.driver.link import Link
@@ -71,6 +71,19 @@ class Listening(Generic[Item]):
             self._link.listeners.discard(self)
             self._frames.clear()
             self._link.changed.notify_all()
+
+    def settle(self, all_taken: Callable[[int], bool], timeout: float = 1.0) -> int:
+        """Call ``all_taken`` with the number of the board's bytes of which all frames are here or were taken, until it
+        returns true; returns how many items wait then, which come next. Raises :class:`ReadTimeout`."""
+        waiting = 0
+
+        def settled() -> bool | None:
+            nonlocal waiting
+            waiting = len(self._frames)
+            return True if all_taken(self._link.conversation.stats.bytes) else None
+
+        self._link.wait_for(settled, self._link.clock() + timeout, timeout)
+        return waiting
 
     def __enter__(self):  # type: ignore[no-untyped-def]
         return self

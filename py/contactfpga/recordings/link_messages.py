@@ -45,7 +45,8 @@ class LinkMessages:
 
     def frame(self, zones: Zones, clock_s: float) -> None:
         """A frame; contacts whenever something happens to them, and now and then, with what 3-D programs show."""
-        sampled_s = clock_s if zones.host_time_s is None else zones.host_time_s
+        known_s = [one for one in (zones.host_time_s, zones.arrived_s) if one is not None]
+        sampled_s = known_s[0] if known_s else clock_s
         head = convert.header(self._link.time_ns(sampled_s), self._frame)
         tracks = self._tracker.update(zones)
         forces = None if self._felt is None else self._felt(zones, tracks)

@@ -32,17 +32,33 @@ BATCH_BYTES = 2048
 class Buffer:
     """A tap whose bytes wait to be written."""
 
+    events: Events
+    """All that the board says, from the first byte on."""
+
     def __init__(self) -> None:
         self._pieces: collections.deque[tuple[bytes, float]] = collections.deque()
         self._bytes = 0
+        self._taken = 0  # bytes in all
+        self._ended = False
         self._lock = threading.Lock()
+
+    def opened(self, board: Board) -> None:
+        """Listen to a board before its first byte."""
+        self.events = board.events(QUEUE)
 
     def take(self, data: bytes, clock_s: float) -> None:
         """Bytes that came then."""
-        if data:
-            with self._lock:
+        with self._lock:
+            if data and not self._ended:
                 self._pieces.append((data, clock_s))
                 self._bytes += len(data)
+                self._taken += len(data)
+
+    def end_at(self, count: int) -> bool:
+        """Take no more if so many bytes were taken in all; whether it is so."""
+        with self._lock:
+            self._ended = self._ended or self._taken == count
+            return self._ended
 
     def close(self) -> None:
         """What waits can still be taken out."""
@@ -91,13 +107,13 @@ class LinkRecorder:
         self._late = late
         self._last_us = 0
         self._begun_s: float | None = None
+        self._left: int | None = None  # what waits at the end
 
     def run(self, stop: threading.Event, seconds: float | None = None) -> None:
         """Record, in a thread of its own."""
         try:
             with self._events:
                 frames = WithReadings(self) if self._late else self
-                self._take(self.board.next())  # the answer to the first hello came before there were events
                 while not stop.is_set() and (seconds is None or self.seconds < seconds):
                     try:
                         self._take(frames.next(TURN_S))
@@ -105,7 +121,7 @@ class LinkRecorder:
                         self._pause()
                     except (SkinMismatch, VersionMismatch) as told:
                         self.notes.append(str(told))
-                left = self._take_rest(frames) if self.board.live else 0
+                left = self._take_rest(frames)
                 if left := left + self._events.dropped:
                     self.notes.append(
                         f"{self.name}: {left} frames came faster than messages could be written of them; their "
@@ -119,7 +135,10 @@ class LinkRecorder:
     def next(self, timeout: float = 1.0) -> Zones:
         """The next frame; what comes before it is written."""
         while True:
+            if self._left == 0:
+                raise ReadTimeout(f"{self.name}: nothing more is to be recorded")
             item = self._events.next(timeout)
+            self._left = None if self._left is None else self._left - 1
             if isinstance(item, Zones):
                 return item
             clock_s = self._clock_s()
@@ -142,8 +161,10 @@ class LinkRecorder:
         self._drain()
 
     def _take_rest(self, frames: WithReadings | LinkRecorder) -> int:
-        """Frames that wait at the end, for a while; how many are left."""
+        """Frames of the bytes that have come by the end, for a while; how many are left."""
         until, left = time.monotonic() + END_S, 0
+        with contextlib.suppress(ReadTimeout):
+            self._left = self._events.settle(self._buffer.end_at)
         with contextlib.suppress(ReadTimeout):
             while True:
                 zones = frames.next(AT_ONCE_S)

@@ -17,7 +17,7 @@ from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.recordings.link_messages import LinkMessages
-from contactfpga.recordings.link_recorder import QUEUE, Buffer, LinkRecorder
+from contactfpga.recordings.link_recorder import Buffer, LinkRecorder
 from contactfpga.recordings.mount import Mount
 from contactfpga.recordings.recorder import Recorder, Split, link_name
 from contactfpga.recordings.whole_file import RecordingFailed
@@ -92,14 +92,13 @@ class Session:
             raise ContactFPGAError("this recording has begun; add all boards before start()")
         buffer = self._buffer()
         board = driver.open(port, skin, baud=baud, record=buffer, timeout=timeout)
-        events = board.events(QUEUE)  # at once: what comes before start() is recorded as well
         try:
             force = None if felt is None else felt(board)
         except BaseException:
             board.close()
             raise
         self._opened.append(
-            _Opened(link_name(board.hello) if name is None else name, board, events, buffer, mount, force)
+            _Opened(link_name(board.hello) if name is None else name, board, buffer.events, buffer, mount, force)
         )
 
     def start(self, seconds: float | None = None) -> None:
