@@ -33,7 +33,7 @@ PROOFS = "tests/proofs/test_formal.py"
 LEFT_OUT = ("board/", "__init__.py")
 """Pins and bitstreams of boards are no stage; their tests are those of the boards."""
 CHEAP_S = 12
-"""Processor time of the tests that are run first, together."""
+"""Processor time that the tests may take that are run first."""
 LIMIT_S = 1800
 
 EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {}
@@ -270,14 +270,15 @@ class Noted:
                 self._touched[unit].update(one["touched"])
 
     def batches(self, function: str) -> Iterator[list[str]]:
-        """Those that run the function, the cheapest first: a few together, then file by file, then the proofs."""
-        found = sorted((unit for unit, names in self._touched.items() if function in names), key=self._seconds.get)
-        plain = [unit for unit in found if not unit.startswith(PROOFS)]
-        first: list[str] = []
-        while plain and sum(map(self._seconds.get, [*first, plain[0]])) < CHEAP_S:
-            first.append(plain.pop(0))
-        proofs = [unit for unit in found if unit.startswith(PROOFS)]
-        yield from (batch for batch in (first, *([one] for one in plain), proofs) if batch)
+        """Those that run the function, the cheapest first; each batch may cost twice what the one before may."""
+        left = sorted((unit for unit, names in self._touched.items() if function in names), key=self._seconds.get)
+        most = CHEAP_S
+        while left:
+            batch = [left.pop(0)]
+            while left and sum(map(self._seconds.get, [*batch, left[0]])) < most:
+                batch.append(left.pop(0))
+            yield batch
+            most *= 2
 
 
 def fate_of(change: Change, tests: Noted) -> dict[str, str]:

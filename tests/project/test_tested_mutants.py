@@ -64,13 +64,13 @@ def test_copies_note_the_functions_that_are_run():
     assert all(f"_note('{file}:{function}')" in sources[file] for file, function in places)
 
 
-def test_the_cheapest_tests_that_run_a_function_come_first_and_proofs_last(tmp_path):
-    proof = f"{tested_mutants.PROOFS}::test_the_claim_holds[one]"
+def test_the_cheapest_tests_that_run_a_function_come_first_and_each_proof_stands_alone(tmp_path):
+    proof, other = (f"{tested_mutants.PROOFS}::test_the_claim_holds[{name}]" for name in ("one", "other"))
     ran = [("a.py::x", 5, "f"), ("a.py::y", 3, "g"), ("b.py::x", 1, "f"), ("c.py::x", 90, "f"), ("d.py::x", 1, "g")]
-    for test, seconds, touched in [*ran, (proof, 2, "f")]:
+    for test, seconds, touched in [*ran, (proof, 2, "f"), (other, 2, "g")]:
         with (tmp_path / "1.jsonl").open("a") as file:
             file.write(json.dumps({"test": test, "seconds": seconds, "touched": [touched]}) + "\n")
-    assert list(Noted(tmp_path).batches("f")) == [["b.py", "a.py"], ["c.py"], [proof]]
+    assert list(Noted(tmp_path).batches("f")) == [["b.py", proof, "a.py"], ["c.py"]]
     assert list(Noted(tmp_path).batches("h")) == []
 
 

@@ -56,7 +56,8 @@ class Sums(wiring.Component):
         m.d.comb += added.eq(Mux(first, 0, totals[0]) + product)
         with m.If(adds):  # they go round, so that the next one is in front
             m.d.sync += [total.eq(after) for total, after in zip(totals, [*totals[1:], added], strict=True)]
-        m.d.sync += [compares.eq(adds & last), self.sum.eq(Mux(compares & (self.sum != count - 1), self.sum + 1, 0))]
+        # High for as many clocks in a row as there are sums.
+        m.d.sync += [compares.eq(adds & last), self.sum.eq(Mux(compares, self.sum + 1, 0))]
         total = totals[-1]
         amount = Mux(total < 0, -total, total)
         with m.If(compares):
