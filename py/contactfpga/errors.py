@@ -20,6 +20,10 @@ class PortNotFound(ContactFPGAError):
     """No port, or no single one, could be chosen or opened."""
 
 
+class PortBusy(PortNotFound):
+    """The port is there, and open in this program or another one."""
+
+
 class PortLost(ContactFPGAError):
     """The port was there and is gone: unplugged, or its other end closed it."""
 

@@ -124,6 +124,25 @@ def test_what_a_function_raises_comes_out_of_the_call_that_waits(call):
                 forever(getattr(opened, call))
 
 
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("call", ["next", "read", "latest", "batch"])
+def test_a_function_that_reads_its_own_board_is_told_so(call):
+    """It would wait for time that passes once it has returned."""
+
+    def press(seconds):
+        if len(opened) and seconds > 0.01:
+            getattr(opened[0], call)()
+        return np.zeros((16, 16), bool)
+
+    opened = []
+    with contactfpga.open(VirtualBoard(scene=press)) as board:
+        opened.append(board)
+        with pytest.raises(contactfpga.ContactFPGAError, match="its own scene would wait for it for ever"):
+            collections.deque(board, maxlen=0)
+        opened.clear()
+        board.read()
+
+
 def test_a_function_that_gives_another_sheets_cells_says_so():
     with pytest.raises(ValueError, match=r"cells of shape \(3, 3\); the sheet has 16x16"):
         contactfpga.open(VirtualBoard(scene=lambda seconds: np.zeros((3, 3), bool)))
@@ -133,7 +152,7 @@ def test_a_function_that_gives_another_sheets_cells_says_so():
 def test_a_second_client_of_a_virtual_board_is_refused_and_the_first_goes_on(tmp_path, record):
     virtual = VirtualBoard(scene="two_fingers")
     with contactfpga.open(virtual, record=tmp_path / "first.raw" if record else None) as opened:
-        with pytest.raises(contactfpga.PortNotFound, match="is in use: this program opened it already; close that"):
+        with pytest.raises(contactfpga.PortBusy, match="is in use: this program opened it already; close that"):
             contactfpga.open(virtual)
         assert len(opened.read()) == 2
     with pytest.raises(contactfpga.BoardClosed, match="make another one"):
@@ -196,7 +215,7 @@ def test_the_board_on_a_pseudo_terminal_answers_read_zones(pty_board):
 
 def test_a_second_client_of_the_pseudo_terminal_is_refused_and_the_first_goes_on(pty_board):
     with contactfpga.open(pty_board.port, timeout=LONG) as opened:
-        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+        with pytest.raises(contactfpga.PortBusy, match="this program opened it already"):
             contactfpga.open(pty_board.port, timeout=LONG)
         assert len(opened.read(LONG)) == 2
     with contactfpga.open(pty_board.port, timeout=LONG) as again:

@@ -160,7 +160,7 @@ def test_a_search_writes_to_no_port(three):
 def test_a_search_does_not_disturb_an_open_board(three):
     three[0].slice = 1 << 16
     with contactfpga.open("name:LEFT", timeout=LONG) as opened:
-        with pytest.raises(contactfpga.PortNotFound, match="another program reads this port"):
+        with pytest.raises(contactfpga.PortNotFound, match="in use: this program opened it already"):
             contactfpga.open("name:LEFT")
         with contactfpga.open("name:RIGHT", timeout=LONG) as other:
             assert other.name == "RIGHT"

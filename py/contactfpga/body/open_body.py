@@ -18,6 +18,7 @@ from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
 from contactfpga.body.snapshot import Snapshot
 from contactfpga.body.together import Together
 from contactfpga.body.totals import BodyStats, SnapshotBatch
+from contactfpga.driver import forks
 from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 
@@ -48,6 +49,8 @@ class OpenBody:
         self._changes = self._given = 0
         self._closing = threading.Event()  # beside the condition: no change of a link wakes the other links' threads
         self._queues: list[SnapshotQueue] = []
+        self._inherited = False
+        forks.watch(self)
         opener, together = opened or self._open_board, Together(self.clock)
         self._readers = {name: LinkReader(plan, opener, self.clock, together) for name, plan in body.links.items()}
         self._threads = [
@@ -171,7 +174,15 @@ class OpenBody:
         """Counters since the body was opened."""
         return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
 
+    def forked(self) -> None:
+        """In a child process all ports are closed; its parent goes on."""
+        self._changed, self._closing = threading.Condition(), threading.Event()
+        self._closing.set()
+        self._threads, self._readers, self._inherited = [], {}, True
+
     def _check_open(self) -> None:
+        if self._inherited:
+            raise BoardClosed(f"this body {forks.ELSEWHERE}")
         if self._closing.is_set():
             raise BoardClosed("this body was closed; open it again")
 

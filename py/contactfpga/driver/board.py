@@ -35,7 +35,8 @@ class Board:
 
     Made by :func:`open`. Safe for several threads. :meth:`read`, :meth:`next` and :meth:`latest` share one queue, so a
     thread that wants every frame for itself calls :meth:`subscribe`. A board can be neither copied nor sent to another
-    process. After :meth:`close` every method raises :class:`BoardClosed`, even one that was already waiting.
+    process; in a child of ``fork`` it is closed. After :meth:`close` every method raises :class:`BoardClosed`, even one
+    that was already waiting.
     """
 
     def __init__(self, transport: Transport, skin: Skin | None = None, opened: Callable[[Board], object] | None = None):

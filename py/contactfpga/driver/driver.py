@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 from contactfpga.choices.choice import trusted
-from contactfpga.driver import finding, recording
+from contactfpga.driver import finding, forks, recording
 from contactfpga.driver.board import Board
 from contactfpga.driver.recording import FileTap, Opening, Tap
 from contactfpga.driver.subscription import checked
@@ -44,8 +44,8 @@ def open(
     ``timeout`` in seconds, for the hello. ``trust``: files of Skins may name modules, which are imported and so run
     (:meth:`Skin.load`). Paths may be text or :class:`~pathlib.Path`.
 
-    Raises :class:`PortNotFound`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`, :class:`ReadTimeout`,
-    :class:`SkinMismatch`, :class:`VersionMismatch`.
+    Raises :class:`PortNotFound`, :class:`PortBusy`, :class:`PortLost`, :class:`BoardSilent`, :class:`OnlyNoise`,
+    :class:`ReadTimeout`, :class:`SkinMismatch`, :class:`VersionMismatch`.
     """
     timeout = checked(timeout)
     if skin is not None and not isinstance(skin, Skin):
@@ -117,6 +117,13 @@ def _forget(port: str | None, board: Board | None = None) -> None:
             board = _boards.pop(port, None)
     if board is not None:
         board.close()
+
+
+@forks.in_child
+def _begin_anew() -> None:
+    global _lock
+    _lock = threading.Lock()
+    _boards.clear()
 
 
 @atexit.register

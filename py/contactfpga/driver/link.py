@@ -9,6 +9,7 @@ import weakref
 from collections.abc import Callable
 from typing import Protocol
 
+from contactfpga.driver import forks
 from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.driver.silence import Silence
 from contactfpga.driver.timed_out import timed_out
@@ -82,6 +83,8 @@ class Link:
         self._turning: int | None = None  # the thread that reads
         self._writing: int | None = None  # the thread that writes
         self._closers = 0  # threads that wait in :meth:`close`
+        self._inherited = False
+        forks.watch(self)
 
     def start(self) -> None:
         """Begin to read, once those listen who want to hear all from the first byte on."""
@@ -169,6 +172,8 @@ class Link:
         with self.changed:
             self._closing = True
             self.changed.notify_all()
+            if self._inherited:
+                return
             if threading.get_ident() in (self._turning, self._writing):  # a scene's callback closes
                 return  # what it was called by does the rest
             self._closers += 1
@@ -191,7 +196,15 @@ class Link:
             if not self._in_use() and not self._closers:
                 self.transport.close()
 
+    def forked(self) -> None:
+        """In a child process the port is closed, and stays open in its parent."""
+        self.changed, self._commanding = threading.Condition(), threading.Lock()
+        self._turning = self._writing = None
+        self._closing = self._inherited = True
+
     def check_open(self) -> None:
+        if self._inherited:
+            raise BoardClosed(f"{self.transport.name} {forks.ELSEWHERE}")
         if self._closing:
             raise BoardClosed(f"{self.transport.name} was closed; open it again")
 
@@ -203,6 +216,9 @@ class Link:
                 self.check_open()
                 if (result := found()) is not None:
                     return result
+                if self._turning == threading.get_ident():
+                    step = "a scene is called while its board is read, so read the board elsewhere"
+                    raise ContactFPGAError(f"{self.transport.name}: its own scene would wait for it for ever; {step}")
                 if self._failure is not None:
                     raise self._failure.with_traceback(None)
                 left = deadline - self.transport.clock()

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
 from urllib.parse import unquote
 
+from contactfpga.driver import forks
 from contactfpga.driver.mcap_bytes import McapStream
 from contactfpga.driver.mcap_part import files_of
 from contactfpga.driver.mcap_records import MAGIC
@@ -64,6 +65,7 @@ class FileTap:
     def __init__(self, path: str | Path):
         self._path = path
         self._file = create(path)
+        forks.watch(self)
 
     def take(self, data: bytes, clock_s: float) -> None:
         """Append them. Raises :class:`ContactFPGAError`."""
@@ -78,6 +80,11 @@ class FileTap:
             self._file.close()
         except OSError as error:
             raise self._failed(error) from None
+
+    def forked(self) -> None:
+        """The parent writes what waits."""
+        if not self._file.closed:
+            forks.discard(self._file)
 
     def _failed(self, error: OSError) -> ContactFPGAError:
         reason = error.strerror or told(error)

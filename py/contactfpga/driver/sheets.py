@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from contactfpga.driver import forks
 from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.skin.several import MOST_SHEETS
@@ -210,6 +211,13 @@ class Greetings:
 
 _open: dict[str, SharedPort] = {}
 _lock = threading.Lock()
+
+
+@forks.in_child
+def _begin_anew() -> None:
+    global _lock
+    _lock = threading.Lock()
+    _open.clear()
 
 
 def share(port: str, number: int, baud: int, connect: Callable[[str, int], Transport]) -> SheetPort:

@@ -11,9 +11,9 @@ from typing import Protocol
 
 from contactfpga.circuit import Circuit, load_checked
 from contactfpga.cover import Cover, load_cover
-from contactfpga.driver import recording, sheets, sim_address
+from contactfpga.driver import forks, recording, sheets, sim_address
 from contactfpga.driver.replay import ReplayTransport
-from contactfpga.errors import MissingExtra, PortLost, PortNotFound
+from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
 from contactfpga.net.address import SCHEME
 from contactfpga.net.message import Counters
@@ -78,8 +78,10 @@ class SerialTransport:
             self._port.open()
         except self._errors as error:
             if "locked" in str(error):
-                raise PortNotFound(f"{name} is in use: another program reads this port; close it first") from None
+                raise PortBusy(f"{name} is in use: {_user(name)}") from None
             raise PortNotFound(f"{name} cannot be opened: {_reason(error)}; {_next_step(error, name)}") from None
+        _SERIAL.add(self)
+        forks.watch(self)
 
     def read(self, timeout_s: float) -> bytes:
         try:
@@ -98,11 +100,31 @@ class SerialTransport:
         return time.monotonic()
 
     def close(self) -> None:
+        _SERIAL.discard(self)
         with contextlib.suppress(*self._errors):  # gone already, which is what closing wants
             self._port.close()
 
+    def forked(self) -> None:
+        """Close the child's descriptor: the lock is the parent's, and ends with the last descriptor."""
+        self.close()
+
     def _lost(self, error: Exception) -> PortLost:
         return PortLost(f"{self.name} is gone ({_reason(error)}); plug the board in and open it again")
+
+
+_SERIAL: weakref.WeakSet[SerialTransport] = weakref.WeakSet()
+"""What is open in this process."""
+
+
+def _user(name: str) -> str:
+    """Who has a serial port open, and what to do about it."""
+    place = os.path.realpath(name)
+    if all(os.path.realpath(one.name) != place for one in _SERIAL):
+        return "another program reads this port; close it first"
+    return (
+        "this program opened it already; go on with that board, or close it first, as `with` does. "
+        "What read_zones() has opened stays open"
+    )
 
 
 class SimulatedPort(Protocol):
@@ -130,7 +152,7 @@ class SimTransport:
         self.name = name
         self._board = board
         if _SIMULATED.setdefault(id(board), self) is not self:
-            raise PortNotFound(f"{name} is in use: this program opened it already; close that first")
+            raise PortBusy(f"{name} is in use: this program opened it already; close that first")
 
     @classmethod
     def named(cls, name: str) -> SimTransport:
@@ -155,6 +177,8 @@ class SimTransport:
 
 _SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDictionary()
 """What is open, by its board's identity: two readers would take each other's bytes."""
+
+forks.in_child(_SIMULATED.clear)
 
 
 class RecordingTransport:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 
-from contactfpga.driver import driver
+from contactfpga.driver import driver, forks
 from contactfpga.driver.board import Board
 from contactfpga.driver.mcap_part import SUFFIX
 from contactfpga.driver.subscription import Events
@@ -71,6 +71,7 @@ class Session:
         self._begun: threading.Event | None = None
         self._failure: BaseException | None = None
         self._threads: list[threading.Thread] = []
+        forks.watch(self)
 
     def add(
         self,
@@ -176,6 +177,12 @@ class Session:
         for link in self.links:
             if link.error is not None:
                 raise link.error
+
+    def forked(self) -> None:
+        """In a child process nothing is recorded; its parent goes on."""
+        self._stop, self._ended, self._begun = threading.Event(), threading.Event(), None
+        self._ended.set()
+        self._opened, self.links, self._threads, self._recorder = [], [], [], None
 
     @property
     def seconds(self) -> float:

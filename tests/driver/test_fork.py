@@ -1,0 +1,286 @@
+"""After `fork` an open board is the parent's: the child is told so, ends as usual, and leaves the parent's port alone.
+
+Each test runs a program of its own, as a child of pytest would run pytest's ends.
+"""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from fake_board import FakeBoard
+from terminals import environment
+from two_links import write_robot
+
+from contactfpga import Skin
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+
+HEAD = """
+import contactfpga, os, sys, threading, time
+from contactfpga import BoardClosed, ContactFPGAError, PortNotFound
+port = sys.argv[1]
+
+def child(work, end=sys.exit):
+    '''The status of a child that does this work; 99: it did not end.'''
+    number = os.fork()
+    if not number:
+        work()
+        end(0)
+    until = time.monotonic() + 20
+    while time.monotonic() < until:
+        ended, status = os.waitpid(number, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.002)
+    os.kill(number, 9)
+    os.waitpid(number, 0)
+    return 99
+
+def refused(call):
+    try:
+        call()
+    except BoardClosed as error:
+        assert "was opened in another process; open it anew in this one" in str(error), error
+    else:
+        raise AssertionError(f"{call} was not refused")
+"""
+
+
+def run(program, *arguments):
+    """What a program of its own prints."""
+    command = [sys.executable, "-c", HEAD + program, *map(str, arguments)]
+    path = os.pathsep.join(sys.path)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=250, env=environment(PYTHONPATH=path))
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if not line.startswith("contactfpga: building")] == []
+    return done.stdout
+
+
+def test_a_child_has_no_board_and_ends_as_usual(board):
+    board.hello_s = 0.1
+    program = """
+board = contactfpga.open(port)
+frames = board.subscribe()
+calls = [board.read, board.next, board.latest, board.batch, board.clock, lambda: board.command(1), board.self_test,
+         lambda: board.sheet, lambda: board.silence, board.subscribe, board.events, frames.next,
+         board.__iter__().__next__]
+
+def work():
+    for call in calls:
+        refused(call)
+    assert board.port == port and board.live
+    frames.close()
+    board.close()
+    with board:
+        pass
+
+print([child(work), child(work, os._exit), child(lambda: None)])
+zones = board.read()
+board.close()
+print(len(zones), board.stats.lost, sum(board.stats.damaged.values()))
+again = contactfpga.open(port)
+"""
+    asked = board.asked
+    assert run(program, board.path) == "[0, 0, 0]\n1 0 0\n"
+    assert board.asked - asked <= 6, "a child asked"
+
+
+def test_children_of_a_busy_board_end_at_any_moment(board):
+    """While other threads of the parent read, ask and hold locks."""
+    board.stream = board.frame
+    board.hello_s = 0.05
+    program = """
+board = contactfpga.open(port)
+done = threading.Event()
+counts = [0, 0, 0]
+
+def keep(number, call):
+    while not done.is_set():
+        call(5.0)
+        counts[number] += 1
+
+def work():
+    refused(board.read)
+    refused(board.next)
+    board.close()
+
+threads = [threading.Thread(target=keep, args=(number, call))
+           for number, call in enumerate([board.read, board.next, board.latest])]
+for thread in threads:
+    thread.start()
+found = [child(work) for _ in range(15)]
+before = list(counts)
+time.sleep(0.5)
+print(set(found), all(now > then for now, then in zip(counts, before)))
+done.set()
+for thread in threads:
+    thread.join()
+board.close()
+"""
+    assert run(program, board.path) == "{0} True\n"
+
+
+def test_a_port_that_read_zones_keeps_open_is_the_parents(board):
+    program = """
+contactfpga.read_zones(port)
+
+def work():
+    try:
+        contactfpga.read_zones(port)
+    except PortNotFound as error:
+        assert "another program" in str(error), error
+    else:
+        raise AssertionError("the child reads the parent's port")
+
+print(child(work), len(contactfpga.read_zones(port)))
+"""
+    assert run(program, board.path) == "0 1\n"
+
+
+def test_a_child_may_open_a_board_of_its_own(board):
+    program = """
+own = contactfpga.open(port)
+other = contactfpga.open("sim://")
+
+def work():
+    refused(other.read)
+    with contactfpga.open("sim://") as board:
+        board.read()
+    with contactfpga.open(sys.argv[2]) as board:
+        board.read()
+    own.close()
+
+print(child(work), len(own.read()))
+"""
+    with FakeBoard(Skin()) as second:
+        assert run(program, board.path, second.path) == "0 1\n"
+
+
+@pytest.mark.parametrize("how", ["Process", "Pool"])
+def test_children_of_multiprocessing(board, how):
+    program = """
+import multiprocessing
+board = contactfpga.open(port)
+fork = multiprocessing.get_context("fork")
+
+def work(number):
+    refused(board.read)
+    return number
+
+if sys.argv[2] == "Pool":
+    with fork.Pool(2) as pool:
+        print(pool.map(work, range(4)))
+else:
+    process = fork.Process(target=work, args=(0,))
+    process.start()
+    process.join(20)
+    print(process.exitcode)
+print(len(board.read()))
+"""
+    assert run(program, board.path, how) == {"Process": "0\n1\n", "Pool": "[0, 1, 2, 3]\n1\n"}[how]
+
+
+def test_the_parents_port_is_given_back_though_a_child_goes_on(board):
+    program = """
+board = contactfpga.open(port)
+(said, says), (out, into) = os.pipe(), os.pipe()
+number = os.fork()
+if not number:
+    os.close(into)
+    os.write(says, b"x")
+    os.read(out, 1)  # until the parent ends
+    os._exit(0)
+os.read(said, 1)
+board.close()
+print(len(contactfpga.open(port).read()))
+"""
+    assert run(program, board.path) == "1\n"
+
+
+def test_what_is_recorded_is_written_once(board, tmp_path):
+    file = tmp_path / "bytes.rec"
+    program = """
+board = contactfpga.open(port, record=sys.argv[2])
+for _ in range(20):
+    board.read()
+assert not os.path.getsize(sys.argv[2]), "nothing waits to be written, so that this test tests nothing"
+print([child(lambda: None), child(board.close)])
+board.read()
+board.close()
+print(board.stats.bytes)
+"""
+    status, count = run(program, board.path, file).splitlines()
+    assert status == "[0, 0]"
+    assert file.stat().st_size == int(count)
+    program = """
+every = [zones.time_us for zones in contactfpga.open(f"replay://{port}")]
+with contactfpga.open(f"replay://{port}") as board:
+    before = [board.next().time_us for _ in range(5)]
+    print(child(lambda: refused(board.next)), before + [zones.time_us for zones in board] == every)
+"""
+    assert run(program, file) == "0 True\n"
+
+
+def test_sheets_of_one_port_in_a_child():
+    program = """
+from contactfpga.driver import sheets
+board = contactfpga.open("sim://?sheets=examples/two-sheets.toml#0")
+print(child(lambda: (refused(board.read), board.close())), len(sheets._open))
+board.read()
+"""
+    assert run(program, "") == "0 1\n"
+
+
+def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
+    pytest.importorskip("mcap", reason="the extra `record` is not installed")
+    program = """
+from contactfpga.recordings import Recording
+from contactfpga.recordings.session import Session
+session = Session(sys.argv[2])
+session.add(port)
+session.start()
+print({child(session.stop) for _ in range(4)}, session.running)
+session.stop()
+Recording(sys.argv[2])
+"""
+    board.stream = board.frame
+    board.hello_s = 0.05
+    assert run(program, board.path, tmp_path / "session.mcap") == "{0} True\n"
+
+
+def test_a_body_in_a_child_is_closed(tmp_path):
+    program = """
+from two_links import Plugged
+from contactfpga.body import Body
+from contactfpga.body.open_body import OpenBody
+body = OpenBody(Body.load(port), opened=Plugged().opened)
+snapshots = body.subscribe()
+body.read()
+
+def work():
+    for call in (body.read, body.latest, body.next, body.subscribe, snapshots.next):
+        refused(call)
+    snapshots.close()
+    body.close()
+
+print({child(work) for _ in range(6)})
+body.next()
+body.close()
+"""
+    assert run(program, write_robot(tmp_path)) == "{0}\n"
+
+
+def test_a_reader_over_a_network_in_a_child(board):
+    pytest.importorskip("zenoh", reason="the extra `net` is not installed")
+    from net_processes import free_endpoint, publish
+
+    program = """
+board = contactfpga.open(port, timeout=30.0)
+print(child(lambda: refused(board.read)), child(board.close), child(lambda: refused(board.next), os._exit))
+print(len(board.read(30.0)))
+board.close()
+"""
+    endpoint = free_endpoint()
+    with publish(board.path, "--key", "forked", "--listen", endpoint):
+        assert run(program, f"zenoh://forked?connect={endpoint}") == "0 0 0\n1\n"
