@@ -11,8 +11,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_sim.cosim import record
-from contactfpga_sim.golden import Timeline, requests
-from contactfpga_sim.golden import reversal as golden
+from contactfpga_sim.golden import Timeline, guard, requests
 from contactfpga_sim.golden import reversal_guard as golden_guard
 from contactfpga_sim.golden.facts import facts
 
@@ -36,7 +35,7 @@ def small(**fields) -> Skin:
 def checked_soon(monkeypatch) -> None:
     """A sheet at rest is checked every 32 us, and what is told is renewed every 256 us."""
     monkeypatch.setattr(reversal, "RETRY_BIT", 8)
-    monkeypatch.setattr(golden, "RETRY_US", 2**8)
+    monkeypatch.setattr(guard, "RETRY_US", 2**8)
     for module in (reversal, reversal_guard):
         monkeypatch.setattr(module, "CHECK_BIT", 5)
     monkeypatch.setattr(golden_guard, "CHECK_US", 2**5)

@@ -1,35 +1,53 @@
 """Drives the columns to the released level, but for those that something else holds."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.stuck import watched
 
 RETRY_BIT = 16
-"""Of the clock in us: a column that read stuck is driven again when this bit turns."""
+"""Of the clock in us: a column that is stuck is driven again when this bit turns."""
+LOOKS = 4
+"""Samples, apart from each other, of which a single one that reads released shows that a column is not stuck."""
+LEAST_BITS = 4
+"""Of the clocks between two of them: no disturbance of a few clocks spoils both."""
 
 
 class Precharge(wiring.Component):
-    """Columns that are masked in every row are never driven; one that read stuck is not driven until it is retried.
+    """Columns that are masked in every row are never driven. A column is *stuck*, and not driven, if it reads pressed
+    in a whole window, which lasts for :data:`LOOKS` samples that lie apart, and counts all samples between them. Two of
+    the :data:`LOOKS` are ``2 ** apart_bits`` clocks apart: longer than it takes to drive a column to its level, and
+    longer than a projection.
+
+    A stuck column is *tried* in the first window that begins after ``turn`` turns: it is driven, and is still stuck
+    after that, or well, by the same rule.
 
     drive (in): in the next clock the columns are driven.
     columns (in): those that read pressed.
-    stuck (in): high for a clock in which these are stuck.
+    looks (in): high for a clock in which these are a sample, taken when all that are not stuck had been driven.
     turn (in): bit ``RETRY_BIT`` of a clock in us.
-    held (out): columns that are not driven as they read stuck, from the clock after ``stuck`` on.
+    guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck; it is until
+    ``turn`` turns. The other scans take it for a column like all others.
+    held (out): columns that are stuck, from the clock after a window on.
     pins (out): columns that are driven, from registers.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
+        derived = Derived(skin)
+        charge = max(derived.precharge_clocks, derived.project_clocks if skin.reads_rows else 0)
+        self.apart_bits = max(LEAST_BITS, charge.bit_length())
+        self.alone = skin.guard and skin.reads_rows
         super().__init__(
             {
                 "drive": In(1),
-                "columns": In(skin.column_lines),
-                "stuck": In(1),
+                "columns": In(skin.column_lines - self.alone),
+                "looks": In(1),
                 "turn": In(1),
+                **({"guard_pressed": In(1)} if self.alone else {}),
                 "held": Out(skin.column_lines),
                 "pins": Out(skin.column_lines),
             }
@@ -37,11 +55,35 @@ class Precharge(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        lines = watched(self.skin)
-        free = Signal(self.skin.column_lines, init=lines)
+        count = Signal(range(LOOKS << self.apart_bits))  # of the window
+        low = Signal(len(self.columns), init=-1)  # columns that read pressed in all of its samples
+        stuck = Signal(len(self.columns))
+        ends = Signal()  # the window does, with this sample
+        asked = Signal()  # in the next window columns that are stuck are driven
+        tries = Signal()  # they are in this one
         before = Signal()
-        m.d.comb += self.held.eq(~free & lines)
-        m.d.sync += [before.eq(self.turn), self.pins.eq(Mux(self.drive, free, 0))]
-        retried = Mux(self.turn ^ before, lines, free)
-        m.d.sync += free.eq(retried & ~Mux(self.stuck, self.columns, 0))
+        turns = Signal()
+        free = Signal(self.skin.column_lines)
+        lines = watched(self.skin)
+        m.d.comb += [
+            turns.eq(self.turn ^ before),
+            ends.eq(self.looks & count.all()),
+            self.held[: len(stuck)].eq(stuck),
+            free.eq(Cat(~stuck | tries.replicate(len(stuck)), ~self.held[len(stuck) :]) & lines),
+        ]
+        m.d.sync += [
+            before.eq(self.turn),
+            self.pins.eq(Mux(self.drive, free, 0)),
+            asked.eq(turns | asked & ~ends),
+            count.eq(count + (self.looks | ~count[: self.apart_bits].all())),
+        ]
+        with m.If(ends):
+            kept = stuck & ~tries.replicate(len(stuck))
+            m.d.sync += [low.eq(-1), tries.eq(asked), stuck.eq((low & self.columns | kept) & lines)]
+        with m.Elif(self.looks):
+            m.d.sync += low.eq(low & self.columns)
+        if self.alone:
+            guard_stuck = Signal()
+            m.d.sync += guard_stuck.eq(~turns & (guard_stuck | self.guard_pressed))
+            m.d.comb += self.held[-1].eq(guard_stuck)
         return m

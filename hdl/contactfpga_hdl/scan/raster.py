@@ -181,7 +181,7 @@ class Scanner(wiring.Component):
                 (slots.clock >= self.derived.settle_clocks) & (slots.clock < self.derived.row_clocks - 2)
             ),
             precharge.columns.eq(sample.read),
-            precharge.stuck.eq(sample.of_released),
+            precharge.looks.eq(sample.of_released),
             precharge.turn.eq(time[RETRY_BIT]),
             self.pins.columns_drive.eq(precharge.pins),
         ]

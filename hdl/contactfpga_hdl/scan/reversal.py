@@ -1,6 +1,6 @@
 """Drives all columns and reads the rows; then drives only the rows that are touched, one by one."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -114,14 +114,14 @@ class ReversalScanner(wiring.Component):
         drives_rows = Signal()
         begun = Signal()
         m.d.sync += [drives_rows.eq(~sheet.listens), begun.eq(turn.begins)]
-        selected, drive, stuck = sheet.selected, drives_rows.replicate(skin.rows), sheet.pressed
+        selected, drive = sheet.selected, drives_rows.replicate(skin.rows)
         inverted, charged = Const(0, 1), precharge.pins
         if skin.guard:
             holds = Signal()  # from the first clock on
             inverted = Signal()
             m.d.sync += [holds.eq(~turn.tests), inverted.eq(sheet.inverts)]
             selected, drive = Cat(selected, sheet.guard), Cat(drive, holds)
-            stuck = Mux(checks.of_guard, stuck & 1 << skin.columns, stuck[: skin.columns])
+            m.d.comb += precharge.guard_pressed.eq(checks.of_guard & sheet.pressed[-1])
         if test is not None:
             rows_drive, columns_drive = test.pins()
             selected, drive = selected | test.discharges.replicate(skin.row_lines), drive | rows_drive
@@ -132,10 +132,9 @@ class ReversalScanner(wiring.Component):
             self.pins.rows.eq(~selected if skin.selects_low else selected),
             self.pins.rows_drive.eq(drive),
             self.pins.columns_drive.eq(charged),
-            turn.released.eq(turn.begins | turn.rests & turn.settled),
             precharge.drive.eq(sheet.charges),
-            precharge.columns.eq(stuck),
-            precharge.stuck.eq(turn.released | checks.of_guard),
+            precharge.columns.eq(sheet.pressed),
+            precharge.looks.eq(turn.begins | turn.rests & turn.settled),
             precharge.turn.eq(self.time[RETRY_BIT]),
         ]
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)

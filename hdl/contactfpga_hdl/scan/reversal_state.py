@@ -41,4 +41,3 @@ class Turn:
         self.lets_go = Signal()  # high for a clock: one begins
         self.tests = Signal()  # it is under way
         self.tested = Signal()  # high for a clock, its last one
-        self.released = Signal()  # columns that read pressed in this clock are stuck

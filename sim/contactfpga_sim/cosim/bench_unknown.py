@@ -183,7 +183,8 @@ def _sheet(skin: Skin) -> tuple[str, str]:
     plain = f"{{{skin.columns}{{{released}}}}}"
     guard = f"{{~({released}), {plain}}}" if skin.guard else plain
     kept = _kept(skin, columns) if skin.self_test else ""
-    reads = "pulled | stuck" + (" | held | still" if skin.self_test else "")
+    reads = "pulled | stuck" + (" | held | still" if skin.self_test else "") + (" | drained" if reverses else "")
+    alone = (f"{{{skin.column_lines}{{~(rows_drive[{row}] | touched[{row}])}}}} & closed{row}" for row in lines)
     text = f"""wire {rows} rows;
 wire {rows} rows_drive{"" if reverses else f" = {{{skin.row_lines}{{1'b1}}}}"};
 wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
@@ -191,8 +192,9 @@ wire {columns} columns_drive{"" if skin.precharge_us else " = 0"};
 wire {columns} feeding = columns_drive{f" & {guard}" if checks else ""};
 wire {rows} selected = {selecting} & rows_drive;
 wire {columns} pulled = {pulled};
-{kept}wire {columns} reads = {reads};
-wire {rows} touched = {{{feeding}}};
+{kept}wire {rows} touched = {{{feeding}}};
+wire {columns} drained = ({" | ".join(alone)}) & ~feeding;
+wire {columns} reads = {reads};
 wire {rows} rows_read = rows & rows_drive | {let_go} & ~rows_drive;
 """
     pins = f", .columns({level}), .rows(rows)"

@@ -213,7 +213,7 @@ def _row_time(values: dict[str, Any], kind: str, megahertz: int) -> tuple[float,
 def stimulus(skin: Skin, cycles: int, seed: int) -> Timeline:
     """Random cells that come and go at any cycle, stuck columns, requests and other bytes.
 
-    A scan that waits does not drive a column that was stuck for a long time, so of its columns only some ever are.
+    A scan that waits does not drive a column that is stuck, so of its columns only some ever are.
     """
     rng = np.random.default_rng([seed, 7])
     shape = (skin.rows, skin.columns)

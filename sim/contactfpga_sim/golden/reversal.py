@@ -10,13 +10,11 @@ from contactfpga_sim.golden import debounce, reversal_guard
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import closed, stuck
 from contactfpga_sim.golden.handed import Handed
+from contactfpga_sim.golden.held import Held
 from contactfpga_sim.golden.request import Request
 from contactfpga_sim.golden.reversal_guard import Checks
 from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
 from contactfpga_sim.golden.self_test import SelfTest
-
-RETRY_US = 2**16
-"""A column that read stuck is driven again when the clock passes a multiple of this."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,20 +51,20 @@ class Scanner:
         self._listens = 1  # the first cycle in which all columns are driven and rows let go
         self._packed = 0  # the cycle from which on a frame may begin
         self._rests = False
-        self._held: list[tuple[int, np.ndarray]] = []  # (cycle, columns): read stuck in it, or did before
-        self.checks = Checks(facts, play.timeline, RETRY_US, self._undriven) if facts.skin.guard else None
+        self._held = Held(facts, play.timeline)
+        self.checks = Checks(facts, play.timeline, self._held) if facts.skin.guard else None
         self.test = SelfTest(facts, play.timeline, play.requests, play.stages) if facts.skin.self_test else None
 
     def frame(self) -> None:
         """The next frame."""
         begun = self._begin()
-        held = self._hold(begun)
+        self._held.look(begun)
         touched = self._touched(begun - 2)
         todo = sorted(touched | self._busy)
         scan = Scan(
             cells=np.zeros((self._facts.rows, self._facts.columns), bool),
             offered=[],
-            stuck=int(np.sum(held[: self._facts.columns] & ~self._facts.mask.all(axis=0))),
+            stuck=int(np.sum(self._held.at(begun + 1)[: self._facts.columns])),
             time_us=begun // self._facts.clocks_per_us,
             requested=any(one.cycle < begun for one in self._waiting()),
             heard=last_number(self._requests, begun) % 8,
@@ -97,12 +95,12 @@ class Scanner:
             wanted = max(self._wanted(), self._packed, begin)
             check = max(self.checks.asked, begin) if self.checks else wanted + 1
             until = min(wanted, check)
-            self._rest(begin, until)
+            self._held.rests(begin, until)
             touched = self._first_touched(begin - 2, until - 2)
             test = self._test_asked(begin, until if touched is None else touched + 1)
             if test is not None:
                 until, touched = test, None
-                self._held = [entry for entry in self._held if entry[0] <= until]
+                self._held.cut(until)
             self._watch(begin, until if touched is None else touched + 2)
             if touched is not None:
                 return self._after_tests(max(self._wake(touched) + project, self._packed))
@@ -152,7 +150,7 @@ class Scanner:
     def _wake(self, touched: int) -> int:
         """A row reads touched in this cycle; returns the one in which it is seen."""
         seen = touched + 2
-        self._held = [entry for entry in self._held if entry[0] <= seen]
+        self._held.cut(seen)
         if self._touched(touched) & self._clean_rows():
             self._set_contact(seen + 1, 1)
         return seen
@@ -160,7 +158,7 @@ class Scanner:
     def _listen_after(self, checked: int, guard_is_stuck: bool) -> None:
         """A check had its sample in this cycle."""
         if guard_is_stuck:
-            self._hold(checked + 2, np.arange(self._facts.column_lines) == self._facts.columns)
+            self._held.guard_found(checked + 2)
         self._listens = checked + 2
         self._stages.tell(checked + 3, self._word)
 
@@ -181,7 +179,7 @@ class Scanner:
     def _touched(self, cycle: int) -> frozenset[int]:
         """Rows that read touched at the pins and are not masked whole."""
         facts = self._facts
-        driven = ~self._undriven(cycle) & ~stuck(facts, self._timeline, cycle)
+        driven = ~self._held.undriven(cycle) & ~stuck(facts, self._timeline, cycle)
         lines = closed(facts, self._timeline, cycle)[: facts.rows] & driven
         rows = (lines[:, : facts.columns] & ~facts.mask.all(axis=0)).any(axis=1) & ~facts.mask.all(axis=1)
         return frozenset(np.flatnonzero(rows).tolist())
@@ -191,38 +189,8 @@ class Scanner:
 
     def _first_touched(self, begin: int, end: int) -> int | None:
         """The first cycle from ``begin`` to ``end`` in which a row reads touched."""
-        retry = RETRY_US * self._facts.clocks_per_us
-        driven = (cycle + 2 for cycle, _ in self._held)
-        turns = {begin, *self._changes, *driven, *range(begin // retry * retry + 2, end + 1, retry)}
+        turns = {begin, *self._changes, *self._held.driven_anew(begin, end)}
         return next((cycle for cycle in sorted(turns) if begin <= cycle <= end and self._touched(cycle)), None)
-
-    def _rest(self, begin: int, end: int) -> None:
-        """At rest each cycle counts in which a column reads stuck."""
-        retry = RETRY_US * self._facts.clocks_per_us
-        seen = (cycle + 2 for cycle in self._changes)
-        turns = {begin, *seen, *range(begin // retry * retry, end + 1, retry)}
-        for cycle in sorted(turns):
-            if begin <= cycle <= end:
-                self._hold(cycle)
-
-    def _undriven(self, cycle: int) -> np.ndarray:
-        """(C,) bool: columns that are not driven in this cycle, as they read stuck."""
-        retry = RETRY_US * self._facts.clocks_per_us
-        for begun, held in reversed(self._held):
-            if begun + 2 <= cycle:
-                return held if (cycle - 2) // retry == begun // retry else np.zeros_like(held)
-        return np.zeros(self._facts.column_lines, bool)
-
-    def _hold(self, cycle: int, now: np.ndarray | None = None) -> np.ndarray:
-        """Columns that read pressed in this cycle, or did since the last retry: from then on they are not driven.
-        Without ``now`` those that are stuck, but for a guard column."""
-        if now is None:
-            now = stuck(self._facts, self._timeline, cycle - 2)
-            now &= np.arange(len(now)) < self._facts.columns
-        retry = RETRY_US * self._facts.clocks_per_us
-        before = [held for last, held in self._held[-1:] if last // retry == cycle // retry]
-        self._held.append((cycle, np.logical_or.reduce([now, *before])))
-        return self._held[-1][1]
 
     # ---- rows that are driven
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
+from contactfpga_sim.golden import guard
 from contactfpga_sim.golden.facts import Facts
 from contactfpga_sim.golden.guard import Told, closed, stuck
+from contactfpga_sim.golden.held import Held
 from contactfpga_sim.golden.trace import Timeline
 
 CHECK_US = 2**8
@@ -17,14 +17,13 @@ CHECK_US = 2**8
 class Checks:
     """Of columns and rows in turn."""
 
-    def __init__(self, facts: Facts, timeline: Timeline, retry_us: int, undriven: Callable[[int], np.ndarray]):
-        """``undriven``: (C + 1,) bool, the columns that are not driven in a cycle as they read stuck."""
+    def __init__(self, facts: Facts, timeline: Timeline, held: Held):
         self.slots: list[tuple[int, int]] = []
         """First and last cycle of each slot of the guard row."""
         self._facts = facts
         self._timeline = timeline
-        self._undriven = undriven
-        self._retry = retry_us * facts.clocks_per_us
+        self._held = held
+        self._retry = guard.RETRY_US * facts.clocks_per_us
         self._retries = 0  # up to the last check of rows
         self._renews = False
         self._told = Told(facts)
@@ -61,15 +60,15 @@ class Checks:
             self._check_columns(sample)
         else:
             self._check_rows(sample)
-        return sample, not self._of_rows and bool(self._stuck(sample)[-1])
+        return sample, not self._of_rows and self._guard_reads(sample)
 
     def _check_rows(self, sample: int) -> None:
         facts = self._facts
-        answers = closed(facts, self._timeline, sample)[: facts.rows, -1] & ~self._undriven(sample)[-1]
-        guard = self._stuck(sample) & (np.arange(facts.column_lines) == facts.columns)
-        if not guard[-1] and not self._guard_told:
+        answers = closed(facts, self._timeline, sample)[: facts.rows, -1] & ~self._held.undriven(sample)[-1]
+        pressed = (np.arange(facts.column_lines) == facts.columns) & self._guard_reads(sample)
+        if not pressed[-1] and not self._guard_told:
             self._told.check("rows", ~answers, self._renews)
-        self._told.check("stuck", guard | self._undriven(sample + 3), self._renews)
+        self._told.check("stuck", pressed | self._held.at(sample + 2), self._renews)
         retries = (sample + 2) // self._retry
         self._renews, self._retries = retries != self._retries, retries
 
@@ -81,6 +80,11 @@ class Checks:
     @property
     def _guard_told(self) -> bool:
         return bool(self.word >> self._facts.rows + 2 * self._facts.columns)
+
+    def _guard_reads(self, sample: int) -> bool:
+        """In a check of rows the guard column reads pressed: it is stuck, or not driven, and any row pulls it."""
+        pulled = closed(self._facts, self._timeline, sample)[: self._facts.rows, -1].any()
+        return bool(self._stuck(sample)[-1] or (pulled and self._held.undriven(sample)[-1]))
 
     def _stuck(self, cycle: int) -> np.ndarray:
         return stuck(self._facts, self._timeline, cycle)

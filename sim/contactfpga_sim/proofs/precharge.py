@@ -3,11 +3,11 @@
 from functools import partial
 from typing import Literal
 
-from amaranth.hdl import Mux, Signal, Value
+from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import released_levels
-from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
+from contactfpga_hdl.scan.precharge import LOOKS, RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.proofs.bugs import Bug
@@ -67,33 +67,76 @@ def raster(proof: Proof, diodes: Diodes) -> None:
 
 
 def let_go(proof: Proof) -> None:
-    """Free: when columns are driven, what they read, when it counts, and when they are retried.
+    """Free: when columns are driven, what they read, when that is a sample, and when they are retried.
 
-    Claimed: columns are driven a clock after they shall be, but for those that read stuck two clocks before that or
-    earlier and were not retried since, and those that are masked in every row.
+    Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
+    are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
+    stuck column is driven throughout the first window that begins after a turn, and then it is stuck if it read pressed
+    throughout that, too.
     """
     m = proof.m
-    skin = Skin(rows=2, columns=3, precharge_us=1, settle_us=20, mask=((0, 1), (1, 1)))
-    dut = Precharge(skin)
+    dut = Precharge(Skin(rows=2, columns=3, precharge_us=1, settle_us=20, mask=((0, 1), (1, 1))))
+    dut.apart_bits = 1  # in place of 4 or more, so that bugs show soon
     inside = proof.put(dut)
     drive, turn = proof.free(1, "drive"), proof.free(1, "turn")
-    columns, stuck = proof.free(3, "columns"), proof.free(1, "stuck")
-    m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.stuck.eq(stuck)]
-    held = Signal(3)
-    retried = turn != proof.before(turn)
-    m.d.sync += held.eq(Mux(retried, 0, held) | Mux(stuck, columns, 0))
-    proof.claim(dut.held == held & 0b101)
-    proof.claim(dut.pins == Mux(proof.before(drive), ~proof.before(held) & 0b101, 0))
-    proof.lemma(inside["free"] == ~held & 0b101)
+    columns, looks = proof.free(3, "columns"), proof.free(1, "looks")
+    m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.looks.eq(looks)]
+    apart, parts = Signal(), Signal(range(LOOKS))  # a clock without a look, or a look, was; parts that are over
+    released = Signal(3)  # columns that read so in this window
+    stuck = Signal(3)
+    asked = Signal()
+    tries = Signal()
+    ends = Signal()
+    m.d.comb += ends.eq(looks & apart & (parts == LOOKS - 1))
+    now = (released | Mux(looks, ~columns, 0))[:3]
+    m.d.sync += [
+        apart.eq(~(looks & apart)),
+        parts.eq(parts + (looks & apart)),
+        released.eq(Mux(ends, 0, now)),
+        asked.eq((turn != proof.before(turn)) | asked & ~ends),
+    ]
+    with m.If(ends):
+        m.d.sync += [tries.eq(asked), stuck.eq(~now | Mux(tries, 0, stuck))]
+    proof.claim(dut.held == stuck & 0b101)
+    let_go = stuck & ~tries.replicate(3)
+    proof.claim(dut.pins == Mux(proof.before(drive), ~proof.before(let_go) & 0b101, 0))
     proof.lemma(inside["before"] == proof.before(turn))
+    proof.lemma(inside["count"] == Cat(apart, parts))
+    proof.lemma((inside["low"] == ~released) & (inside["stuck"] == stuck & 0b101))
+    proof.lemma((inside["asked"] == asked) & (inside["tries"] == tries))
+
+
+MISREAD = 8
+"""Clocks."""
+
+
+def kept(proof: Proof) -> None:
+    """Free: as above. Assumed: column 0 reads pressed for at most 8 clocks on end, and not again in a window.
+
+    Claimed: it is driven whenever the others are.
+    """
+    m = proof.m
+    dut = Precharge(Skin(rows=2, columns=3, precharge_us=1, settle_us=20))
+    inside = proof.put(dut)
+    drive, turn = proof.free(1, "drive"), proof.free(1, "turn")
+    columns, looks = proof.free(3, "columns"), proof.free(1, "looks")
+    m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.looks.eq(looks)]
+    count, ends = inside["count"], inside["ends"]
+    lasted, over = Signal(range(MISREAD + 1)), Signal()  # clocks that it has read pressed; no more in this window
+    m.d.sync += [lasted.eq(Mux(columns[0], lasted + 1, 0)), over.eq((over | (lasted != 0) & ~columns[0]) & ~ends)]
+    proof.given(~columns[0] | (lasted < MISREAD) & ((lasted != 0) | ~over))
+    proof.claim(~proof.before(drive) | dut.pins[0])
+    part = 1 << dut.apart_bits
+    proof.lemma(~inside["stuck"][0] & (lasted <= MISREAD) & ~(over & (lasted != 0)))
+    proof.lemma(~inside["low"][0] | (count < 2 * part) & ((count < part) | over | (lasted > count - part)))
 
 
 def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
     """Free: the sheet, and when rows are taken. Column 1 is masked in every row.
 
-    Claimed: from four clocks after column 0 read pressed when it should not, in the last clock of a release, as a frame
-    begins or while the sheet rests, it is not driven, until the clock's bit 16 turns; this happens within 2^16 us.
-    Column 1 never is.
+    Claimed: the columns that are driven are those that the rule above leaves; a sample is what they read two clocks
+    before, in the last clock of a release, or as a frame begins or while the sheet rests; and the clock's bit 16 turns
+    at least every 2^16 us. Column 1 is never driven.
     """
     m, skin = proof.m, dut.skin
     inside = proof.put(dut)
@@ -110,26 +153,23 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
         _raster_lemmas(proof, inside, dut, late)
     released = released_levels(skin, skin.columns)
     at_pins = proof.before(proof.before(columns, init=released), init=released)
-    pressed = (at_pins[0] != released & 1) & sampled
-    held, age = Signal(), Signal(RETRY_BIT + 1)  # age: us since column 0 read stuck for the first time
-    retried = proof.before(time[RETRY_BIT]) != time[RETRY_BIT]
-    with m.If(pressed):
-        m.d.sync += held.eq(1)
-    with m.Elif(retried):
-        m.d.sync += held.eq(0)
-    with m.If(~held | retried):
+    turns = proof.before(time[RETRY_BIT]) != time[RETRY_BIT]
+    part = inside.part("precharge")
+    proof.claim(part.looks == sampled)
+    proof.claim(~sampled | (part.columns == at_pins ^ released))
+    proof.claim((dut.pins.columns_drive == part.pins) & (part.turn == time[RETRY_BIT]))
+    proof.claim(~dut.pins.columns_drive[1])
+    age = Signal(RETRY_BIT + 1)  # us since the last turn
+    with m.If(turns):
         m.d.sync += age.eq(0)
     with m.Elif(runs):
         m.d.sync += age.eq(age + 1)
-    proof.claim(~(proof.before(held) & dut.pins.columns_drive[0]))
-    proof.claim(~dut.pins.columns_drive[1])
     proof.claim(age <= _RETRY)
     since = Signal(RETRY_BIT + 1)  # us since bit 16 turned
-    m.d.comb += since.eq(Mux(retried & (time[:RETRY_BIT] == 0), _RETRY, time[:RETRY_BIT]))
-    proof.lemma((age <= since) & (held | (age == 0)))
-    proof.lemma(~retried | (time[:RETRY_BIT] == 0))
+    m.d.comb += since.eq(Mux(turns & (time[:RETRY_BIT] == 0), _RETRY, time[:RETRY_BIT]))
+    proof.lemma(age <= since)
+    proof.lemma(~turns | (time[:RETRY_BIT] == 0))
     proof.lemma(inside["precharge.before"] == proof.before(time[RETRY_BIT]))
-    proof.lemma(inside["precharge.free"] == ~held)
     level_lemmas(proof, inside, columns, released)
 
 
@@ -157,11 +197,6 @@ def _also_in(columns, inside: Inside, clock: int):
     return columns | (inside["clock"] == clock).replicate(len(columns))
 
 
-def _in_release(inside: Inside):
-    derived = inside.component.derived
-    return (inside["clock"] > derived.settle_clocks) & (inside["clock"] < derived.row_clocks - 1)
-
-
 def _settled(inside: Inside) -> int:
     return inside.component.derived.settle_clocks
 
@@ -174,27 +209,40 @@ _RASTER_BUGS = (
     Bug("driven all the time", Precharge, "pins", lambda _, inside: inside["free"]),
 )  # fmt: skip
 _LET_GO_BUGS = (
-    Bug("a stuck column is driven", Precharge, "free", lambda free, inside: inside["free"] | free),
-    Bug("never retried", Precharge, "free", lambda free, inside: free & inside["free"]),
+    Bug("a stuck column is driven", Precharge, "free", lambda free, inside: free | inside["stuck"]),
+    Bug("never tried", Precharge, "tries", lambda *_: 0),
+    Bug("tried at once, for what is left of a window", Precharge, "tries",
+        lambda tries, inside: tries | inside["turns"]),
+    Bug("well after a try", Precharge, "stuck",
+        lambda stuck, inside: Mux(inside["ends"] & inside["tries"], 0, stuck)),
+    Bug("stuck for good", Precharge, "stuck", lambda stuck, inside: stuck | inside["stuck"]),
     Bug("a masked column is driven", Precharge, "pins",
         lambda pins, inside: Mux(inside.component.drive, pins | 0b010, pins)),
-    Bug("one lets the others go", Precharge, "free",
-        lambda free, inside: Mux(inside.component.stuck & inside.component.columns.any(), 0, free)),
+    Bug("one lets the others go", Precharge, "stuck", lambda stuck, _: stuck.any().replicate(3)),
+    Bug("samples are together", Precharge, "count",
+        lambda count, inside: Mux(inside.component.looks, count + 1, count)),
+    Bug("only the last sample counts", Precharge, "low", lambda *_: -1),
+)  # fmt: skip
+_KEPT_BUGS = (
+    Bug("only the last sample counts", Precharge, "low", lambda *_: -1),
+    Bug("samples are together", Precharge, "count",
+        lambda count, inside: Mux(inside.component.looks, count + 15, count)),
 )  # fmt: skip
 _STUCK_BUGS = (
     Bug("at the wrong sample", Scanner, "of_released", lambda _, inside: inside["of_row"]),
     Bug("those that read released", Scanner, "read", lambda read, _: ~read),
-    Bug("driven on", Scanner, "pins__columns_drive", lambda columns, inside: columns | _in_release(inside)),
+    Bug("driven on", Scanner, "pins__columns_drive", lambda columns, inside: _also_in(columns, inside, 0)),
 )  # fmt: skip
 _REVERSAL_BUGS = (
-    Bug("never counted as stuck", ReversalScanner, "stuck", lambda *_: 0),
-    Bug("counted a clock late", ReversalScanner, "stuck", lambda _, inside: inside["begun"]),
-    Bug("driven on", ReversalScanner, "pins__columns_drive", lambda columns, inside: columns | inside["settled"]),
+    Bug("never looked at", ReversalScanner, "looks", lambda *_: 0),
+    Bug("looked at a clock late", ReversalScanner, "looks", lambda _, inside: inside["begun"]),
+    Bug("driven on", ReversalScanner, "pins__columns_drive", lambda columns, inside: columns | inside["due"][0]),
 )  # fmt: skip
 CASES = (
     Case("columns and rows apart", "raster, 3 rows, col2row", partial(raster, diodes="col2row"), 2, _RASTER_BUGS, 24),
     Case("columns and rows apart", "raster, 3 rows, row2col", partial(raster, diodes="row2col"), 2),
-    Case("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS),
+    Case("a stuck column is let go", "3 columns", let_go, 2, _LET_GO_BUGS, 30),
+    Case("a column that reads pressed for 8 clocks is driven on", "3 columns", kept, 2, _KEPT_BUGS, 80),
     Case("a stuck column is let go", "raster, 3x2",
          lambda proof: column_let_go(proof, Scanner(raster_of("col2row"))), 2, _STUCK_BUGS, 40),
     Case("a stuck column is let go", "reversal, 2x2",

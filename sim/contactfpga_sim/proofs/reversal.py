@@ -168,7 +168,7 @@ def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> No
     proof, state, clock, derived = sheet.proof, sheet.state, sheet.clock, sheet.dut.derived
     before, precharge, project = proof.before(state, init=LISTEN), derived.precharge_clocks, derived.project_clocks
     spare = derived.release_clocks - 2 - precharge  # clocks of a release that a precharge does not need
-    proof.lemma(sheet.inside["precharge.free"][0])
+    proof.lemma(~sheet.inside["precharge.stuck"][0])
     proof.lemma(sheet.dut.pins.columns_drive[0] == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
     proof.lemma((charged <= precharge) & (projected <= project))
     proof.lemma(

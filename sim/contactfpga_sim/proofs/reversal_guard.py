@@ -117,7 +117,7 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
     spared = checks - settle
     checked, of_rows, selects, blind = inside["checked"], inside["of_rows"], inside["selects"], told.stuck[-1]
-    proof.lemma(inside["precharge.free"][-1] | blind)
+    proof.lemma(~inside["precharge.guard_stuck"] | blind)
     proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
     proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= spared) | (before == ANSWER)))
     proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))

@@ -85,7 +85,7 @@ def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) ->
     before, row = proof.before(state, init=LISTEN), switch.row
     driven = switch.of_column(sheet.dut.pins.columns_drive)
     now = (Const(1, sheet.skin.rows) << inside["y"])[: sheet.skin.rows]  # row of this slot, or of the last one
-    proof.lemma(switch.of_column(inside["precharge.free"]))
+    proof.lemma(~switch.of_column(inside["precharge.stuck"]))
     proof.lemma(driven == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
     proof.lemma(report.unread == inside["todo"] | Mux((state == SELECT) | (due == 1), now, 0))
     pressed_1, pressed_2 = switch.of_column(sheet.pressed_1), switch.of_column(sheet.pressed_2)

@@ -32,7 +32,8 @@ class Matrix:
     makes it do. ``col2row``: a row selects by being low and a column that reads pressed is low, else pulled
     up; ``row2col``: both high, else pulled down. Masked cells may be pressed too: the board has to ignore them.
     Likewise a driven column passes its level, the released one, to rows that are let go; else these are pulled to the
-    selecting level. A stuck column cannot be driven. After a discharge of a self-test columns that are let go stay at
+    selecting level. So is a column that nothing drives, by a pressed switch to such a row, as its own pull is weaker
+    than the row's. A stuck column cannot be driven. After a discharge of a self-test columns that are let go stay at
     the selecting level for as long as a slot takes, as their pulls are weak.
 
     Switches and faults are told in the sheet's rows and columns, guard lines last; levels are those of the lines that
@@ -117,6 +118,7 @@ class Matrix:
         if fights := pulled & columns_driven:
             raise Contention(f"columns {fights:#b} are driven against rows {selected:#b}")
         pressed = pulled | self.stuck | columns_held | self._keep(columns_held, lifted)
+        pressed |= self._drained(driven, columns_driven)
         return pressed ^ self._all_columns if self._selects_low else pressed
 
     def _pulled(self, selected: int) -> int:
@@ -125,6 +127,21 @@ class Matrix:
             if selected >> row & 1:
                 pulled |= word
         return pulled
+
+    def _drained(self, rows_driven: int, columns_driven: int) -> int:
+        """Columns that nothing drives and that a row pulls which is let go, and which nothing lifts."""
+        drained, lifted = 0, self._lifted(columns_driven)
+        for row, word in enumerate(self.closed):
+            if not (rows_driven | lifted.rows) >> row & 1:
+                drained |= word
+        return drained & ~(columns_driven | lifted.columns)
+
+    def _lifted(self, columns_driven: int) -> Lines:
+        """What follows the columns that are driven to the released level; with shorts what did in this clock."""
+        if self._shorts is not None:
+            return Lines(self._released.rows, self._released.columns | bits(self._shorts.pulled))
+        feeding = columns_driven & ~self.stuck
+        return Lines(sum(1 << row for row, word in enumerate(self.closed) if word & feeding), feeding)
 
     def _keep(self, held: int, lifted: int) -> int:
         """Columns that are let go and still at the selecting level."""
@@ -150,12 +167,7 @@ class Matrix:
 
     def row_levels(self, rows: int, rows_driven: int, columns_driven: int) -> int:
         """Levels at the row pins: those of ``rows`` where they are driven, else what the columns make of them."""
-        if self._shorts is not None:
-            touched = self._released.rows
-            let_go = touched if self._selects_low else touched ^ self._all_rows
-            return rows & rows_driven | let_go & ~rows_driven
-        feeding = columns_driven & ~self.stuck
-        touched = sum(1 << row for row, word in enumerate(self.closed) if word & feeding)
+        touched = self._lifted(columns_driven).rows
         let_go = touched if self._selects_low else touched ^ self._all_rows
         return rows & rows_driven | let_go & ~rows_driven
 

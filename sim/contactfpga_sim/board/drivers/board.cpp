@@ -28,7 +28,9 @@ enum Boundary { ROW, RECORD, ITEM, BYTE, LINE, CONTACT, ALIVE_PIN, DRIVEN, CHARG
 // The line that each row and each column is soldered to, the guard lines last.
 constexpr uint8_t line_of_row[] = LINE_OF_ROW, line_of_column[] = LINE_OF_COLUMN;
 
-// A pressed switch passes the selecting level of its row to its column, and nothing else: the diode sees to that.
+// A pressed switch passes the selecting level of its row to its column, and nothing else: the diode sees to that. A row
+// that is let go has that level, too, unless a driven column lifts it, and its pull is stronger than that of a column
+// that nothing drives.
 // Switches and faults are told in the sheet's rows and columns, guard lines last; levels are those of lines.
 class Matrix {
 public:
@@ -76,6 +78,7 @@ public:
     // driven lines meet at different levels.
     uint64_t fights = 0;
     Word levels(Word selected, Word rows_released, Word columns_driven, Word columns_held) {
+        [[maybe_unused]] const Word selected_rows = selected;
         Word reads = 0, lifted = columns_driven;
         if (selected)
             selected_ = lowest(selected);
@@ -91,9 +94,23 @@ public:
             fights += (reads & columns_driven) != 0;
         }
         reads |= stuck | columns_held | keep(columns_held, lifted);
+#if REVERSAL
+        reads |= drained(selected_rows | rows_released, columns_driven, lifted);
+#endif
         if (slow)
             reads = settled(reads, columns_driven);
         return (COL2ROW ? ~reads : reads) & mask(COLUMN_LINES);
+    }
+
+    // Columns that nothing drives and that a row pulls which is let go, and which nothing lifts.
+    Word drained(Word rows_driven, Word columns_driven, Word lifted) const {
+        Word reads = 0;
+        for (Word let_go = ~rows_driven & mask(ROW_LINES); let_go; let_go &= let_go - 1) {
+            const unsigned row = lowest(let_go);
+            const bool touched = shorts.any ? lifted_.rows >> row & 1 : (closed_[row] & columns_driven & ~stuck) != 0;
+            reads |= touched ? 0 : closed_[row];
+        }
+        return reads & ~(columns_driven | lifted);
     }
 
     // Of the row pins: a driven column lifts the rows that are let go to its level, which is that of rows at rest.
