@@ -35,22 +35,24 @@ def frame(normal: Vector) -> Floats:
 
 def intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
     """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
-    ``forces``, which lie in them. None: no largest one."""
+    ``forces``, which lie in them, and so in the interval. None: no largest one."""
     basis, firsts = _basis(system.touches, frictionless)
     _, values, turned = np.linalg.svd(system.centered(system.matrix() @ basis))
-    free = turned[int((values > 1e-9 * values[0]).sum()) :].T
+    rank = int((values > 1e-9 * values[0]).sum())
+    fixed, free = turned[:rank], turned[rank:].T
     start = basis.T @ np.ravel(forces)
     size = max(1e-12, float(np.abs(start).max()))
     solver = None
     found: list[Interval] = []
     for first in firsts:
+        push = max(0.0, float(start[first]))
         if float(np.abs(free[first]).max(initial=0.0)) <= DETERMINED:
-            found.append((max(0.0, float(start[first])), max(0.0, float(start[first]))))
+            found.append((push, push))
             continue
-        solver = solver or _Solver(system.touches, frictionless, free, start / size)
-        low, high = solver.least(free[first]), solver.least(-free[first])
-        least = 0.0 if low is None else max(0.0, float(start[first]) + size * low)
-        found.append((least, None if high is None else max(least, float(start[first]) - size * high)))
+        solver = solver or _Solver(system.touches, frictionless, fixed, start / size)
+        low, high = solver.least(first, 1.0), solver.least(first, -1.0)
+        least = 0.0 if low is None else min(push, max(0.0, float(start[first]) + size * low))
+        found.append((least, None if high is None else max(push, float(start[first]) - size * high)))
     return found
 
 
@@ -66,7 +68,7 @@ def nearest(system: System) -> Floats:
     size = max(1e-12, float(np.abs(system.wrench[:3]).max()))
     wanted = matrix.T @ (system.root @ system.wrench) / size
     scale = float(np.abs(square).max())
-    solver = _Solver(system.touches, False, np.eye(len(square)), np.zeros(len(square)))
+    solver = _Solver(system.touches, False, np.zeros((0, len(square))), np.zeros(len(square)))
     return np.asarray(basis @ (size * solver.solve(square / scale, -wanted / scale)))
 
 
@@ -82,9 +84,10 @@ def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[i
 
 
 class _Solver:
-    """start + free y in all cones."""
+    """start + y in all cones, where fixed y = 0. So few of its numbers are not 0 that 64 contacts take no longer each
+    than three do; with the null space of ``fixed`` in place of it they take 50 times as long."""
 
-    def __init__(self, touches: Sequence[Touch], frictionless: bool, free: Floats, start: Floats):
+    def __init__(self, touches: Sequence[Touch], frictionless: bool, fixed: Floats, start: Floats):
         try:
             import clarabel
             from scipy import sparse
@@ -92,17 +95,20 @@ class _Solver:
             raise MissingExtra("The interval of a push among three contacts or more", "haptics") from None
         self._clarabel, self._sparse = clarabel, sparse
         scales: list[float] = []
-        self._cones: list[Any] = []
+        self._cones: list[Any] = [clarabel.ZeroConeT(len(fixed))] if len(fixed) else []
         for touch in touches:
             flat = frictionless or not touch.friction
             scales += [1.0] if flat else [touch.friction, 1.0, 1.0]
             self._cones.append(clarabel.NonnegativeConeT(1) if flat else clarabel.SecondOrderConeT(3))
-        self._sides = -np.array(scales)[:, None] * free
-        self._start = np.array(scales) * start
+        self._sides = sparse.vstack([sparse.csc_matrix(fixed), -sparse.diags(scales)], format="csc")
+        self._start = np.concatenate([np.zeros(len(fixed)), np.array(scales) * start])
 
-    def least(self, slope: Floats) -> float | None:
-        """The least of ``slope`` times y; None where there is none."""
-        solution = self._run(np.zeros((len(slope), len(slope))), slope)
+    def least(self, at: int, factor: float) -> float | None:
+        """The least of ``factor`` times this one of y; None where there is none."""
+        count = self._sides.shape[1]
+        slope = np.zeros(count)
+        slope[at] = factor
+        solution = self._run(self._sparse.csc_matrix((count, count)), slope)
         status = str(solution.status)
         if "DualInfeasible" in status:
             return None
@@ -112,21 +118,13 @@ class _Solver:
 
     def solve(self, square: Floats, slope: Floats) -> Floats:
         """The y with the least of y square y / 2 + slope y."""
-        solution = self._run(square, slope)
+        solution = self._run(self._sparse.csc_matrix(np.triu(square)), slope)
         if "Solved" not in str(solution.status):
             raise HapticsError(f"no forces within friction's cones were found ({solution.status})")
         return np.array(solution.x)
 
-    def _run(self, square: Floats, slope: Floats) -> Any:
+    def _run(self, square: Any, slope: Floats) -> Any:
         settings = self._clarabel.DefaultSettings()
         settings.verbose = False
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-        sparse = self._sparse
-        return self._clarabel.DefaultSolver(
-            sparse.csc_matrix(np.triu(square)),
-            slope,
-            sparse.csc_matrix(self._sides),
-            self._start,
-            self._cones,
-            settings,
-        ).solve()
+        return self._clarabel.DefaultSolver(square, slope, self._sides, self._start, self._cones, settings).solve()
