@@ -1,5 +1,6 @@
 """What a file from a stranger may cost: memory and processor time are bounded, and a limit is told in one line."""
 
+import contextlib
 import io
 import time
 import tomllib
@@ -11,12 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga import Skin, SkinError
+from contactfpga import ContactFPGAError, Skin, SkinError, cli
 from contactfpga.body import Body, BodyError, packed, urdf
 from contactfpga.body.kinematics import Kinematics
+from contactfpga.cover.task import Task
+from contactfpga.haptics import LoadCells
 from contactfpga.inputs import tomlfile, xmlfile
+from contactfpga.skin.several import Several
 from contactfpga.surfaces import SurfaceError, mesh_file
 from contactfpga.surfaces.laying import Triangles
+from contactfpga_sim.scenes.file import SceneFile
+from contactfpga_sim.studies.arm.case import Case
 
 DOTTED = f"a{'.a' * 300_000} = 1\n"
 """The standard library's parser takes the square of this."""
@@ -103,6 +109,63 @@ def test_the_longest_key_is_read():
     assert deep == 1
     with pytest.raises(SkinError, match=LONG_KEY):
         tomlfile.parse(f"a{'.a' * 16} = 1".encode(), "x", SkinError)
+
+
+LONG = "q" * 900_000
+
+
+@pytest.mark.parametrize(
+    ("read", "text"),
+    [
+        (Skin.load, f'name = "{LONG}"'),
+        (Skin.load, f"{LONG} = 1"),
+        (Several.load, f"{LONG} = 1"),
+        (Several.load, f"sheets = [{'1, ' * 300_000}]"),
+        (Several.load, "sheets = [" + '"a", ' * 100_000 + "]"),
+        (Body.load, f'[[links]]\nname = "{LONG}"'),
+        (Body.load, "links = [" + "{}, " * 100_000 + "]"),
+        (SceneFile.load, f'contact = "{LONG}"'),
+        (SceneFile.load, f"[[contact]]\n{LONG} = 1"),
+        (SceneFile.load, f'[[contact]]\nshape = "{LONG}"'),
+        (SceneFile.load, f'[[contact]]\nshape = "disc"\nradius_mm = ["{LONG}"]'),
+        (Case.load, f"{LONG} = 1"),
+        (Case.load, f"[link]\n{LONG} = 1"),
+        (Task.load, f"{LONG} = 1"),
+        (LoadCells.load, f"{LONG} = 1"),
+        (LoadCells.load, "[surface]\nkind = []"),
+    ],
+)
+def test_messages_are_short(tmp_path, read, text):
+    path = tmp_path / "x.toml"
+    path.write_text(text)
+    with pytest.raises(ContactFPGAError if read not in (SceneFile.load, Case.load) else ValueError) as refused:
+        read(path)
+    assert len(str(refused.value).replace(str(path), "")) < 700
+
+
+def test_no_error_fills_the_screen(tmp_path, capsys):
+    """What the system says of a name is as long as that."""
+    path = tmp_path / "x.toml"
+    path.write_text(f'[[links]]\nname = "a"\nskin = "{LONG}"')
+    assert cli.main(["body", "show", str(path)]) == 1
+    assert len(capsys.readouterr().err) < 5000
+
+
+@pytest.mark.parametrize(
+    "arguments", [["replay", "x.npy", "--skin", "esc\x1b[2J"], ["zones", "\x1b[2J", "\u202eab"], ["\x1b]0;a\x07"]]
+)
+def test_what_the_parser_of_options_quotes_is_shown_as_escapes(capsys, arguments):
+    with contextlib.suppress(SystemExit):
+        cli.main([*arguments, "--no-such\x1b[2J"])
+    said = capsys.readouterr()
+    assert "\\x1b" in said.err
+    assert not any(one in said.out + said.err for one in "\x1b\x07\u202e")
+
+
+def test_a_very_long_argument_is_not_printed_whole(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["zones", f"--no-such-{LONG}"])
+    assert len(capsys.readouterr().err) < 10_000
 
 
 # ---- XML

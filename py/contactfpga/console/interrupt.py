@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import told
-from contactfpga.inputs.values import visible_lines
+from contactfpga.inputs.values import shortened, visible_lines
 
 STATUS = 130
 """Of a command that Ctrl-C cut short: 128 and the number of the signal."""
@@ -72,7 +72,7 @@ def failed(reason: object) -> int:
     """Say why a command failed; its status."""
     silence_amaranth()
     # Names from files and devices are part of it.
-    terminal.say(f"contactfpga: {visible_lines(str(reason))}", sys.stderr, hang=2)
+    terminal.say(f"contactfpga: {visible_lines(shortened(str(reason)))}", sys.stderr, hang=2)
     return 1
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import Any, NoReturn
+
+from contactfpga.inputs.values import shortened, visible_lines
 
 
 class Parser(argparse.ArgumentParser):
@@ -11,6 +13,10 @@ class Parser(argparse.ArgumentParser):
     the port in `contactfpga record FILE --seconds 2 PORT`."""
 
     _within = False
+
+    def error(self, message: str) -> NoReturn:
+        """As argparse does; what it quotes of the arguments, a terminal does not obey."""
+        super().error(visible_lines(shortened(message)))
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does, but with options anywhere."""

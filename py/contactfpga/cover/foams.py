@@ -103,4 +103,4 @@ def find(name: str, foams: tuple[Foam, ...] = FOAMS) -> Foam:
     for foam in foams:
         if foam.name == name:
             return foam
-    raise CoverError(f"foam is {name!r}; known are {', '.join(repr(foam.name) for foam in foams)}")
+    raise CoverError(f"foam is {shown(name)}; known are {', '.join(repr(foam.name) for foam in foams)}")

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contactfpga.cover.answer import CoverError
+from contactfpga.inputs.values import shown
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def transfer(name: str, t: Floats) -> Floats:
     if name == "frictionless":
         moving = t > 0
         return np.where(moving, sech * (tanh + t) / np.where(moving, tanh + t * sech**2, 1.0), 1.0)
-    raise CoverError(f"medium is {name!r}; it must be one of {', '.join(MEDIA)}")
+    raise CoverError(f"medium is {shown(name)}; it must be one of {', '.join(MEDIA)}")
 
 
 def spread(name: str, s: Floats | float) -> Floats:

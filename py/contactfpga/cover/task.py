@@ -173,7 +173,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     known = [*_KEYS, "foam"]
     for name in given:
         if name not in _KEYS:
-            raise CoverError(f"{path}: unknown part {name!r}; known are {', '.join(known)}")
+            raise CoverError(f"{path}: unknown part {shown(name)}; known are {', '.join(known)}")
     part = {}
     for name, keys in _KEYS.items():
         values = given.get(name, {})
@@ -181,7 +181,7 @@ def _read(path: str | Path, given: dict[str, Any]) -> dict[str, dict[str, Any]]:
             raise CoverError(f"{path}: {name} is {shown(values)}; it must be a part, [{name}]")
         for key in values:
             if key not in keys:
-                raise CoverError(f"{path}: unknown key {key!r} in [{name}]; known are {', '.join(keys)}")
+                raise CoverError(f"{path}: unknown key {shown(key)} in [{name}]; known are {', '.join(keys)}")
         part[name] = {key: values.get(key, default) for key, default in keys.items()}
         for key, value in part[name].items():
             if value is _NEEDED:
@@ -221,7 +221,7 @@ def _foam(path: str | Path, values: dict[str, Any]) -> Foam:
     known = [field.name for field in dataclasses.fields(Foam)]
     for key in values:
         if key not in known:
-            raise CoverError(f"{path}: unknown key {key!r} in [[foam]]; known are {', '.join(known)}")
+            raise CoverError(f"{path}: unknown key {shown(key)} in [[foam]]; known are {', '.join(known)}")
     for key in ("name", "modulus_pa", "source"):
         if key not in values:
             raise CoverError(f"{path}: {key} is missing in [[foam]]")

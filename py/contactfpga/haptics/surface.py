@@ -133,7 +133,7 @@ KINDS: dict[str, tuple[type[Plane] | type[Cylinder], str]] = {
 
 def read(values: Any, name: str = "surface") -> Surface:
     """The surface that a table describes; raises :class:`HapticsError`."""
-    if not isinstance(values, dict) or values.get("kind") not in KINDS:
+    if not isinstance(values, dict) or values.get("kind") not in list(KINDS):
         kind = values.get("kind") if isinstance(values, dict) else values
         raise HapticsError(
             f"{name} is {shown(kind)}; its kind must be 'plane', with height_m, or 'cylinder', with radius_m"

@@ -9,6 +9,8 @@ from typing import Any
 
 MAX_SHOWN = 80
 """Characters of a value in a message."""
+MAX_MESSAGE = 4000
+"""Of a message: paths have 4,096 at most."""
 
 
 def is_finite(value: object) -> bool:
@@ -46,6 +48,14 @@ def shown(value: Any) -> str:
     except (ValueError, RecursionError):  # a number of more digits than Python writes, or lists in lists in lists
         return f"one {type(value).__name__} too long to show"
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 20]}... ({len(text)} characters)"
+
+
+def shortened(text: str) -> str:
+    """A message, without its middle where that is longer than anybody reads: it begins with what failed and ends with
+    the next step."""
+    if len(text) <= MAX_MESSAGE:
+        return text
+    return f"{text[: MAX_MESSAGE // 2]}... ({len(text):,} characters) ...{text[-MAX_MESSAGE // 2 :]}"
 
 
 def visible(text: str) -> str:

@@ -94,12 +94,12 @@ def _finite(name: str, value: Any) -> float:
 
 def _check_name(name: object) -> None:
     if not isinstance(name, str):
-        raise SkinError(f"name is {name!r}; it must be a string")
+        raise SkinError(f"name is {shown(name)}; it must be a string")
     if not name.isprintable() or name != name.strip():
-        raise SkinError(f"name is {name!r}; it must be printable, with no spaces around it")
+        raise SkinError(f"name is {shown(name)}; it must be printable, with no spaces around it")
     if len(name.encode()) > limits.MAX_NAME_BYTES:
         raise SkinError(
-            f"name is {name!r}, {len(name.encode())} bytes of UTF-8; at most {limits.MAX_NAME_BYTES} are possible"
+            f"name is {shown(name)}, {len(name.encode())} bytes of UTF-8; at most {limits.MAX_NAME_BYTES} are possible"
         )
 
 

@@ -41,11 +41,13 @@ class Several:
         values = tomlfile.load(path, SkinError)
         if set(values) != {"sheets"}:
             unknown = sorted(set(values) - {"sheets"})
-            what = f"unknown key {unknown[0]!r}" if unknown else "no key 'sheets'"
+            what = f"unknown key {shown(unknown[0])}" if unknown else "no key 'sheets'"
             raise SkinError(f'{path}: {what}; the file of several sheets holds sheets = ["SKIN.toml", ...] alone')
         files = values["sheets"]
         if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
             raise SkinError(f"{path}: sheets is {shown(files)}; it must be a list of Skin files")
+        if len(files) > MOST_SHEETS:
+            raise SkinError(f"{path}: sheets names {len(files):,} files; a board has at most {MOST_SHEETS} sheets")
         skins = [Skin.load(Path(path).parent / file, trust) for file in files]
         try:
             return cls(tuple(skins))

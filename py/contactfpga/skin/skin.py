@@ -17,6 +17,7 @@ from contactfpga.choices.reports import REPORTS, ReportName
 from contactfpga.choices.scans import Scan, ScanName
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
+from contactfpga.inputs.values import shown
 from contactfpga.skin import checks, limits
 from contactfpga.skin.sheet import Sheet, max_zones
 
@@ -167,7 +168,7 @@ class Skin:
                 steps = f"name one of them, or give all as --sheets {path} or sim://?sheets={path}"
                 raise SkinError(f"{path} names the Skins of several sheets; {steps}")
             tables = "and the tables [cover] and [circuit]"
-            raise SkinError(f"{path}: unknown key {unknown[0]!r}; known are {', '.join(known)}, {tables}")
+            raise SkinError(f"{path}: unknown key {shown(unknown[0])}; known are {', '.join(known)}, {tables}")
         try:
             return cls(**values)
         except SkinError as error:

@@ -106,7 +106,7 @@ def _scene_file(values: dict[str, Any]) -> SceneFile:
     _keys("a scene file", values, known)
     kinds = values.pop("contact", None)
     if not isinstance(kinds, list) or not kinds:
-        raise SceneFileError(f"contact is {kinds!r}; a scene file has one part [[contact]] at least")
+        raise SceneFileError(f"contact is {shown(kinds)}; a scene file has one part [[contact]] at least")
     for name in ("width_mm", "height_mm"):
         if name in values:
             values[name] = _number(name, values[name], 0.1, MAX_MM)
@@ -121,11 +121,11 @@ def _scene_file(values: dict[str, Any]) -> SceneFile:
 
 def _kind(where: str, given: Any) -> Kind:
     if not isinstance(given, dict):
-        raise SceneFileError(f"{where} is {given!r}; it must be a part, [[contact]]")
+        raise SceneFileError(f"{where} is {shown(given)}; it must be a part, [[contact]]")
     values = dict(given)
     shape = values.pop("shape", None)
     if not isinstance(shape, str) or shape not in SHAPES:
-        raise SceneFileError(f"{where}: shape is {shape!r}; it must be one of {', '.join(SHAPES)}")
+        raise SceneFileError(f"{where}: shape is {shown(shape)}; it must be one of {', '.join(SHAPES)}")
     usual = SHAPES[shape][1]
     common = [field.name for field in dataclasses.fields(Kind) if field.name != "sizes"]
     _keys(f"{where}, a {shape},", values, (*usual, *common))
@@ -153,7 +153,7 @@ def _kind(where: str, given: Any) -> Kind:
 def _keys(what: str, values: dict[str, Any], known: Any) -> None:
     for key in values:
         if key not in known:
-            raise SceneFileError(f"{what} has the key {key!r}; known are {', '.join(known)}")
+            raise SceneFileError(f"{what} has the key {shown(key)}; known are {', '.join(known)}")
 
 
 def _size(where: str, name: str, value: Any) -> Range:
@@ -177,7 +177,7 @@ def _value(name: str, value: Any, low: float, high: float) -> Range | Track:
     _keys(name, value, ("seconds", "values"))
     seconds, values = value.get("seconds"), value.get("values")
     if not isinstance(seconds, list) or not isinstance(values, list):
-        raise SceneFileError(f"{name} is {value}; it must be {{seconds = [...], values = [...]}}")
+        raise SceneFileError(f"{name} is {shown(value)}; it must be {{seconds = [...], values = [...]}}")
     times = tuple(_number(f"{name}: seconds", one, 0.0, 3600.0) for one in seconds)
     try:
         return Track(times, tuple(_number(f"{name}: values", one, low, high) for one in values))
@@ -190,7 +190,7 @@ def _value(name: str, value: Any, low: float, high: float) -> Range | Track:
 def _range(name: str, value: Any, low: float, high: float) -> Range:
     pair = value if isinstance(value, list) else [value, value]
     if len(pair) != 2:
-        raise SceneFileError(f"{name} is {value}; it must be a number or [least, most]")
+        raise SceneFileError(f"{name} is {shown(value)}; it must be a number or [least, most]")
     first, last = (_number(name, one, low, high) for one in pair)
     if first > last:
         raise SceneFileError(f"{name} is {value}; the least comes first")

@@ -103,7 +103,7 @@ def names() -> list[str]:
 def _values(name: str, before: tuple[str, ...] = ()) -> dict[str, Any]:
     path = Path(name) if name.endswith(".toml") else _CASES / f"{name}.toml"
     if not path.exists():
-        raise CaseError(f"case {name!r} is not known; take a .toml file or one of {', '.join(names())}")
+        raise CaseError(f"case {shown(name)} is not known; take a .toml file or one of {', '.join(names())}")
     values = tomlfile.load(path, CaseError)
     if (like := values.pop("like", None)) is None:
         return values
@@ -120,7 +120,7 @@ def _values(name: str, before: tuple[str, ...] = ()) -> dict[str, Any]:
 def _case(name: str, values: dict[str, Any]) -> Case:
     unknown = sorted(set(values) - {*_PARTS, "touch", "model"})
     if unknown:
-        raise CaseError(f"{name}: unknown part {unknown[0]!r}; known are {', '.join([*_PARTS, 'touch', 'model'])}")
+        raise CaseError(f"{name}: unknown part {shown(unknown[0])}; known are {', '.join([*_PARTS, 'touch', 'model'])}")
     parts: dict[str, Any] = {
         part: _part(name, part, kind, values[part]) for part, kind in _PARTS.items() if part in values
     }
@@ -142,7 +142,7 @@ def _part(name: str, part: str, kind: type, values: Any) -> Any:
     known = [field.name for field in dataclasses.fields(kind)]
     for key in values:
         if key not in known:
-            raise CaseError(f"{name}: unknown key {key!r} in [{part}]; known are {', '.join(known)}")
+            raise CaseError(f"{name}: unknown key {shown(key)} in [{part}]; known are {', '.join(known)}")
     try:
         return kind(**values)
     except TypeError as error:
