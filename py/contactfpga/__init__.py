@@ -1,40 +1,48 @@
-"""Contact zones of a switch-matrix skin, from an FPGA to Python."""
+"""Contact zones of a switch-matrix skin, from an FPGA to Python.
 
-from contactfpga.driver.board import Board
-from contactfpga.driver.driver import open, read_zones
-from contactfpga.driver.silence import Silence
-from contactfpga.driver.stats import Stats
-from contactfpga.driver.subscription import Events, Subscription
-from contactfpga.errors import (
-    BoardClosed,
-    BoardSilent,
-    ContactFPGAError,
-    MissingExtra,
-    MissingTool,
-    NoData,
-    NoSuchCommand,
-    OnlyNoise,
-    PortBusy,
-    PortLost,
-    PortNotFound,
-    ReadTimeout,
-    ReplayEnded,
-    SkinMismatch,
-    VersionMismatch,
-)
-from contactfpga.shipped import examples
-from contactfpga.skin import Skin, SkinError
-from contactfpga.skin.sheet import Sheet
-from contactfpga.tracking.tracker import Tracker
-from contactfpga.tracking.tracks import Event, Track, Tracks
-from contactfpga.wire.faults import Faults, SelfTestSlot
-from contactfpga.wire.hello import Hello
-from contactfpga.zones.batch import Batch
-from contactfpga.zones.self_test import SelfTest
-from contactfpga.zones.suspicion import Suspicion
-from contactfpga.zones.units import UnitHistory, UnitSamples
-from contactfpga.zones.watch import Watch
-from contactfpga.zones.zone import Zone, Zones
+What it offers is imported when it is used first: so the command `contactfpga` takes Ctrl-C before numpy is loaded.
+"""
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contactfpga.driver.board import Board
+    from contactfpga.driver.driver import open, read_zones
+    from contactfpga.driver.silence import Silence
+    from contactfpga.driver.stats import Stats
+    from contactfpga.driver.subscription import Events, Subscription
+    from contactfpga.errors import (
+        BoardClosed,
+        BoardSilent,
+        ContactFPGAError,
+        MissingExtra,
+        MissingTool,
+        NoData,
+        NoSuchCommand,
+        OnlyNoise,
+        PortBusy,
+        PortLost,
+        PortNotFound,
+        ReadTimeout,
+        ReplayEnded,
+        SkinMismatch,
+        VersionMismatch,
+    )
+    from contactfpga.shipped import examples
+    from contactfpga.skin import Skin, SkinError
+    from contactfpga.skin.sheet import Sheet
+    from contactfpga.tracking.tracker import Tracker
+    from contactfpga.tracking.tracks import Event, Track, Tracks
+    from contactfpga.wire.faults import Faults, SelfTestSlot
+    from contactfpga.wire.hello import Hello
+    from contactfpga.zones.batch import Batch
+    from contactfpga.zones.self_test import SelfTest
+    from contactfpga.zones.suspicion import Suspicion
+    from contactfpga.zones.units import UnitHistory, UnitSamples
+    from contactfpga.zones.watch import Watch
+    from contactfpga.zones.zone import Zone, Zones
 
 # The one place of the version; the build reads it from here. Metadata of an installed package would be absent in a
 # source tree that was never installed, and out of date in an editable install made before the last release.
@@ -84,3 +92,45 @@ __all__ = [
     "open",
     "read_zones",
 ]
+
+_NAMES = {
+    "driver.board": "Board",
+    "driver.driver": "open read_zones",
+    "driver.silence": "Silence",
+    "driver.stats": "Stats",
+    "driver.subscription": "Events Subscription",
+    "errors": (
+        "BoardClosed BoardSilent ContactFPGAError MissingExtra MissingTool NoData NoSuchCommand OnlyNoise PortBusy "
+        "PortLost PortNotFound ReadTimeout ReplayEnded SkinMismatch VersionMismatch"
+    ),
+    "shipped": "examples",
+    "skin": "Skin SkinError",
+    "skin.sheet": "Sheet",
+    "tracking.tracker": "Tracker",
+    "tracking.tracks": "Event Track Tracks",
+    "wire.faults": "Faults SelfTestSlot",
+    "wire.hello": "Hello",
+    "zones.batch": "Batch",
+    "zones.self_test": "SelfTest",
+    "zones.suspicion": "Suspicion",
+    "zones.units": "UnitHistory UnitSamples",
+    "zones.watch": "Watch",
+    "zones.zone": "Zone Zones",
+}
+"""Where each of these is: by module."""
+_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PLACES:
+        found = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
+    elif not name.startswith("_") and find_spec(f"{__name__}.{name}") is not None:
+        found = import_module(f"{__name__}.{name}")
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,8 +1,17 @@
-"""``python -m contactfpga``: the command `contactfpga`, also where its folder is not on the PATH."""
+"""Where the command `contactfpga` begins, also as ``python -m contactfpga``, where its folder is not on the PATH."""
 
 import sys
 
-from contactfpga.cli import main
+from contactfpga.console import signals
+
+
+def main() -> int:
+    """Run the command; a signal ends it quietly also while it is still being loaded."""
+    signals.end_all_at_once()
+    from contactfpga import cli  # and numpy with it, half a second
+
+    return cli.main()
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import contactfpga
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("py", "hdl", "sim")
 
@@ -41,9 +43,22 @@ def loaded_by(module: str) -> set[str]:
     return set(run.stdout.split()) - sys.stdlib_module_names
 
 
-@pytest.mark.parametrize(
-    "module", ["contactfpga", "contactfpga.haptics", project()["scripts"]["contactfpga"].partition(":")[0]]
-)
+def test_all_names_of_the_package_are_there():
+    """They are imported when they are used first."""
+    for name in contactfpga.__all__:
+        assert getattr(contactfpga, name).__class__
+        assert name in dir(contactfpga)
+    assert set(contactfpga._PLACES) == set(contactfpga.__all__) - {"__version__"}
+    assert contactfpga.skin.limits.__name__ == "contactfpga.skin.limits"
+    with pytest.raises(AttributeError, match="module 'contactfpga' has no attribute 'zonse'"):
+        contactfpga.zonse  # noqa: B018
+
+
+def test_the_command_begins_without_anything_to_load():
+    assert loaded_by(project()["scripts"]["contactfpga"].partition(":")[0]) == {"contactfpga"}
+
+
+@pytest.mark.parametrize("module", ["contactfpga.driver.driver", "contactfpga.haptics", "contactfpga.cli"])
 def test_host_loads_only_its_dependencies(module):
     direct = {normal(requirement) for requirement in project()["dependencies"]}
     provided = importlib.metadata.packages_distributions()

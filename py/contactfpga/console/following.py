@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from contactfpga.console import terminal
+from contactfpga.console import interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
@@ -30,7 +30,7 @@ def follow(
     first_us: int | None = None
     time_us = 0
     findings: list[Finding] = []
-    with shown(render) as show, contextlib.suppress(KeyboardInterrupt, ReplayEnded):
+    with shown(render) as show, interrupt.usual_end(), contextlib.suppress(ReplayEnded):
         try:
             while args.seconds is None or first_us is None or time_us - first_us < args.seconds * 1e6:
                 zones = board.next(args.timeout)

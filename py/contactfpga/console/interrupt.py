@@ -1,10 +1,11 @@
 """How a command ends that fails or is interrupted: at once, with its status, and without a word that is no use.
 
-The signal TERM, which stops services, does what Ctrl-C does.
+The signal TERM, which stops services, does what Ctrl-C does, with a status of its own.
 """
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import errno
 import signal
@@ -13,16 +14,17 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 
-from contactfpga.console import terminal
+from contactfpga.console import signals, terminal
+from contactfpga.console.signals import SIGNALS
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import told
 from contactfpga.inputs.values import shortened, visible_lines
 
-STATUS = 130
-"""Of a command that Ctrl-C cut short: 128 and the number of the signal."""
+AGAIN_S = 0.01
+"""After which a signal comes again that Python dropped where nothing can be raised, as in the end of an object."""
 
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_came: int | None = None
+"""The signal that came since the command began, unless it was the usual end of what ran."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -35,6 +37,8 @@ def guarded(body: Callable[[], int | None]) -> int:
     A shell starts what runs in its background with Ctrl-C ignored, and so does everything below it. A command is
     ended by the same signal, so it listens all the same.
     """
+    global _came
+    _came = None
     terminal.prepare()
     with _listening():
         try:
@@ -42,9 +46,7 @@ def guarded(body: Callable[[], int | None]) -> int:
             sys.stdout.flush()
             return status
         except KeyboardInterrupt as interrupt:
-            if str(interrupt):
-                terminal.say(f"contactfpga: {interrupt}", sys.stderr, hang=2)
-            return STATUS
+            return _cut_short(str(interrupt))
         except ContactFPGAError as error:
             return failed(error)
         except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
@@ -53,13 +55,29 @@ def guarded(body: Callable[[], int | None]) -> int:
         except OSError as error:
             terminal.drop_unwritable()
             return failed(_told(error))
+        except Exception:
+            if _came is None:
+                raise
+            return _cut_short()  # whatever was made of it, as by a module that it kept from being imported
+
+
+def _cut_short(said: str = "") -> int:
+    number = signal.SIGINT if _came is None else _came
+    if threading.current_thread() is threading.main_thread():
+        signals.end_all_at_once()  # should it be told twice
+    if said:
+        terminal.say(f"contactfpga: {said}", sys.stderr, hang=2)
+    return signals.status(number)
 
 
 @contextlib.contextmanager
 def usual_end() -> Iterator[None]:
     """Around what runs until Ctrl-C: that is no failure."""
-    with contextlib.suppress(KeyboardInterrupt):
+    global _came
+    try:
         yield
+    except KeyboardInterrupt:
+        _came = None
 
 
 def _told(error: OSError) -> str:
@@ -69,7 +87,9 @@ def _told(error: OSError) -> str:
 
 
 def failed(reason: object) -> int:
-    """Say why a command failed; its status."""
+    """Say why a command failed; its status. What fails because a signal came is no failure."""
+    if _came is not None:
+        return _cut_short()
     silence_amaranth()
     # Names from files and devices are part of it.
     terminal.say(f"contactfpga: {visible_lines(shortened(str(reason)))}", sys.stderr, hang=2)
@@ -82,16 +102,30 @@ def _listening() -> Iterator[None]:
         yield  # signals are the main thread's
         return
     before = {number: signal.signal(number, _interrupt) for number in SIGNALS}
+    hook, sys.unraisablehook = sys.unraisablehook, _again
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
-def _interrupt(*_: object) -> None:
+def _interrupt(number: int, _: object) -> None:
+    global _came
+    _came = number
     silence_amaranth()  # before anything is left half made
     raise KeyboardInterrupt
+
+
+def _again(what: sys.UnraisableHookArgs) -> None:
+    """In place of Python's words about what could not be raised: where it was a signal, it comes again."""
+    if _came is None or not issubclass(what.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(what)
+        return
+    timer = threading.Timer(AGAIN_S, _thread.interrupt_main, (_came,))
+    timer.daemon = True
+    timer.start()
 
 
 def silence_amaranth() -> None:

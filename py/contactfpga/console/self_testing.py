@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 from collections.abc import Iterator
 
-from contactfpga.console import flags, terminal
+from contactfpga.console import flags, interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.zones.self_test import LineFinding, SelfTest, untried
@@ -43,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tests(board: Board, args: argparse.Namespace) -> Iterator[SelfTest]:
     until = None if args.seconds is None else board.clock() + args.seconds
-    with contextlib.suppress(KeyboardInterrupt):
+    with interrupt.usual_end():
         while True:
             yield board.self_test(max(2.0, args.timeout))
             if until is not None and board.clock() >= until:

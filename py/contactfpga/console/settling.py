@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 from typing import Any
 
 import numpy as np
 
 from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import drawn_settling, terminal
+from contactfpga.console import drawn_settling, interrupt, terminal
 from contactfpga.console.bouncing import NAMED, bare_skin
 from contactfpga.console.following import shown
 from contactfpga.driver.board import Board
@@ -64,7 +63,7 @@ def _follow(board: Board, args: argparse.Namespace, found: Settling, render: Any
     found.start(_cells(zones))
     with shown(render) as show:
         try:
-            with contextlib.suppress(KeyboardInterrupt):
+            with interrupt.usual_end():
                 while args.seconds is None or past_us < args.seconds * 1e6:
                     clocks, before = found.next_clocks(), zones
                     if clocks is None:

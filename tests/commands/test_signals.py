@@ -1,0 +1,164 @@
+"""Ctrl-C and TERM while a command starts: no traceback, no false reason, statuses 130 and 143."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from sample import sample
+from terminals import environment, listening
+
+from contactfpga.console import interrupt
+from contactfpga.console.signals import SIGNALS
+
+STATUSES = {signal.SIGINT: 130, signal.SIGTERM: 143}
+CUT_SHORT = {
+    "settle": ["settle"],
+    "cover": ["cover", "design", "--help"],
+    "latency": ["latency", "--touches", "40"],
+    "chart": ["chart", "--placements", "200", "--no-size", "--output", "OUT"],
+    "plot": ["plot", "nothing.mcap"],
+    "doctor": ["doctor", "--list"],
+}
+"""Commands that a signal cuts short, or that end by themselves, also with an error, before one comes."""
+RUNNING = {"zones": ["zones", "sim://", "--json"], "zones as a table": ["zones", "sim://"]}
+"""Those whose usual end it is, once they run."""
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="this system has no /proc")
+
+
+def start(arguments, folder):
+    words = [str(folder / "out") if one == "OUT" else one for one in arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    command = [sys.executable, "-m", "contactfpga", *words]
+    return subprocess.Popen(command, **pipes, text=True, preexec_fn=listening, env=environment(), cwd=folder)
+
+
+def caught(process):
+    """The numbers of the signals that a process handles."""
+    with open(f"/proc/{process.pid}/status") as file:
+        mask = next(int(line.split()[1], 16) for line in file if line.startswith("SigCgt"))
+    return {number for number in range(1, 32) if mask >> number - 1 & 1}
+
+
+def wait_until_it_listens(process):
+    until = time.monotonic() + 60
+    while process.poll() is None and signal.SIGTERM not in caught(process):
+        assert time.monotonic() < until
+        time.sleep(0.0005)
+
+
+def assert_quiet(said):
+    for word in ("Traceback", "KeyboardInterrupt", "Exception ignored", "Warning", "Error", "numpy", "failed"):
+        assert word not in said, said
+
+
+@linux
+def test_a_command_listens_before_it_loads_numpy(tmp_path):
+    with start(["zones", "sim://"], tmp_path) as process:
+        wait_until_it_listens(process)
+        with open(f"/proc/{process.pid}/maps") as file:
+            assert "numpy" not in file.read(), "half a second in which Ctrl-C ends with a traceback of numpy's"
+        process.kill()
+
+
+@linux
+@pytest.mark.parametrize("name", [*CUT_SHORT, *RUNNING])
+@pytest.mark.parametrize("seed", sample(range(60), quick=range(2), slow=range(2, 8)))
+def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
+    rng = random.Random(f"{name} {seed}")
+    number = rng.choice(SIGNALS)
+    with start((CUT_SHORT | RUNNING)[name], tmp_path) as process:
+        wait_until_it_listens(process)
+        time.sleep(rng.choice([0.0, 0.1, 0.5, 1.5]) * rng.random())
+        ended = process.poll() is not None
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+    if ended:
+        return
+    assert_quiet(errors)
+    at_their_end = {0, 1, 2} if name in ("doctor", "plot", "cover") else {0} if name in RUNNING else set()
+    assert process.returncode in {STATUSES[number]} | at_their_end, errors
+
+
+STARTS = """
+import sys
+from contactfpga.console import interrupt, signals
+WORK
+signals.end_all_at_once()
+sys.exit(interrupt.guarded(body))
+"""
+BROKEN = {
+    "dropped": """
+import os, signal, time
+class Dropped:
+    def __del__(self):
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+def body():
+    Dropped()
+    time.sleep(30)
+""",
+    "made something else": """
+import os
+def body():
+    try:
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+    except BaseException:
+        raise ImportError("numpy is badly installed") from None
+""",
+    "made an error of ours": """
+import os
+from contactfpga.errors import PortNotFound
+def body():
+    try:
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+    except BaseException:
+        raise PortNotFound("no such port") from None
+""",
+    "twice": """
+import os
+def body():
+    try:
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+    finally:
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+""",
+}
+"""What becomes of a signal in other people's code."""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("how", BROKEN)
+def test_a_signal_that_others_make_something_of(how, number):
+    program = STARTS.replace("WORK", BROKEN[how]).replace("NUMBER", str(int(number)))
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment()
+    )
+    assert (done.returncode, done.stderr) == (STATUSES[number], "")
+
+
+def test_what_fails_after_the_usual_end_is_told(capsys):
+    def body():
+        with interrupt.usual_end():
+            os.kill(os.getpid(), signal.SIGINT)
+            pytest.fail("it did not end")
+        raise OSError(28, "No space left on device", "x.mcap")
+
+    assert interrupt.guarded(body) == 1
+    assert capsys.readouterr().err == "contactfpga: x.mcap: No space left on device\n"
+
+
+def test_other_errors_are_raised():
+    def body():
+        raise RuntimeError("a mistake of ours")
+
+    with pytest.raises(RuntimeError, match="a mistake of ours"):
+        interrupt.guarded(body)
