@@ -32,6 +32,8 @@ SKINS = {
     "registers": Skin(row_drive="74hc595", column_read="74hc165"),
     "without diodes": Skin(diodes="none", connectivity=4),
     "reversal, guard": Skin(**FAST, guard=True, fail_safe=True),
+    "reversal, self-test": Skin(**FAST, self_test=True),
+    "reversal, guard, self-test": Skin(**FAST, guard=True, self_test=True, diodes="row2col", alive=True),
     "dual": Skin(dual=True),
     "dual, fail_safe": Skin(dual=True, fail_safe=True, alive=True),
 }

@@ -31,6 +31,7 @@ class Precharge(wiring.Component):
     turn (in): bit ``RETRY_BIT`` of a clock in us.
     guard_pressed (in): of a scan that reads the rows: high for a clock in which the guard column is stuck; it is until
     ``turn`` turns. The other scans take it for a column like all others.
+    others (in): with a self-test, columns that are driven in the next clock whatever they read.
     held (out): columns that are stuck, from the clock after a window on.
     pins (out): columns that are driven, from registers.
     """
@@ -48,6 +49,7 @@ class Precharge(wiring.Component):
                 "looks": In(1),
                 "turn": In(1),
                 **({"guard_pressed": In(1)} if self.alone else {}),
+                **({"others": In(skin.column_lines)} if skin.self_test else {}),
                 "held": Out(skin.column_lines),
                 "pins": Out(skin.column_lines),
             }
@@ -73,7 +75,7 @@ class Precharge(wiring.Component):
         ]
         m.d.sync += [
             before.eq(self.turn),
-            self.pins.eq(Mux(self.drive, free, 0)),
+            self.pins.eq(Mux(self.drive, free, 0) | (self.others if self.skin.self_test else 0)),
             asked.eq(turns | asked & ~ends),
             count.eq(count + (self.looks | ~count[: self.apart_bits].all())),
         ]

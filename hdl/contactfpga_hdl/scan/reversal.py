@@ -1,6 +1,6 @@
 """Drives all columns and reads the rows; then drives only the rows that are touched, one by one."""
 
-from amaranth.hdl import Cat, Const, Module, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -111,34 +111,43 @@ class ReversalScanner(wiring.Component):
         """All pins come from registers; at power-up none is driven."""
         skin = self.skin
         m.submodules.precharge = precharge = Precharge(skin)
-        drives_rows = Signal()
         begun = Signal()
-        m.d.sync += [drives_rows.eq(~sheet.listens), begun.eq(turn.begins)]
-        selected, drive = sheet.selected, drives_rows.replicate(skin.rows)
-        inverted, charged = Const(0, 1), precharge.pins
+        m.d.sync += begun.eq(turn.begins)
+        selected, inverts = Cat(sheet.selected, sheet.guard)[: skin.row_lines], sheet.inverts
         if skin.guard:
-            holds = Signal()  # from the first clock on
-            inverted = Signal()
-            m.d.sync += [holds.eq(~turn.tests), inverted.eq(sheet.inverts)]
-            selected, drive = Cat(selected, sheet.guard), Cat(drive, holds)
             m.d.comb += precharge.guard_pressed.eq(checks.of_guard & sheet.pressed[-1])
         if test is not None:
-            rows_drive, columns_drive = test.pins()
-            selected, drive = selected | test.discharges.replicate(skin.row_lines), drive | rows_drive
-            inverted, charged = inverted | test.discharges, charged | columns_drive
+            inverts = inverts | test.discharges
         if drives_columns_both_ways(skin):
+            inverted = Signal()
+            m.d.sync += inverted.eq(inverts)
             m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
         m.d.comb += [
             self.pins.rows.eq(~selected if skin.selects_low else selected),
-            self.pins.rows_drive.eq(drive),
-            self.pins.columns_drive.eq(charged),
+            self.pins.columns_drive.eq(precharge.pins),
             precharge.drive.eq(sheet.charges),
             precharge.columns.eq(sheet.pressed),
             precharge.looks.eq(turn.begins | turn.rests & turn.settled),
             precharge.turn.eq(self.time[RETRY_BIT]),
         ]
+        self._let_go(m, sheet, turn, precharge, test)
         count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
         return precharge
+
+    def _let_go(self, m: Module, sheet: Sheet, turn: Turn, precharge: Precharge, test: SelfTest | None) -> None:
+        """Which rows are driven: all or none, and a guard row but in a self-test; this drives single lines."""
+        skin = self.skin
+        if test is None:
+            drives_rows = Signal()
+            holds = Signal()  # from the first clock on
+            m.d.sync += [drives_rows.eq(~sheet.listens), holds.eq(1)]
+            m.d.comb += self.pins.rows_drive.eq(Cat(drives_rows.replicate(skin.rows), holds))
+            return
+        rows, columns = test.drives()
+        every = Cat((~sheet.listens).replicate(skin.rows), ~turn.tests)[: skin.row_lines]
+        drives = Signal(skin.row_lines)
+        m.d.sync += drives.eq(every | rows)
+        m.d.comb += [self.pins.rows_drive.eq(drives), precharge.others.eq(columns)]
 
     def _mask(self, m: Module, sheet: Sheet, turn: Turn) -> Value:
         """Columns that read pressed and are not masked in the row."""

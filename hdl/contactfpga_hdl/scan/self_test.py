@@ -28,10 +28,10 @@ class SelfTest(wiring.Component):
     begin (in): high for a clock in which one is; the scan drives nothing from the next clock but one on.
     ends (out): high for a clock, its last one.
     rows, columns (in): lines that read released, from synchronizers; rows that are masked whole never do.
-    discharges (out): all lines are driven to the selecting level, from the second clock after ``begin`` on for the
-    projection time.
-    alone (out): rows, then columns, that are driven to the released level, after a gap of a clock for the settle time.
-    Lines that are masked whole are not driven.
+    discharges (out): in the next clock all lines are driven to the selecting level; so they are from the third clock
+    after ``begin`` on for the projection time.
+    alone (out): rows, then columns, that in the next clock are driven to the released level; so one is after a gap of a
+    clock for the settle time. Lines that are masked whole are not driven.
     slots (out): after a command, what was read in each slot.
     joined (out): a slot found a line that follows another one; until a whole test finds none. A column that rises in
     slot 0 says nothing in the others; a row that does without a column is joined with the supply.
@@ -67,14 +67,14 @@ class SelfTest(wiring.Component):
         return m
 
     def _drive(self, m: Module, line: Value) -> Value:
-        """All pins come from registers. Returns what is high when the levels of a slot are there."""
+        """Returns what is high when the levels of a slot are there."""
         project, settle = self.derived.project_clocks, self.derived.settle_clocks
         clock = Signal(range(max(project, settle, SEEN + 1)))
         drives = Signal()
         judges = Signal()
         driven = checked_rows(self.skin) | anywhere(self.skin) << self.skin.rows
-        m.d.sync += [clock.eq(0), self.discharges.eq(0), self.alone.eq(Mux(drives, line & driven, 0))]
-        m.d.comb += self.ends.eq(judges)
+        m.d.sync += clock.eq(0)
+        m.d.comb += [self.ends.eq(judges), self.alone.eq(Mux(drives, line & driven, 0))]
         with m.FSM(name="slot"):
             with m.State("REST"):
                 with m.If(self.begin):
@@ -82,7 +82,8 @@ class SelfTest(wiring.Component):
             with m.State("GAP"):
                 m.next = "DISCHARGE"
             with m.State("DISCHARGE"):
-                m.d.sync += [self.discharges.eq(1), clock.eq(clock + 1)]
+                m.d.comb += self.discharges.eq(1)
+                m.d.sync += clock.eq(clock + 1)
                 with m.If(clock == project - 1):
                     m.d.sync += clock.eq(0)
                     m.next = "LET GO"
@@ -141,8 +142,9 @@ class SelfTest(wiring.Component):
             with m.If(first):
                 m.d.sync += rises.eq(Cat(rows, columns))
 
-    def pins(self) -> tuple[Value, Value]:
-        """Rows and columns that are driven. A guard row is discharged, a guard column is by its switches."""
+    def drives(self) -> tuple[Value, Value]:
+        """Rows and columns that are driven in the next clock. A guard row is discharged, a guard column is by its
+        switches."""
         rows, columns = self.skin.rows, self.skin.columns
         guard = 1 << rows if self.skin.guard else 0
         discharged = self.discharges.replicate(rows + 1) & (checked_rows(self.skin) | guard)
@@ -158,7 +160,8 @@ def test_ports(derived: Derived) -> dict[str, wiring.Member]:
 
 
 def test_lines(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, test: SelfTest) -> None:
-    """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it."""
+    """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it. No row is to be driven in a
+    frame then."""
     m.submodules.test = test
     wiring.connect(m, test.slots, wiring.flipped(scan.slots))
     m.d.comb += [
@@ -170,3 +173,5 @@ def test_lines(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, test
         turn.tested.eq(test.ends),
         scan.faults.joined.eq(test.joined),
     ]
+    with m.If(test.discharges):
+        m.d.sync += [sheet.selected.eq(-1), sheet.guard.eq(1)]
