@@ -14,14 +14,16 @@ from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError, cli
 from contactfpga.body import Body, BodyError, packed, urdf
+from contactfpga.body.folds import Folds
 from contactfpga.body.kinematics import Kinematics
 from contactfpga.cover.task import Task
 from contactfpga.haptics import LoadCells
-from contactfpga.inputs import tomlfile, xmlfile
+from contactfpga.inputs import array_file, tomlfile, xmlfile
 from contactfpga.skin.several import Several
-from contactfpga.surfaces import SurfaceError, mesh_file
+from contactfpga.surfaces import Mesh, SurfaceError, mesh_file
 from contactfpga.surfaces.laying import Triangles
 from contactfpga_sim.scenes.file import SceneFile
+from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.studies.arm.case import Case
 
 DOTTED = f"a{'.a' * 300_000} = 1\n"
@@ -307,3 +309,60 @@ def test_a_fan_of_very_many_triangles_is_refused(tmp_path):
     with Cost() as cost, pytest.raises(SurfaceError, match="8,000 of its 8,000 triangles share one corner"):
         Triangles.load(path)
     assert cost.peak < 100e6
+
+
+# ---- arrays and tables of cells
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_packed_array_is_unpacked_to_its_limit(tmp_path, packing):
+    path = tmp_path / "x.npz"
+    data = io.BytesIO()
+    np.lib.format.write_array_header_1_0(data, {"descr": "|u1", "fortran_order": False, "shape": (10**8,)})
+    with zipfile.ZipFile(path, "w", packing) as archive, archive.open("points_mm.npy", "w") as file:
+        file.write(data.getvalue())
+        for _ in range(100):
+            file.write(bytes(10**6))
+    with Cost() as cost, pytest.raises(SurfaceError, match="^[^\n]*(the limit is 98304, split it|numpy does not use)"):
+        Mesh.load(path)
+    assert cost.peak < 20e6
+
+
+@pytest.mark.parametrize("shape", [(1 << 40,), (-1,), (1 << 20, 1 << 20), (3, 0, 1 << 62)])
+def test_an_array_that_claims_more_than_it_has_is_refused(tmp_path, shape):
+    path = tmp_path / "x.npy"
+    with open(path, "wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        file.write(bytes(1000))
+    with Cost() as cost, pytest.raises((array_file.ArrayFileError, ValueError)):
+        Recording.load(path)
+    assert cost.peak < 20e6
+
+
+def test_arrays_of_objects_are_not_unpickled(tmp_path):
+    for name, save in (
+        ("x.npy", lambda path, one: np.save(path, one)),
+        ("x.npz", lambda path, one: np.savez(path, points_mm=one)),
+    ):
+        save(tmp_path / name, np.array([Ran()], object))
+        with pytest.raises(ValueError, match="numbers are needed"):
+            Mesh.load(tmp_path / name)
+    assert not Ran.ran
+
+
+class Ran:
+    """What says so where it is unpickled."""
+
+    ran = False
+
+    def __reduce__(self):
+        return setattr, (Ran, "ran", True)
+
+
+def test_folds_of_very_many_steps_are_refused(tmp_path):
+    path = tmp_path / "x.json"
+    steps = ", ".join(f'{{"step": {step}, "frames": 1, "cells": []}}' for step in range(200_000))
+    path.write_text(f'{{"joint": "a", "step_rad": 0.01, "lines": [64, 64], "steps": [{steps}]}}')
+    with Cost() as cost, pytest.raises(BodyError, match="200,000 steps of angles; the limit is 10,000"):
+        Folds.load(path)
+    assert cost.peak < 300e6

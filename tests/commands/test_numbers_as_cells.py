@@ -8,9 +8,9 @@ import zipfile
 import numpy as np
 import pytest
 
+from contactfpga.inputs.array_file import ArrayFileError, read
 from contactfpga.skin import Skin
 from contactfpga_sim.scenes import scene
-from contactfpga_sim.scenes.array_file import ArrayFileError, read
 from contactfpga_sim.scenes.cells import pressed
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.studies.fit.sources import source

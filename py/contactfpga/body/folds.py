@@ -25,6 +25,8 @@ from contactfpga.zones.zone import Zone, Zones
 STEP_RAD = 0.05
 """Angles are told apart this finely."""
 MAX_BYTES = 20_000_000
+MAX_STEPS = 10_000
+"""Of angles, each with a sheet of cells: a turn has 126."""
 
 Cells = NDArray[np.bool_]
 
@@ -118,6 +120,8 @@ def _read(values: Any) -> Folds:
         raise BodyError(f"lines is {shown(values['lines'])}; it must be rows and columns, 64 at most")
     frames: dict[int, int] = {}
     cells: dict[int, Cells] = {}
+    if len(values["steps"]) > MAX_STEPS:
+        raise BodyError(f"it has {len(values['steps']):,} steps of angles; the limit is {MAX_STEPS:,}")
     for step in values["steps"]:
         number, count = whole(step["step"]), whole(step["frames"])
         if number is None or count is None or count < 1:

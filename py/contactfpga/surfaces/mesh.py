@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import math
-import zipfile
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 
-from contactfpga.inputs.files import read_small, replaced
+from contactfpga.inputs import array_file
+from contactfpga.inputs.array_file import ArrayFileError
+from contactfpga.inputs.files import replaced
 from contactfpga.skin.limits import MAX_LINES
 from contactfpga.surfaces.answer import SurfaceError, length
 from contactfpga.surfaces.shapes import Floats, Vector, is_one, vector
 
 KEYS = ("points_mm", "normals", "pitch_mm", "closed")
-MAX_BYTES = 4_000_000
+MAX_BYTES = 8 * 3 * MAX_LINES**2
+"""Of an array: numbers of 64 bits."""
 BEYOND = 1.0
 """Pitches beyond the outermost cells up to which the surface goes on as it ends there."""
 STEPS = 30
@@ -61,11 +62,11 @@ class Mesh:
     @classmethod
     def load(cls, path: str | Path) -> Mesh:
         """Read a table that :meth:`save` wrote. Raises :class:`SurfaceError`, OSError."""
-        data = read_small(path, MAX_BYTES, "a table of `contactfpga surface`", SurfaceError)
         try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as values:
-                found = {key: _small(values, key) for key in KEYS}
-        except (ValueError, KeyError, EOFError, zipfile.BadZipFile, AttributeError, TypeError) as error:
+            found = {key: one.astype(float) for key, one in array_file.read(path, KEYS, MAX_BYTES).items()}
+            if missing := [key for key in KEYS if key not in found]:
+                raise ArrayFileError(f"it has no {missing[0]}")
+        except ArrayFileError as error:
             raise SurfaceError(f"{path}: not a table of `contactfpga surface`: {error}") from None
         try:
             if found["pitch_mm"].shape != (2,) or found["closed"].shape != ():
@@ -171,10 +172,3 @@ class Mesh:
         along_x = np.linalg.norm(next_column - p[:, : next_column.shape[1]], axis=2)
         along_y = np.linalg.norm(p[1:] - p[:-1], axis=2)
         return (float(along_x.min()), float(along_x.max())), (float(along_y.min()), float(along_y.max()))
-
-
-def _small(values: Any, key: str) -> Floats:
-    found = np.asarray(values[key])
-    if found.dtype.kind not in "fiub" or found.size > 3 * MAX_LINES**2:
-        raise ValueError(f"{key} is of type {found.dtype} and shape {found.shape}")
-    return found.astype(float)

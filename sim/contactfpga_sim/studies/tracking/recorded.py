@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import array_file
 from contactfpga_sim.scenes.recordings import Recording
 from contactfpga_sim.studies.tracking.frames import Place, Shown, zones_of
 

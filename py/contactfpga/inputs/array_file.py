@@ -15,8 +15,10 @@ from numpy.lib import format as npy
 from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import visible
 
-MAX_BYTES = 1 << 32
-"""Of an array."""
+MAX_BYTES = 1 << 30
+"""Of an array: packed, a thousandth of it may be in the file."""
+PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those of numpy. Of others a few bytes are unpacked to any number at once."""
 NUMBERS = "biuf"
 """Kinds of arrays that are read: bools, whole numbers, floats."""
 _SHOWN = 8
@@ -26,17 +28,18 @@ class ArrayFileError(ValueError):
     """What a file holds that is no array of numbers."""
 
 
-def read(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+def read(path: str | Path, names: Sequence[str], most: int = MAX_BYTES) -> dict[str, np.ndarray]:
     """The named arrays of a .npz file that it has; of a .npy file the one array, by the first name.
 
-    Raises :class:`ArrayFileError` where the first one is not there or the file is damaged, and OSError.
+    ``most``: bytes of an array. Raises :class:`ArrayFileError` where the first one is not there or the file is damaged,
+    and OSError.
     """
     with open_regular(path) as file:
         try:
             if file.read(len(npy.MAGIC_PREFIX)) == npy.MAGIC_PREFIX:
-                return {names[0]: _array(file, os.fstat(file.fileno()).st_size, str(path))}
+                return {names[0]: _array(file, os.fstat(file.fileno()).st_size, str(path), most)}
             with zipfile.ZipFile(file) as archive:
-                return _arrays(archive, names, str(path))
+                return _arrays(archive, names, str(path), most)
         except ArrayFileError:
             raise
         except Exception as error:  # zipfile and numpy raise a dozen kinds for bytes that are no such file
@@ -44,7 +47,7 @@ def read(path: str | Path, names: Sequence[str]) -> dict[str, np.ndarray]:
             raise ArrayFileError(f"{path} is no .npy or .npz file, or damaged: {said}") from None
 
 
-def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str) -> dict[str, np.ndarray]:
+def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str, most: int) -> dict[str, np.ndarray]:
     held = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
     if names[0] not in held:
         shown = ", ".join(visible(name[:40]) for name in list(held)[:_SHOWN]) or "nothing"
@@ -53,12 +56,14 @@ def _arrays(archive: zipfile.ZipFile, names: Sequence[str], path: str) -> dict[s
     found = {}
     for name in names:
         if name in held:
+            if held[name].compress_type not in PACKINGS:
+                raise ArrayFileError(f"`{name}` in {path} is packed in a way that numpy does not use; save it anew")
             with archive.open(held[name]) as file:
-                found[name] = _array(file, held[name].file_size, f"`{name}` in {path}")  # type: ignore[arg-type]
+                found[name] = _array(file, held[name].file_size, f"`{name}` in {path}", most)  # type: ignore[arg-type]
     return found
 
 
-def _array(file: BinaryIO, size: int, what: str) -> np.ndarray:
+def _array(file: BinaryIO, size: int, what: str, most: int) -> np.ndarray:
     """The array that begins here, of ``size`` bytes with its header."""
     file.seek(0)
     version = npy.read_magic(file)
@@ -69,9 +74,11 @@ def _array(file: BinaryIO, size: int, what: str) -> np.ndarray:
     claimed, left = math.prod(shape) * dtype.itemsize, size - file.tell()
     if min(shape, default=0) < 0 or claimed > left:
         raise ArrayFileError(f"{what} claims shape {shape} of {dtype}, {claimed} bytes, and holds {left}")
-    if claimed > MAX_BYTES:
-        raise ArrayFileError(f"{what} has {claimed} bytes; the limit is {MAX_BYTES}, split it")
-    data = file.read(claimed)
+    if claimed > most:
+        raise ArrayFileError(f"{what} has {claimed} bytes; the limit is {most}, split it")
+    data = np.empty(claimed, np.uint8)
+    if file.readinto(data.data) != claimed:  # type: ignore[attr-defined]
+        raise ArrayFileError(f"{what} claims {claimed} bytes and holds fewer")
     if dtype.kind == "b":  # any byte but 0 is True, and numpy takes such bytes for 0 or 1
-        return np.reshape(np.frombuffer(data, np.uint8) != 0, shape, "F" if by_columns else "C")
-    return np.reshape(np.frombuffer(data, dtype), shape, "F" if by_columns else "C")
+        np.minimum(data, 1, out=data)
+    return np.reshape(data.view(dtype), shape, "F" if by_columns else "C")
