@@ -99,8 +99,8 @@ fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (s
 failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
 	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
 
-flips: $(VENV)/.stamp-boards $(VENV)/.stamp-chart | compiler ## flip bits of the running gateware, and write docs/flips.md and its picture (half an hour, unless kept from before) [ARGS="--registers 1000"]
-	$(VENV)/bin/contactfpga flips --page docs/flips.md $(ARGS)
+flips: $(VENV)/.stamp-boards $(VENV)/.stamp-chart | compiler ## flip bits of the running gateware, and write docs/flips.md and its picture (half an hour at most) [ARGS="--registers 1000 --minutes 90"]
+	$(VENV)/bin/contactfpga flips --page docs/flips.md --minutes 25 $(ARGS)
 
 arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
 	$(PY) -m contactfpga_sim.pages.arm_page docs/arm.md docs/images

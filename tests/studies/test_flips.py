@@ -1,7 +1,9 @@
 """Flips of single bits: every bit is there, each is followed, and what came of it is judged rightly."""
 
 import json
+import time
 import types
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +97,27 @@ def test_a_board_returns_to_a_moment(plain):
     assert not board.same(plain.steps[5].moment)
     with pytest.raises(ValueError, match="is outside of"):
         board.flip(Bit(0, 1, 0))
+
+
+@pytest.fixture(scope="module")
+def fast():
+    yield from made(designs.skin("run, on_change, reversal"))
+
+
+@pytest.mark.slow  # which has a board of its own to compile
+def test_the_reference_of_a_scan_that_waits_is_right_and_finds_touches_from_rest(fast):
+    heard = [one for step in fast.steps[4:] for one in step.heard]
+    assert flip._wrong(fast, heard) == []
+    assert not any(one.flagged for one in heard)
+    assert sum(one.said[0] == 0 for one in heard) >= len(fast.steps) // touches.PERIOD - 1
+
+
+@pytest.mark.slow
+def test_a_scan_that_waits_and_hears_of_no_touch_is_stale(fast):
+    heard = [one for step in fast.steps[4:] for one in step.heard]
+    from_rest = next(index for index, one in enumerate(heard) if index and one.said[0] and not heard[index - 1].said[0])
+    del heard[from_rest : from_rest + 2]
+    assert "stale" in {kind for _, kind in flip._wrong(fast, heard)}
 
 
 def test_the_reference_is_right_all_the_time(plain):
@@ -248,6 +271,36 @@ def test_all_that_was_followed_before_is_there_up_to_the_first_block_that_is_mis
             kept._path("flips", campaign._key("run", memory, block)).unlink()
 
 
+@pytest.mark.parametrize("within_s", [None, 0.3])
+def test_what_is_not_begun_in_time_is_left_out_and_the_first_block_of_each_never(monkeypatch, within_s):
+    """One worker, ten blocks of registers and five of memory for each of two designs, 50 ms each."""
+    begun = []
+
+    def block(design, memory, number):
+        begun.append((design, memory, number))
+        time.sleep(0.05)
+        return [Found(f"{design} {number}", memory, "masked", "", 0, 0.0, 0.5)] * campaign.BLOCK
+
+    monkeypatch.setattr(campaign, "_block", block)
+    counted = []
+    with ThreadPoolExecutor(1) as executor:
+        rows = campaign.run(["a", "b"], 250, 125, executor, counted.append, within_s)
+    firsts = [(name, memory, 0) for name in "ab" for memory in (False, True)]
+    assert sorted(begun[:4]) == sorted(firsts)
+    assert (len(begun) == 30) == (within_s is None)
+    assert counted == [30] * len(begun)
+    found = {(row.design, row.found.memory, int(row.found.name.split()[1])) for row in rows}
+    assert len(rows) == campaign.BLOCK * len(found)
+    for name, memory, _ in firsts:
+        numbers = [number for one, of, number in begun if (one, of) == (name, memory)]
+        taken = [number for one, of, number in found if (one, of) == (name, memory)]
+        assert sorted(taken) == sorted(numbers) == list(range(len(numbers)))
+
+
+def test_a_block_after_one_that_is_missing_does_not_count():
+    assert list(campaign._first([[1], [2, 3], None, [4]])) == [1, 2, 3]
+
+
 def test_bad_choices_are_refused_in_a_sentence(capsys):
     assert cli.main(["flips", "--design", "triple"]) == 1
     assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
@@ -270,6 +323,14 @@ def test_tables_count_what_came_out():
         Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
     ]
     tables = flips_page.tables(rows, [Design("run", 1700, 1000, 14000)])
+    worst = [
+        "- Flips of registers with one copy: one of `scan.time` in `run` was silently wrong for 250.0 ms (time).",
+        "1 of 4 were silently wrong (4.6 to 69.9 %), 1 of them for more than 5 ms (4.6 to 69.9 %).",
+        "- Flips of memory with one copy:",
+        "0 of 1 were silently wrong (0.0 to 79.3 %), 0 of them for more than 5 ms (0.0 to 79.3 %).",
+        "A flip that was not drawn may be worse than all of these.",
+    ]
+    assert tables["worst"]().split() == " ".join(worst).split()
     registers, memory = tables["flipped"]().splitlines()[2:]
     assert registers.startswith(
         "| `run` | 1,700 | 1,000 of registers | 4 | **25.0 %**, 4.6 to 69.9 % | 250.0 / 250.0 |"

@@ -15,9 +15,10 @@ from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
 from contactfpga_hdl.units.pack import packet_signature
+from contactfpga_hdl.util.upset import upset_places
 
 HELLO_REGION = 3
-"""The others hold frames; it is the exclusive or of the three."""
+"""The others hold frames."""
 
 FRAMES_BEFORE_UNITS = 4
 """As many frames go in a row while readings of units wait."""
@@ -113,7 +114,7 @@ class Link(wiring.Component):
         hello_due = Signal(init=1)
         self._place_frames(m, wire, regions)
         if not self.skin.dual:
-            m.d.comb += self.upset.eq(regions.filling ^ regions.waiting ^ regions.sending != HELLO_REGION)
+            m.d.comb += self.upset.eq(upset_places(regions.filling, regions.waiting, regions.sending))
         frames_sent = self._decide(m, wire, regions)
         with m.If(wire.take_hello):
             m.d.sync += hello_due.eq(0)

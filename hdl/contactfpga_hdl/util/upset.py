@@ -12,6 +12,11 @@ def upset(m: Module, name: str, word: Value, writes: Value, toggles: Value | int
     return ~written & (odd ^ word.xor())
 
 
+def upset_places(first: Value, second: Value, third: Value) -> Value:
+    """High while these are not 0, 1 and 2 in any order, by a flip of one of their six bits."""
+    return first ^ second ^ third != 0b11
+
+
 def upset_count(m: Module, name: str, count: Value, ticks: Value) -> Value:
     """The same of a counter: 15 of 16 ticks can be foretold from its lowest bits, which costs less than all."""
     low = count[:4]

@@ -20,6 +20,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--registers", type=count, default=400, metavar="N", help=registers)
     memories = "Flips of memory bits per design (default: 100)."
     parser.add_argument("--memories", type=count, default=100, metavar="N", help=memories)
+    minutes = "Begin no more flips after this time, and take those that were followed until then."
+    parser.add_argument("--minutes", type=numbers.number(0.1, 10_000, "minutes"), metavar="N", help=minutes)
     only = "Run nothing: use the results kept from earlier runs, as many as there are for each design."
     parser.add_argument("--kept", action="store_true", help=only)
     flags.workers(parser)
@@ -45,9 +47,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         try:
             with pool.executor(args.jobs, args.dask) as executor, pool.progress() as step:
-                rows = campaign.run(
-                    names, args.registers, args.memories, executor, functools.partial(step, "blocks of flips")
-                )
+                done = functools.partial(step, "blocks of flips")
+                within_s = None if args.minutes is None else 60 * args.minutes
+                rows = campaign.run(names, args.registers, args.memories, executor, done, within_s)
         except KeyboardInterrupt:
             what = "interrupted; the blocks that were finished are kept, and the same command goes on"
             raise Interrupted(what) from None

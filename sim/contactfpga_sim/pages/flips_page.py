@@ -15,11 +15,13 @@ DESIGNS = (
     "bits",
     "flips",
     "silently wrong, 95 %",
-    "wrong for, ms: median / longest",
+    "wrong for, ms: longest / median",
     "reported",
 )
 MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
+LONG_S = 0.005
+"""Longer than any fault that spoils a frame or two."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 """In words."""
 
@@ -27,10 +29,41 @@ OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
     """All of them, by name."""
     return {
+        "worst": lambda: worst_text(rows),
         "flipped": lambda: designs_table(rows, designs),
         "modules": lambda: modules_table(rows, designs),
         "ways": lambda: ways_table(rows, designs),
     }
+
+
+def worst_text(rows: Sequence[Row]) -> str:
+    """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
+    groups = [
+        (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)
+        for dual in (False, True)
+        for memory in (False, True)
+        if (some := [row for row in rows if row.found.memory == memory and row.design.endswith("dual") == dual])
+    ]
+    groups.sort(key=lambda group: -max(row.found.seconds for row in group[1]))
+    lines = [f"- {name}: {_worst(some)}" for name, some in groups]
+    return "\n".join((*lines, "", "A flip that was not drawn may be worse than all of these."))
+
+
+def _worst(rows: Sequence[Row]) -> str:
+    silent = summary.share(rows)
+    wrong = [row for row in rows if row.found.outcome == "silent"]
+    worst = max(wrong or rows, key=lambda row: row.found.seconds)
+    long = summary.Share(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
+    what = (
+        f"one of `{worst.found.name}` in `{worst.design}` was silently wrong for {1e3 * worst.found.seconds:,.1f} ms "
+        f"({worst.found.kind}). "
+        if silent.hits
+        else ""
+    )
+    return (
+        f"{what}{silent.hits} of {silent.of:,} were silently wrong ({_interval(silent)}), {long.hits} of them for more "
+        f"than {1e3 * LONG_S:g} ms ({_interval(long)})."
+    )
 
 
 def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
@@ -51,7 +84,7 @@ def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
                         f"{bits:,} of {'memory' if memory else 'registers'}",
                         f"{len(some):,}",
                         f"**{100 * silent.hits / silent.of:.1f} %**, {_interval(silent)}",
-                        f"{median:,.1f} / {longest:,.1f}" if silent.hits else "",
+                        f"{longest:,.1f} / {median:,.1f}" if silent.hits else "",
                         f"{100 * told.hits / told.of:.1f} %",
                     )
                 )

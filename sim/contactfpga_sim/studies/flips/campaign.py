@@ -6,7 +6,8 @@ import csv
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import NamedTuple
@@ -29,22 +30,48 @@ class Row(NamedTuple):
 
 
 def run(
-    names: Sequence[str], registers: int, memories: int, executor: Executor, done: Callable[[int], None]
+    names: Sequence[str],
+    registers: int,
+    memories: int,
+    executor: Executor,
+    done: Callable[[int], None],
+    within_s: float | None = None,
 ) -> list[Row]:
     """This many flips of register bits and of memory bits of each design. ``done`` is told the number of blocks
-    whenever one is finished."""
-    blocks = [
-        (name, memory, block)
-        for memory, count in ((False, registers), (True, memories))
-        for block in range(math.ceil(count / BLOCK))
+    whenever one is finished.
+
+    ``within_s``: no block is begun later than that, but for the first of each; the rest is left out.
+    """
+    counts = {False: math.ceil(registers / BLOCK), True: math.ceil(memories / BLOCK)}
+    blocks = [(name, memory, block) for memory, count in counts.items() for block in range(count) for name in names]
+    # So that all of them are as far when the time is over.
+    ordered = sorted(blocks, key=lambda each: each[2] / counts[each[1]])
+    todo = {each: executor.submit(_block, *each) for each in ordered}
+    timer = threading.Timer(within_s or 0.0, lambda: [todo[each].cancel() for each in ordered if each[2]])
+    if within_s is not None:
+        timer.start()
+    try:
+        for future in as_completed(todo.values()):
+            if not future.cancelled():
+                future.result()
+                done(len(blocks))
+    finally:
+        timer.cancel()
+    return [
+        Row(name, Found(*one))
+        for memory, count in counts.items()
         for name in names
+        for one in _first(
+            None if todo[name, memory, block].cancelled() else todo[name, memory, block].result()
+            for block in range(count)
+        )
     ]
-    todo = {executor.submit(_block, *each): each for each in blocks}
-    found = {}
-    for future in as_completed(todo):
-        found[todo[future]] = future.result()
-        done(len(blocks))
-    return [Row(each[0], Found(*one)) for each in blocks for one in found[each]]
+
+
+def _first(blocks: Iterable[list[Found] | None]) -> Iterator[Found]:
+    """Flips of the blocks up to the first that is not there: which ones are there may depend on what came of them."""
+    for found in itertools.takewhile(lambda block: block is not None, blocks):
+        yield from found or ()
 
 
 def _block(design: str, memory: bool, block: int) -> list[Found]:
@@ -62,14 +89,12 @@ def _key(design: str, memory: bool, block: int) -> str:
 
 def finished(names: Iterable[str]) -> list[Row]:
     """All flips of these designs that were followed before: of each the blocks up to the first one that was not."""
-    rows = []
-    for memory in (False, True):
-        for name in names:
-            for block in itertools.count():
-                if (found := kept.found("flips", _key(name, memory, block))) is None:
-                    break
-                rows += [Row(name, Found(*one)) for one in found]
-    return rows
+    return [
+        Row(name, Found(*one))
+        for memory in (False, True)
+        for name in names
+        for one in _first(kept.found("flips", _key(name, memory, block)) for block in itertools.count())
+    ]
 
 
 @functools.lru_cache(maxsize=len(designs.DESIGNS))

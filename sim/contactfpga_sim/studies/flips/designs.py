@@ -14,6 +14,7 @@ DESIGNS: dict[str, dict[str, Any]] = {
     "run": {},
     "run, on_change": {"send": "on_change"},
     "serial": {"labeller": "serial"},
+    "run, on_change, reversal": {"send": "on_change", "scan": "reversal", "precharge_us": 0.5},
     "run, dual": {"dual": True},
     "run, on_change, dual": {"send": "on_change", "dual": True},
     "serial, dual": {"labeller": "serial", "dual": True},

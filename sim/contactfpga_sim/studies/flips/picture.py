@@ -22,7 +22,7 @@ def draw(rows: Sequence[Row], designs: Sequence[Design], path: Path) -> Path:
         figure = style.new(3.6)
         axes = figure.subplots()
         kinds = [design.name.removesuffix(", dual") for design in designs]
-        for kind, color in zip(dict.fromkeys(kinds), (style.BLUE, style.VERMILLION, style.GREEN)):
+        for kind, color in zip(dict.fromkeys(kinds), style.PALETTE):
             line = [design for design, one in zip(designs, kinds) if one == kind]
             shares = [summary.share(summary.of(rows, design.name, memory=False)) for design in line]
             middle = [100 * share.hits / share.of for share in shares]

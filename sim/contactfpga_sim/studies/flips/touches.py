@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
 
 import numpy as np
 
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
 from contactfpga_sim import golden
 
 STEP_S = 0.005
 """Another sheet comes this often."""
+PERIOD, REST = 8, 3
+"""For a scan that waits until something touches the sheet nothing does so in the last ``REST`` of ``PERIOD`` sheets."""
 
 Said = tuple[int, int, tuple[tuple[int, int, int], ...]]
 """Pressed cells, zones in all, and the moments of those that are listed."""
 
 
 def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
-    """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, and come and go."""
+    """(count, rows, columns) bool: three touches of different sizes that move a cell at a time, and come and go. A scan
+    that waits until something touches the sheet has to wait now and then."""
     rng = np.random.default_rng(seed)
     cells = np.zeros((count, skin.rows, skin.columns), bool)
     for rows, columns in ((2, 2), (3, 3), (4, 2)):
@@ -31,6 +34,8 @@ def sheets(skin: Skin, count: int, seed: int = 7) -> np.ndarray:
             place = np.clip(place + rng.integers(-1, 2, 2), 0, most)
             if there:
                 sheet[place[0] : place[0] + rows, place[1] : place[1] + columns] = True
+    if Derived(skin).scan.waits:
+        cells[np.arange(count) % PERIOD >= PERIOD - REST] = False
     return cells
 
 
@@ -41,7 +46,8 @@ def said(zones: Zones) -> Said:
 
 
 class Truth:
-    """What frames may say at each step: any scan of the sheet, which may have changed between two of its rows.
+    """What frames may say at each step: any scan of the sheet, which may have changed between two of its rows. A scan
+    that looks first which rows are touched passes over those that were not.
 
     ``sheets``: (n, rows, columns) bool.
     """
@@ -59,12 +65,11 @@ class Truth:
         return what in self.still[first : last + 1] or any(what in self._changing[step] for step in range(first, last))
 
     def _between(self, before: np.ndarray, after: np.ndarray) -> set[Said]:
-        rows = np.flatnonzero((before != after).any(axis=1)) + 1
-        return {self._says(np.concatenate([before[:row], after[row:]])) for row in self._ends(rows)}
-
-    @staticmethod
-    def _ends(rows: Iterable[int]) -> list[int]:
-        return [0, *map(int, rows)]
+        ends = [0, *(np.flatnonzero((before != after).any(axis=1)) + 1)]
+        later = [after]
+        if self._skin.reads_rows:
+            later.append(after & before.any(axis=1, keepdims=True))
+        return {self._says(np.concatenate([before[:row], one[row:]])) for row in ends for one in later}
 
     def _says(self, cells: np.ndarray) -> Said:
         key = cells.tobytes()
