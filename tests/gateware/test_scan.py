@@ -1,11 +1,17 @@
 """The scanner: which row is driven when, and what it makes of the column pins (docs/timing.md, Scan)."""
 
 import dataclasses
+import itertools
 import types
 
 import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
+from contactfpga.skin.derived import EPOCH_BITS, TIME_BITS
+from contactfpga_hdl.scan import raster
 from contactfpga_hdl.scan.raster import Scanner
 
 SKINS = {
@@ -257,3 +263,32 @@ def test_a_row_is_offered_until_it_is_taken(bench, rng):
     assert [payload & 31 for _, payload in sink.transfers] == [cells for _, cells in rows]
     assert sink.offered == [cycle for cycle, _ in rows]
     assert any(cycle != offered for (cycle, _), offered in zip(sink.transfers, sink.offered))
+
+
+class Epochs(wiring.Component):
+    """What counts them, without a scan."""
+
+    def __init__(self, late):
+        self.late = late
+        super().__init__({"time": In(TIME_BITS), "epoch": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        raster.watch_epoch(m, self.time, self.epoch, self.late)
+        return m
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_an_epoch_begins_with_each_further_2_to_the_22_us_and_not_at_power_up(bench, rng, late):
+    """Where columns are shifted in for longer than rows are, the time begins below 0."""
+    times = [-5 if late else 0]
+    while len(times) < 400:
+        times.append(times[-1] + rng.choice([1, 3, rng.randrange(1 << 20)]))
+    dut = Epochs(late)
+    sim = bench(dut)
+    sim.drive(dut.time, lambda cycle: times[cycle] % (1 << TIME_BITS))
+    epoch = sim.watch(dut.epoch)
+    sim.run(len(times) - 1)
+    begun = [max(0, time) >> EPOCH_BITS for time in times[:-1]]
+    assert epoch.values == [0, *(int(after > before) for before, after in itertools.pairwise(begun))]
+    assert sum(epoch.values) > 10
