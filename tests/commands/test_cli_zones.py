@@ -1,5 +1,6 @@
 """`contactfpga zones` and `contactfpga wire`: what they print and keep."""
 
+import itertools
 import json
 import re
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import pytest
 from fake_board import FakeBoard, wait_until
 
 import contactfpga
@@ -109,6 +111,38 @@ def test_reader_of_json_may_end_first(board):
         process.stdout.close()
         assert process.wait(30) == 0
         assert process.stderr.read() == ""
+
+
+def test_reader_of_tables_has_the_first_at_once_and_may_end_first(board):
+    """`contactfpga zones | head -1`: nothing may wait for the end of what has none."""
+    board.stream = board.frame
+    command = [sys.executable, "-m", "contactfpga", "zones", "--timeout", "30", board.path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        lines = iter(process.stdout.readline, "")
+        assert sum("cells pressed" in line for line in itertools.islice(lines, 100)) >= 2
+        assert process.poll() is None
+        process.stdout.close()
+        assert process.wait(30) == 0
+        assert process.stderr.read() == ""
+
+
+@pytest.mark.parametrize("form", ["--json", "--tracks"])
+def test_zones_end_after_the_seconds_asked_for(board, tmp_path, run, form):
+    recorded_touches(board, tmp_path / "touches.rec")
+    first, *_, last = (json.loads(line)["time_us"] for line in run(*replayed(tmp_path), "--json")[1].splitlines())
+    assert last - first > 20_000
+    status, out, errors = run(*replayed(tmp_path), form, "--seconds", 0.01)
+    assert (status, errors) == (0, "")
+    if form == "--json":
+        times = [json.loads(line)["time_us"] for line in out.splitlines()]
+        assert times[0] == first
+        assert first + 9_000 < times[-1] < first + 10_000
+    else:
+        assert out.count("cells pressed") == 2  # the first and the last
+
+
+def replayed(folder):
+    return "zones", f"replay://{folder / 'touches.rec'}"
 
 
 def test_interrupt_ends_the_live_view_quietly(board):

@@ -5,14 +5,19 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+from typing import TYPE_CHECKING
 
 from contactfpga.console import flags, interrupt
 from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
+from contactfpga.errors import ReplayEnded
 from contactfpga.haptics import WithReadings
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from contactfpga.console.live import Frames  # which needs rich
 
 HELP = "Show the contact zones live."
 EXTRA = None
@@ -22,6 +27,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
     flags.once(parser)
+    flags.seconds(parser)
     parser.add_argument("--json", action="store_true", help="Print every frame as a line with one JSON object.")
     parser.add_argument(
         "--tracks", action="store_true", help="Follow contacts: show ids that stay from frame to frame."
@@ -54,12 +60,14 @@ class _Follow:
 
     def __init__(self, args: argparse.Namespace, forces: Forces | None):
         self._tracker = Tracker() if args.tracks else None
+        self._seconds: float | None = args.seconds
         self.tracks: Tracks | None = None
         self.forces = forces
 
-    def frames(self, board: Board) -> Board | WithReadings:
-        """The board's frames; with forces, each once its readings are known."""
-        return board if self.forces is None else WithReadings(board)
+    def frames(self, board: Board) -> Frames:
+        """The board's frames, to the end that was asked for; with forces, each once its readings are known."""
+        frames: Frames = board if self.forces is None else WithReadings(board)
+        return frames if self._seconds is None else _Limited(frames, self._seconds)
 
     def take(self, zones: Zones) -> None:
         if self._tracker is not None:
@@ -68,11 +76,30 @@ class _Follow:
             self.forces.take(zones, self.tracks)
 
 
+class _Limited:
+    """Frames of so many seconds of device time; then it ends as a recording does."""
+
+    def __init__(self, frames: Frames, seconds: float):
+        self._frames, self._left_us = frames, seconds * 1e6
+        self._before_us: int | None = None
+
+    def next(self, timeout: float = 1.0) -> Zones:
+        zones = self._frames.next(timeout)
+        if self._before_us is not None:  # a board that was restarted begins at 0
+            self._left_us -= max(0, zones.time_us - self._before_us)
+        self._before_us = zones.time_us
+        if self._left_us <= 0:
+            raise ReplayEnded("the time is over")
+        return zones
+
+
 def _json(args: argparse.Namespace) -> int:
     with flags.opened(args, args.record) as board:
         follow = _Follow(args, Forces.of(board, args.units, args.friction))
-        with contextlib.nullcontext() if args.once else interrupt.usual_end():
-            for zones in follow.frames(board):
+        frames = follow.frames(board)
+        with contextlib.nullcontext() if args.once else interrupt.usual_end(), contextlib.suppress(ReplayEnded):
+            while True:
+                zones = frames.next(args.timeout)
                 follow.take(zones)
                 more = {} if follow.tracks is None else follow.tracks.to_dict()
                 if follow.forces is not None:

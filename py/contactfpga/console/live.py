@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,9 @@ from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.zones.zone import Zones
 
 REFRESH_US = 66_667
+
+LISTED_S = 1.0
+"""How often a frame is shown where they stand one below the other."""
 
 SILENT_S = 0.2
 """Without a frame for this long, and what a board may need besides, a display says so."""
@@ -58,8 +62,8 @@ class Frames(Protocol):
 def show(
     board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: Frames | None = None
 ) -> int:
-    """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends; ``frames``:
-    what gives the board's, by default it does."""
+    """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends, and one per
+    second where nothing can be redrawn; ``frames``: what gives the board's, by default it does."""
     console = terminal.console()
     frames = frames or board
     if args.once:
@@ -78,9 +82,9 @@ def _follow(
     """Show frames until there are no more."""
     if not terminal.of().live:
         if sys.stdout.isatty():
-            what = "contactfpga: this terminal cannot be redrawn, so only the last frame is shown, at the end"
+            what = "contactfpga: this terminal cannot be redrawn, so one frame per second is shown, and the last one"
             terminal.say(what, sys.stderr, hang=2)
-        _last(board, frames, args, console, render, take)
+        _list(board, frames, args, console, render, take)
         return
     with Live(console=console, auto_refresh=False) as live:
         for found in _paced(board, frames, args.timeout, take, tell_silence=True):
@@ -94,15 +98,26 @@ def room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _last(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> None:
-    """Show the last frame, be it that of a recording or the one at which Ctrl-C comes."""
-    zones = None
+def _list(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> None:
+    """Show one frame per second below the other, at once the first, and at the end the last, be it that of a recording
+    or the one at which Ctrl-C comes."""
+    waits: Zones | None = None  # the last one, while it is not shown
+    due_s = -math.inf
+
+    def shown(zones: Zones) -> None:
+        console.print(render(zones, room(console, endless=True)))
+
     try:
-        for zones in _paced(board, frames, args.timeout, take):  # noqa: B007
-            pass
+        for found in _paced(board, frames, args.timeout, take):
+            assert isinstance(found, Zones)
+            waits = found
+            if time.monotonic() >= due_s:
+                due_s = time.monotonic() + LISTED_S
+                shown(found)
+                waits = None
     finally:
-        if isinstance(zones, Zones):
-            console.print(render(zones, room(console, endless=True)))
+        if waits is not None:
+            shown(waits)
 
 
 def _paced(

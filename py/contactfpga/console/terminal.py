@@ -162,7 +162,11 @@ def console(stream: TextIO | None = None) -> Console:
     """Rich's console for standard output, or another stream, with what is known here."""
     from rich.console import Console
 
+    class Ours(Console):
+        def on_broken_pipe(self) -> None:
+            raise  # by which every command ends well whose reader has enough; rich's way is status 1
+
     stream = sys.stdout if stream is None else stream
     shown = of(stream)
     # A terminal that can be rewritten can be resized too, which rich follows by itself.
-    return Console(file=stream, width=None if shown.live else shown.width, highlight=False)
+    return Ours(file=stream, width=None if shown.live else shown.width, highlight=False)
