@@ -6,6 +6,7 @@ import time
 import tomllib
 import tracemalloc
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError, cli
-from contactfpga.body import Body, BodyError, packed, urdf
+from contactfpga.body import Body, BodyError, folds, packed, urdf
 from contactfpga.body.folds import Folds
 from contactfpga.body.kinematics import Kinematics
+from contactfpga.commands.haptics import reading
 from contactfpga.cover.task import Task
+from contactfpga.driver import mcap_part, mcap_records
 from contactfpga.haptics import LoadCells
-from contactfpga.inputs import array_file, tomlfile, xmlfile
-from contactfpga.skin.several import Several
-from contactfpga.surfaces import Mesh, SurfaceError, mesh_file
+from contactfpga.inputs import array_file, tomlfile, values, xmlfile
+from contactfpga.skin.several import MOST_SHEETS, Several
+from contactfpga.surfaces import Mesh, SurfaceError, mesh, mesh_file
 from contactfpga.surfaces.laying import Triangles
 from contactfpga_sim.scenes.file import SceneFile
 from contactfpga_sim.scenes.recordings import Recording
@@ -79,14 +82,14 @@ def documents(draw):
         quoted = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
         long = text.replace("\\", "\\\\").replace('"', '\\"')
         literal = plain.replace("'", "").replace("\n", "")
-        values = [
+        given = [
             f'"{quoted}"', f"'{literal}'",
             f'"""{long}"""', f'"""a"x{long}x""\\""""', f"'''{plain.replace(chr(39), '')}'''",
             "1.5", "[1.5, 2.5, 3.5, -1e-3, 4.5, 1.5, 2.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5, 1.5]",
             f"{{a.b = '{literal}', c = 1.5}}",
         ]  # fmt: skip
         comment = draw(st.sampled_from(["", f"  # {literal}", '  # """' + ".a" * 20]))
-        lines.append(f"{key} = {draw(st.sampled_from(values))}{comment}\n")
+        lines.append(f"{key} = {draw(st.sampled_from(given))}{comment}\n")
         most = max(most, len(parts))
     return "".join(lines), most
 
@@ -96,12 +99,12 @@ def documents(draw):
 def test_only_keys_of_many_parts_are_refused(document):
     """Whatever stands in strings and comments; the parser says what a text is."""
     text, most = document
-    values = tomllib.loads(text)
+    known = tomllib.loads(text)
     if most > tomlfile.MAX_DEPTH:
         with pytest.raises(SkinError, match=LONG_KEY):
             tomlfile.parse(text.encode(), "x", SkinError)
     else:
-        assert tomlfile.parse(text.encode(), "x", SkinError) == values
+        assert tomlfile.parse(text.encode(), "x", SkinError) == known
 
 
 def test_the_longest_key_is_read():
@@ -323,7 +326,7 @@ def test_a_packed_array_is_unpacked_to_its_limit(tmp_path, packing):
         file.write(data.getvalue())
         for _ in range(100):
             file.write(bytes(10**6))
-    with Cost() as cost, pytest.raises(SurfaceError, match="^[^\n]*(the limit is 98304, split it|numpy does not use)"):
+    with Cost() as cost, pytest.raises(SurfaceError, match=r"^[^\n]*(the limit is 98304, split it|numpy does not use)"):
         Mesh.load(path)
     assert cost.peak < 20e6
 
@@ -366,3 +369,27 @@ def test_folds_of_very_many_steps_are_refused(tmp_path):
     with Cost() as cost, pytest.raises(BodyError, match="200,000 steps of angles; the limit is 10,000"):
         Folds.load(path)
     assert cost.peak < 300e6
+
+
+def test_the_page_on_security_states_these_limits():
+    page = (Path(__file__).resolve().parents[2] / "SECURITY.md").read_text(encoding="utf-8")
+    rows = {line.split("|")[1].strip(): line for line in page.splitlines() if line.startswith("| ")}
+    for row, numbers in {
+        "Any TOML": (tomlfile.MAX_BYTES // 10**6, tomlfile.MAX_DEPTH),
+        "Skin files of several sheets": (MOST_SHEETS,),
+        "Robot": (mcap_part.MAX_LINKS, mcap_part.MAX_NAME),
+        "URDF": (urdf.MAX_BYTES // 10**6, xmlfile.MAX_ELEMENTS, urdf.MAX_LINKS),
+        "Mesh of a robot": (mesh_file.MAX_BYTES // 10**6, mesh_file.MAX_TRIANGLES),
+        "Recording (MCAP)": (
+            *(mcap_records.LARGEST >> 20, mcap_records.UNPACKED >> 20, mcap_records.FREE >> 10, mcap_records.RATIO),
+            *(mcap_part.MAX_LINKS, mcap_part.MAX_NAME, mcap_part.MAX_TEXTS),
+        ),
+        "Frames": (array_file.MAX_BYTES >> 30,),
+        "Table of a surface": (mesh.MAX_BYTES,),
+        "Folds of a cover": (folds.MAX_BYTES // 10**6, folds.MAX_STEPS),
+        "JSON of `contactfpga haptics`": (reading.MAX_BYTES // 10**6, reading.MAX_CONTACTS, reading.MAX_UNITS),
+        "Names and values": (values.MAX_SHOWN, values.MAX_MESSAGE),
+    }.items():
+        (line,) = [line for name, line in rows.items() if name.startswith(row)]
+        for number in numbers:
+            assert f" {number:,}" in line, (row, number)

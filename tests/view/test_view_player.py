@@ -1,8 +1,11 @@
 """Recordings in the view: a file of bytes is played, led to any moment, paused, and counted."""
 
 import pytest
+from model_board import ModelBoard
 
 import contactfpga
+from contactfpga import Skin, cli
+from contactfpga.console import reading
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.view import opening, replayed
 from contactfpga.view import player as playing
@@ -124,3 +127,19 @@ def test_a_link_of_bytes_alone_is_refused(tmp_path, name, link):
     path.write_bytes(b"nothing")
     with pytest.raises(ContactFPGAError, match=r"holds one board; --link is for files of `contactfpga record`$"):
         replayed.load(name.format(path), link)
+
+
+def test_a_long_recording_says_how_far_it_is_read(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    board = ModelBoard(Skin())
+    data = board.hello() + b"".join(board.frame() for _ in range(3000))
+    (tmp_path / "long.rec").write_bytes(data)
+    for soon_s, lines in ((60.0, 0), (0.0, 2)):
+        monkeypatch.setattr(reading, "SOON_S", soon_s)
+        monkeypatch.setattr(reading, "LINES_S", 0.0)
+        assert cli.main(["plot", "long.rec"]) == 0
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) >= lines
+        assert bool(said) == bool(lines)
+        assert all(one.startswith("Reading long.rec: 0 of 0 MB") for one in said)

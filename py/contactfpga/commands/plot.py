@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from contactfpga.console import outputs, terminal
+from contactfpga.console import outputs, reading, terminal
 
 HELP = "Draw a recording: where, when and how large it was touched."
 EXTRA = "view"
@@ -27,7 +27,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.view import plot, replayed
 
-    recording = replayed.load(args.recording, args.link)
+    with reading.told(args.recording) as tell:
+        recording = replayed.load(args.recording, args.link, reading=tell)
     path = Path(args.output or f"{Path(args.recording).stem}.png")
     if path.suffix.lower() not in ENDINGS:
         raise ValueError(f"--output is {str(path)!r}; it must end in {' or '.join(ENDINGS)}")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 
-from contactfpga.console import flags, interrupt, numbers, terminal
+from contactfpga.console import flags, interrupt, numbers, reading, terminal
 
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
@@ -41,8 +42,11 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.view import opening
     from contactfpga.view.player import Player
 
-    named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units)
-    with opening.opened(named, args.host, args.http_port) as shown, interrupt.usual_end():
+    with contextlib.ExitStack() as stack:
+        with reading.told(args.port or "") as tell:
+            named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
+            shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
+        stack.enter_context(interrupt.usual_end())
         terminal.say(f"Open {shown.url}")
         can = "see the recording" if isinstance(shown.source, Player) else "read and press"
         terminal.say(f"Whoever has this address can {can}. Ctrl-C ends it.", hang=2)

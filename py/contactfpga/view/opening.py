@@ -26,7 +26,7 @@ from contactfpga.view.fingers import Hand
 from contactfpga.view.guard import Guard
 from contactfpga.view.player import Player
 from contactfpga.view.recorded_body import BodyPlayer, holds_robot
-from contactfpga.view.replayed import LinkRecording, is_recording, load
+from contactfpga.view.replayed import LinkRecording, Reading, is_recording, load, silent
 from contactfpga.view.sources import BoardSource, Source
 
 if TYPE_CHECKING:
@@ -64,6 +64,8 @@ class Named:
     """Of a recording of several boards."""
     units: str | Path | None = None
     """File of the pressure units; by default what ``sim://`` names."""
+    reading: Reading = silent
+    """Told how far a recording is read that has no index."""
 
 
 @contextlib.contextmanager
@@ -111,7 +113,7 @@ def _source(named: Named) -> tuple[Source | BodySource | BodyPlayer, Hand | None
     if names_robot(named.port):
         return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):
-        recorded = load(named.port, named.link, named.timeout)
+        recorded = load(named.port, named.link, named.timeout, named.reading)
         if isinstance(recorded, LinkRecording) and not recorded.named and holds_robot(recorded.recording):
             return BodyPlayer(recorded.recording), None
         return Player(recorded), None

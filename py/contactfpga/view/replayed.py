@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -40,13 +40,22 @@ class Recorded(Protocol):
         Nothing where times of arrival are not in the file."""
 
 
+Reading = Callable[[int, int], object]
+"""Takes the bytes that have been read of a file, and those in it."""
+
+
+def silent(done: int, of: int) -> None:
+    """Tells nobody."""
+
+
 def is_recording(name: str) -> bool:
     """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
     return name.startswith(recording.SCHEME) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
-def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
-    """A recording by its path, or by ``replay://FILE``; ``link``: of several in the file.
+def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Reading = silent) -> Recorded:
+    """A recording by its path, or by ``replay://FILE``; ``link``: of several in the file. ``reading``: told how far a
+    file is read that has no index.
 
     Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file where
     ``[record]`` is absent.
@@ -57,7 +66,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0) -> Recorded:
     if not _is_mcap(asked.path):
         if link is not None:
             raise ContactFPGAError(f"{asked.path} holds one board; --link is for files of `contactfpga record`")
-        return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout)
+        return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout, reading)
     from contactfpga.recordings import Recording
 
     return LinkRecording(Recording(asked.path), link)
@@ -97,12 +106,16 @@ class _Piece:
 class ByteRecording:
     """What ``contactfpga zones --record FILE`` writes: ``replay://FILE``."""
 
-    def __init__(self, port: str, timeout: float = 1.0):
+    def __init__(self, port: str, timeout: float = 1.0, reading: Reading = silent):
         self.title = self.port = port
         self._timeout = timeout
+        self._pieces: list[_Piece] = []
         with self._opened() as board:
             self.sheet: Sheet = board.sheet
-            self._pieces = list(_pieces(board))
+            size = recording.parse(port).path.stat().st_size
+            for piece in _pieces(board):
+                self._pieces.append(piece)
+                reading(board.stats.bytes, size)
         if not self._pieces:
             raise ContactFPGAError(f"{port} holds no frame that can be shown")
 
