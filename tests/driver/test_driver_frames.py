@@ -41,6 +41,24 @@ def test_iteration_gives_every_frame_in_order_and_counts_what_is_missing(board):
         assert opened.stats.frames == 5
 
 
+def test_next_with_no_timeout_takes_what_waits(board):
+    with contactfpga.open(board.path, timeout=LONG) as opened:
+        assert opened.next(0).sequence == 1
+        for _ in range(2):
+            with pytest.raises(contactfpga.ReadTimeout, match=r": no frame waits$") as caught:
+                opened.next(timeout=0)
+            assert type(caught.value) is contactfpga.ReadTimeout, "nothing is said of the board"
+        sent = board.sent
+        board.send(b"".join(board.frame() for _ in range(3)))
+        wait_until(lambda: opened.stats.frames == sent + 3)
+        assert [opened.next(0).sequence, opened.latest(0).sequence] == [sent, sent + 2]
+        for call in (opened.read, opened.batch):
+            with pytest.raises(ValueError, match="timeout is 0; it must be a positive number of seconds"):
+                call(timeout=0)
+    with pytest.raises(contactfpga.BoardClosed):
+        opened.next(0)
+
+
 def test_latest_is_the_newest_of_those_that_wait(board):
     with contactfpga.open(board.path, timeout=LONG) as opened:
         sent = board.sent

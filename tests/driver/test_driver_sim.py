@@ -1,6 +1,7 @@
 """The driver and the gateware itself: simulated behind sim://, and in real time behind a pseudo-terminal."""
 
 import collections
+import contextlib
 import functools
 import itertools
 import threading
@@ -122,6 +123,23 @@ def test_what_a_function_raises_comes_out_of_the_call_that_waits(call):
         for _ in range(2):
             with pytest.raises(RuntimeError, match="the finger slipped"):
                 forever(getattr(opened, call))
+
+
+def test_who_polls_a_simulated_board_lets_its_time_pass():
+    with contactfpga.open("sim://?scene=moving") as opened:
+        opened.next()
+        found = []
+        for _ in range(5000):
+            with contextlib.suppress(contactfpga.ReadTimeout):
+                found.append(opened.next(0))
+        assert 0 < len(found) < 1000
+
+
+def test_a_skin_beside_the_address_of_a_virtual_board_says_where_to_put_it():
+    with pytest.raises(
+        contactfpga.SkinMismatch, match=r"built from the Skin that its address names: sim://\?skin=FILE$"
+    ):
+        contactfpga.open("sim://", contactfpga.Skin(rows=8))
 
 
 @pytest.mark.timeout(60)

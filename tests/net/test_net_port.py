@@ -3,6 +3,7 @@
 import binascii
 import itertools
 import random
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -14,6 +15,12 @@ from contactfpga.net.message import BREAK_S, MOST_BYTES, Message
 zenoh = pytest.importorskip("zenoh")
 
 KEY = "contactfpga/left"
+
+
+def test_a_missing_extra_is_one_here_too(monkeypatch):
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    with pytest.raises(contactfpga.MissingExtra, match=r"pip install '\.\[net\]'"):
+        contactfpga.open(f"zenoh://{KEY}")
 
 
 class Network:

@@ -174,7 +174,8 @@ class Board:
         return zones
 
     def next(self, timeout: float = 1.0) -> Zones:
-        """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`.
+        """The next frame, in order. Raises as :meth:`read` does, and :class:`ReplayEnded`. With ``timeout=0`` a frame
+        that waits, or :class:`ReadTimeout` at once.
 
         At most 16,384 frames wait to be taken; beyond that, the oldest are dropped and counted in ``stats.dropped``.
         """

@@ -14,7 +14,7 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.recording import FileTap, Opening, Tap
 from contactfpga.driver.subscription import checked
 from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
-from contactfpga.errors import BoardClosed, PortLost
+from contactfpga.errors import BoardClosed, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin, limits
 from contactfpga.zones.zone import Zones
@@ -75,8 +75,11 @@ def open(
         raise
     try:
         board.greet(timeout)
-    except BaseException:
+    except BaseException as error:
         board.close()
+        if isinstance(error, SkinMismatch) and board.port.startswith("sim:"):
+            step = "a virtual board is built from the Skin that its address names: sim://?skin=FILE"
+            raise SkinMismatch(f"{error}; {step}") from None
         raise
     return board
 

@@ -22,6 +22,9 @@ from contactfpga.zones.zone import Zones
 
 Item = TypeVar("Item")
 
+POLL_S = 1e-9
+"""How long a timeout of 0 waits: simulated time passes only while one waits, and a recording is read only then."""
+
 
 class Listening(Generic[Item]):
     """What :class:`Subscription` and :class:`Events` have in common."""
@@ -52,13 +55,16 @@ class Listening(Generic[Item]):
 
     def next(self, timeout: float = 1.0) -> Item:
         """What comes next, in order. Errors as for :meth:`Board.next`; silence as the class describes."""
-        timeout = checked(timeout)
+        polled = is_finite(timeout) and timeout == 0
+        timeout = POLL_S if polled else checked(timeout)
         now = self._link.clock()
         silent_at = self._silent_at()
         try:
             found = self._link.wait_for(self._pop, min(now + timeout, silent_at), timeout)
         except ReadTimeout:
             if now + timeout < silent_at:
+                if polled:
+                    raise ReadTimeout(f"{self._link.transport.name}: no frame waits") from None
                 raise
             self._noticed = self._link.clock()
             return self._silent(self._silence())

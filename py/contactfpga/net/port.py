@@ -8,7 +8,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from contactfpga.errors import ContactFPGAError, PortLost, PortNotFound, VersionMismatch
+from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, VersionMismatch
 from contactfpga.net import session
 from contactfpga.net.address import parse
 from contactfpga.net.message import QUIET_S, VERSION, Counters, Stream, refused, token
@@ -40,6 +40,8 @@ class ZenohPort:
         self._asks: zenoh.Publisher | None = None
         try:
             self._session = session.connected(address.connect, address.config)
+        except MissingExtra:
+            raise
         except ContactFPGAError as error:
             raise PortNotFound(f"{name}: {error}") from None
         try:
