@@ -67,7 +67,7 @@ def test_a_command_listens_before_it_loads_numpy(tmp_path):
 
 @linux
 @pytest.mark.parametrize("name", [*CUT_SHORT, *RUNNING])
-@pytest.mark.parametrize("seed", sample(range(60), quick=range(2), slow=range(2, 8)))
+@pytest.mark.parametrize("seed", sample(range(60), quick=range(1), slow=range(1, 8)))
 def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
     rng = random.Random(f"{name} {seed}")
     number = rng.choice(SIGNALS)

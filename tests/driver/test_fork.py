@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from fake_board import FakeBoard
+from sample import sample
 from terminals import environment
 from two_links import write_robot
 
@@ -157,7 +158,7 @@ print(child(work), len(own.read()))
         assert run(program, board.path, second.path) == "0 1\n"
 
 
-@pytest.mark.parametrize("how", ["Process", "Pool"])
+@pytest.mark.parametrize("how", sample(["Process", "Pool"], quick=["Process"], slow=["Pool"]))
 def test_children_of_multiprocessing(board, how):
     program = """
 import multiprocessing
@@ -222,6 +223,7 @@ with contactfpga.open(f"replay://{port}") as board:
     assert run(program, file) == "0 True\n"
 
 
+@pytest.mark.slow
 def test_sheets_of_one_port_in_a_child():
     program = """
 from contactfpga.driver import sheets
@@ -232,6 +234,7 @@ board.read()
     assert run(program, "") == "0 1\n"
 
 
+@pytest.mark.slow
 def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
     pytest.importorskip("mcap", reason="the extra `record` is not installed")
     program = """
@@ -249,6 +252,7 @@ Recording(sys.argv[2])
     assert run(program, board.path, tmp_path / "session.mcap") == "{0} True\n"
 
 
+@pytest.mark.slow
 def test_a_body_in_a_child_is_closed(tmp_path):
     program = """
 from two_links import Plugged
@@ -271,6 +275,7 @@ body.close()
     assert run(program, write_robot(tmp_path)) == "{0}\n"
 
 
+@pytest.mark.slow
 def test_a_reader_over_a_network_in_a_child(board):
     pytest.importorskip("zenoh", reason="the extra `net` is not installed")
     from net_processes import free_endpoint, publish

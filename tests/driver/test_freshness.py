@@ -83,6 +83,34 @@ def test_a_board_that_was_restarted_is_asked_anew():
         assert board.stats.restarts == 10
 
 
+def test_the_logger_tells_of_the_board_its_restarts_and_losses(caplog):
+    caplog.set_level("INFO", "contactfpga")
+    world = World(SKIN)
+    with contactfpga.open(world) as board:
+        poll(world, board, [0.1] * 20)
+        assert [record.levelname for record in caplog.records] == ["INFO"]
+        assert "the board has a 16x16 Skin (fingerprint" in caplog.text
+        caplog.clear()
+        world.restart()
+        while world.board.sent < 300:
+            board.next()
+        world.lose = 1.0
+        world.pause(10_000)
+        world.lose = 0.0
+        while board.stats.lost == 0:
+            board.next()
+        world.pause(1_200_000)
+        board.latest()
+        told = [(record.levelname, record.getMessage()) for record in caplog.records]
+        lost = board.stats.lost
+    port = board.port
+    assert lost > 0
+    assert told == [
+        ("WARNING", f"{port}: the board was restarted"),
+        ("WARNING", f"{port}: {lost} frames were lost, {lost} since the port was opened"),
+    ]
+
+
 # ---- the numbers
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import threading
 import weakref
@@ -19,8 +20,14 @@ from contactfpga.errors import BoardClosed, ContactFPGAError, NoSuchCommand, Rea
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.hello import Hello
+from contactfpga.wire.mismatch import describe
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
+
+LOG = logging.getLogger("contactfpga")
+"""Says at a board's hellos, twice per second at most, which board it is, that it was restarted, and how many frames
+were lost. Silent unless the program sets up logging."""
+LOG.addHandler(logging.NullHandler())
 
 TURN_S = 0.05
 """How often the reader checks whether the board was closed."""
@@ -83,6 +90,7 @@ class Link:
         self._turning: int | None = None  # the thread that reads
         self._writing: int | None = None  # the thread that writes
         self._closers = 0  # threads that wait in :meth:`close`
+        self._logged: tuple[int, int] | None = None  # restarts and lost frames; None: not even the first hello
         self._inherited = False
         forks.watch(self)
 
@@ -270,6 +278,7 @@ class Link:
 
     def _pass_on(self, event: Event | Run) -> None:
         if isinstance(event, Hello):
+            self._log(event)
             return
         item = event.zones if isinstance(event, Arrival) else event
         between = isinstance(item, Told)
@@ -290,6 +299,17 @@ class Link:
             elif isinstance(event, ContactFPGAError) and self.conversation.sheet is None:
                 # Another Skin that can be read is no trouble for a new frame.
                 waiter.found = event
+
+    def _log(self, hello: Hello) -> None:
+        name, stats = self.transport.name, self.conversation.stats
+        if self._logged is None:
+            LOG.info("%s: the board has %s", name, describe(hello))
+        restarts, lost = self._logged or (0, 0)
+        if stats.restarts > restarts:
+            LOG.warning("%s: the board was restarted", name)
+        if stats.lost > lost:
+            LOG.warning("%s: %d frames were lost, %d since the port was opened", name, stats.lost - lost, stats.lost)
+        self._logged = stats.restarts, stats.lost
 
     def _send(self) -> None:
         """Write what has to be sent, in the order in which the conversation made it: one thread writes at a time, and
