@@ -155,7 +155,7 @@ def test_what_ends_a_program_closes_the_file(tmp_path, number):
 
 def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
     """A limit on the size of files stands for it."""
-    limit = 20_000
+    limit = 40_000
 
     def limited():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
