@@ -156,7 +156,7 @@ def soon(monkeypatch):
 
 
 KINDS = [
-    {"mask": ((0, 1), (1, 1), (2, 1)), "diodes": "row2col"},
+    {"mask": ((0, 1), (1, 1), (2, 1)), "diodes": "row2col", "precharge_us": 1.2},
     {"send": "always", "debounce": "sym_defer_pk", "debounce_press_us": 7.0, "debounce_release_us": 12.0},
     {"guard": True, "fail_safe": True, "alive": True},
     {"guard": True, "send": "always", "diodes": "row2col", "self_test": True, "project_us": 0.05, "precharge_us": 1.2},

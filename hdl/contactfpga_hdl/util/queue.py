@@ -23,7 +23,6 @@ class Queue(wiring.Component):
         m = Module()
         m.submodules.storage = storage = memory.Memory(shape=self.width, depth=self.depth, init=[])
         read, write = storage.read_port(), storage.write_port()
-        fetches = Signal()
         put = Signal(range(self.depth))
         taken = Signal(range(self.depth))
         fetches = Signal()

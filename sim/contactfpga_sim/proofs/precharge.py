@@ -72,15 +72,18 @@ def let_go(proof: Proof) -> None:
     Claimed: columns are driven a clock after they shall be, but for those that are masked in every row, and those that
     are stuck: they read pressed in each sample of a window, of four that are two clocks apart and all between them. A
     stuck column is driven throughout the first window that begins after a turn, and then it is stuck if it read pressed
-    throughout that, too.
+    throughout that, too. A guard column that reads pressed in a check is not driven until a turn.
     """
     m = proof.m
-    dut = Precharge(Skin(rows=2, columns=3, precharge_us=1, settle_us=20, mask=((0, 1), (1, 1))))
+    skin = reversal_of("col2row").replace(columns=3, guard=True)
+    dut = Precharge(skin)
     dut.apart_bits = 1  # in place of 4 or more, so that bugs show soon
     inside = proof.put(dut)
     drive, turn = proof.free(1, "drive"), proof.free(1, "turn")
     columns, looks = proof.free(3, "columns"), proof.free(1, "looks")
+    pressed, guard = proof.free(1, "guard_pressed"), Signal()
     m.d.comb += [dut.drive.eq(drive), dut.turn.eq(turn), dut.columns.eq(columns), dut.looks.eq(looks)]
+    m.d.comb += dut.guard_pressed.eq(pressed)
     apart, parts = Signal(), Signal(range(LOOKS))  # a clock without a look, or a look, was; parts that are over
     released = Signal(3)  # columns that read so in this window
     stuck = Signal(3)
@@ -88,21 +91,24 @@ def let_go(proof: Proof) -> None:
     tries = Signal()
     ends = Signal()
     m.d.comb += ends.eq(looks & apart & (parts == LOOKS - 1))
+    turns = turn != proof.before(turn)
     now = (released | Mux(looks, ~columns, 0))[:3]
     m.d.sync += [
         apart.eq(~(looks & apart)),
         parts.eq(parts + (looks & apart)),
         released.eq(Mux(ends, 0, now)),
-        asked.eq((turn != proof.before(turn)) | asked & ~ends),
+        asked.eq(turns | asked & ~ends),
+        guard.eq(~turns & (guard | pressed)),
     ]
     with m.If(ends):
         m.d.sync += [tries.eq(asked), stuck.eq(~now | Mux(tries, 0, stuck))]
-    proof.claim(dut.held == stuck & 0b101)
-    let_go = stuck & ~tries.replicate(3)
-    proof.claim(dut.pins == Mux(proof.before(drive), ~proof.before(let_go) & 0b101, 0))
+    proof.claim(dut.held == Cat(stuck & 0b101, guard))
+    let_go = Cat(stuck & ~tries.replicate(3), guard)
+    proof.claim(dut.pins == Mux(proof.before(drive), ~proof.before(let_go) & 0b1101, 0))
     proof.lemma(inside["before"] == proof.before(turn))
     proof.lemma(inside["count"] == Cat(apart, parts))
     proof.lemma((inside["low"] == ~released) & (inside["stuck"] == stuck & 0b101))
+    proof.lemma(inside["guard_stuck"] == guard)
     proof.lemma((inside["asked"] == asked) & (inside["tries"] == tries))
 
 
@@ -222,6 +228,9 @@ _LET_GO_BUGS = (
     Bug("samples are together", Precharge, "count",
         lambda count, inside: Mux(inside.component.looks, count + 1, count)),
     Bug("only the last sample counts", Precharge, "low", lambda *_: -1),
+    Bug("a guard column for good", Precharge, "guard_stuck", lambda stuck, inside: stuck | inside["guard_stuck"]),
+    Bug("a guard column that is found as it is retried", Precharge, "guard_stuck",
+        lambda stuck, inside: stuck | inside.component.guard_pressed),
 )  # fmt: skip
 _KEPT_BUGS = (
     Bug("only the last sample counts", Precharge, "low", lambda *_: -1),
