@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,45 +15,61 @@ from contactfpga_sim.mutants.stimuli import Stimulus
 
 def quick(several: Several) -> Iterator[Stimulus]:
     """Cells that come and go at any time; requests of each sheet, of one that is not there and of none, damaged ones,
-    and hellos one after the other."""
+    and hellos one after the other. Then sheets at rest, and so few hellos that these tell of more frames than a digit
+    can."""
     for seed in range(3):
         yield _random(several, seed, 40_000)
+    yield _rare(several, 400_000)
 
 
 def thorough(several: Several) -> Iterator[Stimulus]:
-    """The same for longer, and until hellos come unasked."""
+    """The same for longer: ten seconds, with hellos that come unasked and counters that reach their high digits."""
     for seed in range(3, 7):
         yield _random(several, seed, 120_000)
-    yield _random(several, 7, several.clock_hz * 6 // 10)
+    yield _rare(several, 10 * several.clock_hz)
 
 
 def _random(several: Several, seed: int, cycles: int) -> Stimulus:
     rng = np.random.default_rng([seed, 43])
-    received = _asked(several, rng, cycles)
+    gaps = [0, 1, 300, *rng.integers(8_000, size=3)]
+    return _stimulus(several, f"random {seed}", cycles, 6 * facts(several.skins[0]).scan_clocks, gaps, rng)
+
+
+def _rare(several: Several, cycles: int) -> Stimulus:
+    rng = np.random.default_rng(47)
+    return _stimulus(several, "at rest", cycles, 40_000, [30_000, 60_000], rng)
+
+
+def _stimulus(
+    several: Several, name: str, cycles: int, most: int, gaps: Sequence[int], rng: np.random.Generator
+) -> Stimulus:
+    """Cells of each sheet change after ``most`` cycles at most, and requests come with these gaps."""
+    received = _asked(several, gaps, rng, cycles)
     timelines = []
     for skin in several.skins:
-        starts = np.cumsum(rng.integers(1, 6 * facts(skin).scan_clocks, size=cycles // 100))
+        starts = np.cumsum(rng.integers(1, most, size=2 * cycles // most + 10))
         shape = (skin.rows, skin.columns)
-        starts = starts[starts < cycles].tolist()
-        pieces = [(start, rng.random(shape) < rng.choice([0, 0.1, 0.5]), None) for start in starts]
+        pieces = [
+            (start, rng.random(shape) < rng.choice([0, 0.1, 0.5]), None) for start in starts[starts < cycles].tolist()
+        ]
         timelines.append(Timeline(pieces, received))
-    return Stimulus(f"random {seed}", timelines[0], cycles, others=timelines[1:])
+    return Stimulus(name, timelines[0], cycles, others=timelines[1:])
 
 
-def _asked(several: Several, rng: np.random.Generator, cycles: int) -> list[tuple[int, bytes]]:
-    """Requests at any time after the first hellos, some in a row."""
+def _asked(several: Several, gaps: Sequence[int], rng: np.random.Generator, cycles: int) -> list[tuple[int, bytes]]:
+    """Requests of any number at any time after the first hellos, some in a row."""
     sheets, bit_clocks = len(several.skins), facts(several.skins[0]).bit_clocks
     sent: list[tuple[int, bytes]] = []
-    start, number = 600, 129 * 128 + 1
+    start = 600
     while True:
         of = int(rng.integers(-1, sheets + 1))
         closing = b"" if of < 0 else bytes([2, 0xB0 + of])
+        number = 8 * int(rng.integers(1 << 18)) + int(rng.integers(1, 8))
         data = bytearray(request(number, bool(rng.random() < 0.3), bit_clocks, closing))
         if rng.random() < 0.3:
             data[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
-        start += int(rng.choice([0, 1, 300, int(rng.integers(8_000))]))
+        start += int(rng.choice(gaps))
         if start + 10 * bit_clocks * len(data) >= cycles:
             return sent
         sent.append((start, bytes(data)))
         start += 10 * bit_clocks * len(data)
-        number += 2 if number % 8 == 7 else 1
