@@ -18,7 +18,7 @@ from contactfpga.skin.derived import Derived
 from contactfpga.skin.limits import MIN_AROUND
 from contactfpga.skin.sheet import max_zones
 from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import command, request
+from contactfpga_sim.golden.request import KIND, command, request
 from contactfpga_sim.golden.trace import Timeline
 
 Pair = tuple[int, int, int, int]
@@ -260,7 +260,8 @@ def _packet(skin: Skin, rng: np.random.Generator) -> bytes:
         case "cut":
             data = data[: int(rng.integers(1, len(data)))]
         case "kind":
-            data[5] = 0x61
+            kinds = [kind for kind in range(1, 16) if kind != KIND]
+            data = bytearray(request(number, hello, facts(skin).bit_clocks, kind=int(rng.choice(kinds))))
         case "bytes":
             data = bytearray(rng.choice([0, 5, 0x51, 0x81, 0xFF], size=int(rng.integers(1, 13))).astype(np.uint8))
     return bytes(data)

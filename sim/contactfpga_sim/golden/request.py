@@ -40,12 +40,12 @@ class Heard:
         return self.numbers[index - 1][1] if index else 0
 
 
-def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"") -> bytes:
+def request(number: int, hello: bool = False, bit_clocks: int = 4, closing: bytes = b"", kind: int = KIND) -> bytes:
     """A request as on the wire, with a delimiter at either end, for a board with ``bit_clocks`` per bit.
 
-    ``closing``: that of the sheet, among several ones, that it is for.
+    ``closing``: that of the sheet, among several ones, that it is for. Of another ``kind`` it is none.
     """
-    return _sent(_digits(number, 3) + bytes([KIND << 4 | hello]), bit_clocks, closing)
+    return _sent(_digits(number, 3) + bytes([kind << 4 | hello]), bit_clocks, closing)
 
 
 def command(number: int, what: int, value: int = 0, hello: bool = False, bit_clocks: int = 4) -> bytes:
