@@ -42,6 +42,30 @@ FAULTS = {
         "Mux(first & (self.sum == 0), 0, totals[0])",
         (f"{GATEWARE}/test_units.py::test_readings_and_thresholds_are_the_golden_models_in_every_clock",),
     ),
+    "a column is let go for one sample": Fault(
+        "scan/precharge.py",
+        "low & self.columns | kept",
+        "self.columns | kept",
+        (f"{GATEWARE}/test_wrong_readings.py::test_at_rest_a_wrong_reading_delays_contact_by_no_more_than_it_lasts",),
+    ),
+    "a stuck column is never tried": Fault(
+        "scan/precharge.py",
+        "tries.eq(asked)",
+        "tries.eq(0)",
+        (f"{GATEWARE}/test_reversal_scanner.py::test_a_stuck_column_is_told_and_not_driven_until_it_is_tried",),
+    ),
+    "a try ends too soon": Fault(
+        "scan/precharge.py",
+        "count.eq(count + (self.looks | ~count[: self.apart_bits].all()))",
+        "count.eq(Mux(turns, 60, count + (self.looks | ~count[: self.apart_bits].all())))",
+        (f"{GATEWARE}/test_wrong_readings.py::test_random_histories_are_the_golden_models_in_every_clock",),
+    ),
+    "contact of several sheets is a gate": Fault(
+        "several.py",
+        "m.d.sync += self.contact.eq(",
+        "m.d.comb += self.contact.eq(",
+        (f"{GATEWARE}/test_output_pins.py::test_each_pin_of_several_sheets_comes_from_a_register",),
+    ),
     "a test keeps the finding of the one before": Fault(
         "scan/self_test.py",
         "found.eq(bad | found & ~first)",
