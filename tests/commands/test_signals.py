@@ -80,7 +80,9 @@ def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
     if ended:
         return
     assert_quiet(errors)
-    at_their_end = {0, 1, 2} if name in ("doctor", "plot", "cover") else {0} if name in RUNNING else set()
+    at_their_end = {0} if name in RUNNING else set()
+    if name in ("doctor", "plot", "cover"):
+        at_their_end = {0, 1, 2, -number}  # Python takes its handlers away before it ends
     assert process.returncode in {STATUSES[number]} | at_their_end, errors
 
 
@@ -140,7 +142,7 @@ def body():
 def test_a_signal_that_others_make_something_of(how, number):
     program = STARTS.replace("WORK", BROKEN[how]).replace("NUMBER", str(int(number)))
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment()
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=25, env=environment()
     )
     assert (done.returncode, done.stderr) == (STATUSES[number], "")
 

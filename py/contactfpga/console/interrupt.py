@@ -123,9 +123,17 @@ def _again(what: sys.UnraisableHookArgs) -> None:
     if _came is None or not issubclass(what.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(what)
         return
-    timer = threading.Timer(AGAIN_S, _thread.interrupt_main, (_came,))
+    timer = threading.Timer(AGAIN_S, _send, (_came,))
     timer.daemon = True
     timer.start()
+
+
+def _send(number: int) -> None:
+    """To the main thread, also where that sleeps."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:  # Windows
+        _thread.interrupt_main(number)
 
 
 def silence_amaranth() -> None:
