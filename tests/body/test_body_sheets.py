@@ -31,6 +31,7 @@ def test_two_links_share_a_port(tmp_path):
     assert found == {"chest": ("ok", 1), "back": ("ok", 1)}
 
 
+@pytest.mark.slow
 def test_one_publisher_has_both_sheets():
     pytest.importorskip("zenoh")
     endpoint = free_endpoint()

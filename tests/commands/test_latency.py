@@ -57,6 +57,7 @@ def test_the_figures_are_told_in_words(run):
         assert title in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", ["1x1", "16x16"])
 def test_the_smallest_and_the_largest_contact(run, cells):
     status, out, _ = run("--skin", FILE, "--cells", cells, "--touches", "1", "--json")

@@ -70,6 +70,7 @@ def test_the_image_is_what_the_circuit_predicts(capsys):
     assert 1.3 * longest_us <= answer["proposal"]["settle_us"] < 1.3 * longest_us + 0.011
 
 
+@pytest.mark.slow
 def test_the_image_in_a_terminal(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:

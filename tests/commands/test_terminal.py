@@ -77,7 +77,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
         assert cell_len(line.rstrip()) <= columns or str(files) in line or "sim://" in line, line
 
 
-@pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "replay", "an error"]))
+@pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "an error"], slow=["replay"]))
 def test_no_character_ends_a_command(name, files):
     command = [sys.executable, "-m", "contactfpga.cli", *named(name, files)]
     result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)

@@ -109,6 +109,7 @@ def scene(tmp_path_factory):
     return folder / "skin.toml", folder / "cells.npy", cells
 
 
+@pytest.mark.slow
 def test_read_zones_needs_no_skin_and_gives_what_scipy_says_rounded(scene):
     skin, frames, cells = scene
     zones = contactfpga.read_zones(f"sim://?scene={frames}&skin={skin}")

@@ -83,6 +83,7 @@ def test_covering_set_holds_every_pair_of_choices():
     assert len(COVERING) <= 2 * 7 * 4
 
 
+@pytest.mark.slow
 def test_reference_skin_in_amaranths_simulator():
     expected, got = reference_run()
     assert compare(expected, got) > 1_800
@@ -193,6 +194,7 @@ def test_hello_comes_again_after_half_a_second():
     assert len(decoded(bytes(value for _, value in trace.bytes), skin)[1]) == 2
 
 
+@pytest.mark.slow
 def test_sequence_counts_past_255_frames():
     skin, trace = half_a_second()
     numbers = [frame.sequence for frame in decoded(bytes(value for _, value in trace.bytes), skin)[0]]

@@ -104,6 +104,7 @@ def test_the_chart_draws_it(tmp_path):
     assert "toy" in (tmp_path / "chart.svg").read_text()
 
 
+@pytest.mark.slow
 def test_fit_tries_it(capsys):
     asked = ["fit", "bumper", "--labeller", "toy_labeller:TOY", "--labeller", "single", "--pitch-mm", "20"]
     cli.main(

@@ -93,6 +93,7 @@ def test_a_recording_is_never_written_over(tmp_path, link):
 # ---- the link of `contactfpga board`
 
 
+@pytest.mark.slow
 def test_the_link_is_removed_with_its_board(tmp_path):
     link = tmp_path / "port"
     board = PtyBoard(SLOW, link=link)

@@ -61,6 +61,7 @@ def test_a_timeout_on_sim_is_of_simulated_time(tmp_path):
         assert opened.next(0.1).time_us - answered.time_us == pytest.approx(100_000, abs=2 * 96)  # the keep-alive
 
 
+@pytest.mark.slow
 def test_simulated_board_loses_nothing():
     """By the frames, and by the gateware's own counters: at each hello the frames sent are those received."""
     with contactfpga.open("sim://?scene=moving") as opened:

@@ -98,6 +98,7 @@ def test_the_gateware_takes_a_row_time_more_than_active_rows():
 # ---- contact, masks, stuck columns, time
 
 
+@pytest.mark.slow
 def test_contact_rises_within_a_settle_time_and_four_clocks_of_any_touch():
     known = facts(TALL)
     with CompiledBoard(TALL, ("contact",)) as board:

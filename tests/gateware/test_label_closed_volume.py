@@ -67,6 +67,7 @@ def check_in_order(frames, connectivity, labeller):
     assert np.array_equal(got.cycle, handed[expected.frame, expected.row] + expected.clock)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rows", "columns", "connectivity", "labeller"),
     sample(
@@ -84,6 +85,7 @@ def test_every_small_frame(record_property, rows, columns, connectivity, labelle
 SIZES = [(8, 8), (9, 7), (12, 12), (16, 16), (20, 33), (32, 32), (64, 64)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "connectivity", "labeller"),
     sample(

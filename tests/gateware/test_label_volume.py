@@ -156,6 +156,7 @@ def test_random_frames_are_enough():
     assert sum(RANDOM[size] // (1 if labeller == "run" else 10) for size, _, labeller in run) >= 100_000
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("connectivity", [8, 4])
 @pytest.mark.parametrize(("gap", "stall"), sample([(0, 50), (50, 0), (30, 30), (10, 90)], quick=[(30, 30)]))

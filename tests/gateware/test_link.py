@@ -205,6 +205,7 @@ def test_a_hello_goes_out_at_start_every_half_second_and_when_asked_for(link, rn
         assert any(0 < begun - decided <= 3 + 2 * 90 for begun in hellos), "after one frame at most"
 
 
+@pytest.mark.slow
 def test_frames_sent_are_counted_past_the_digits_that_the_link_keeps(bench):
     """The carry into the odometer's digits, and its own carries: 2^14 frames are too many to simulate, so the counters
     begin just before."""

@@ -69,6 +69,7 @@ def test_both_pins_are_the_golden_models_in_every_clock(name, monkeypatch):
     assert expected.alive
 
 
+@pytest.mark.slow
 def test_alive_turns_every_ms_while_all_is_well_and_whatever_is_pressed():
     touches = Timeline([(100, ~NOTHING, None), (2_500, NOTHING, None)])
     trace = bench_native.run(GUARDED, touches, 5_002)

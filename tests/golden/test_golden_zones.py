@@ -135,6 +135,7 @@ def test_many_frames_at_once_agree_with_flood_fill_and_the_labellers_rule(shape,
         assert clocks[index] == max(final, default=0)
 
 
+@pytest.mark.slow
 def test_frames_beyond_one_portion_keep_their_places():
     rng = np.random.default_rng(5)
     few = random_frames(rng, (32, 32), 50)

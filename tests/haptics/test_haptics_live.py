@@ -77,6 +77,7 @@ def test_forces_of_two_contacts_come_through_gateware_and_driver():
     assert first.covariance_m2 == pytest.approx(np.diag([1e-4 / 12, 1e-4 / 12, 0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("second_s", "off_n"), [(0.03, 0.1), (0.01, 1.3)])
 def test_a_contact_that_was_alone_for_20_ms_is_where_its_center_of_pressure_was(second_s, off_n):
     """The sheet puts it at a switch, 4.2 mm off, of 38 mm: 12 N are split wrongly by 1.3 N."""

@@ -134,6 +134,7 @@ def test_mutants_of_several_sheets_are_told_from_the_golden_model_s_line():
     assert len(campaign.left_by(several, mutants, [next(sheets.quick(several))])) < 10
 
 
+@pytest.mark.slow
 def test_what_only_a_flip_can_reach_has_no_mutants(sample):
     assert not any("upset" in mutant.place for mutant in sample.all)
 

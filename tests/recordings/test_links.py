@@ -143,6 +143,7 @@ def test_all_links_of_a_robot_by_command(robot, tmp_path):
         np.testing.assert_allclose((zone.normal.x, zone.normal.y, zone.normal.z), normal)
 
 
+@pytest.mark.slow
 def test_four_links_are_those_that_a_program_reads(tmp_path):
     """A virtual board says the same whenever it is started: once recorded, once read."""
     pytest.importorskip("amaranth")

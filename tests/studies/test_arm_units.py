@@ -24,6 +24,7 @@ def test_units_share_a_push_by_its_place():
     assert (75 * top - 37.5 * (left + right)) * 0.02 / 30 == pytest.approx(85 - 75, abs=1.5)  # mm from the middle
 
 
+@pytest.mark.slow
 def test_a_force_threshold_reacts_where_no_switch_closes():
     result = run(HALFWAY, "force")
     outcome = result.outcome

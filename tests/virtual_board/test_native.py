@@ -69,6 +69,7 @@ def test_outputs_are_those_of_the_cycle_and_registers_follow(tmp_path, monkeypat
         total = (total + number + parity) & 0xFFFF
 
 
+@pytest.mark.slow
 def test_another_component_constant_or_driver_is_another_library(tmp_path, monkeypatch):
     monkeypatch.setenv("CONTACTFPGA_CACHE", str(tmp_path / "cache"))
     native.load(model(tmp_path, False))

@@ -53,6 +53,7 @@ def test_every_frame_comes_back_once_with_scipys_zones(record_property, shape, c
     record_property("cases", len(frames))
 
 
+@pytest.mark.slow
 def test_shapes_that_break_labellers(record_property):
     frames = np.stack([cells for _, cells in variants(16, 16)])
     assert_zones_are_scipys(frames, 8)
