@@ -137,8 +137,10 @@ def test_a_board_is_closed_at_any_moment(seed, threaded, monkeypatch):
     def close():
         for _ in range(rng.choice([0, 1, 10, 100, 600])):
             history.schedule.pause()
-        if rng.random() < 0.5:  # while one of them sends
-            history.schedule.pause(lambda: "write" in history.port.inside, history.world.clock() + 0.1)
+        steps = rng.choice([0, 3000])  # for which it waits until one of them sends; time passes only while all wait
+        while steps and "write" not in history.port.inside:
+            history.schedule.pause()
+            steps -= 1
         board.close()
         assert history.port.closed, "close returned before the port was given back"
 

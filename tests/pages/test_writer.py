@@ -60,7 +60,7 @@ def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch
         ("pages.figures", ["none.md"], "contactfpga: page is 'none.md'; there is no such page"),
         ("pages.cover_page", ["none.md", "."], "contactfpga: page is 'none.md'; there is no such page"),
         ("netlist.replay", ["icebreaker", "--skin", "none.toml"], "contactfpga: none.toml: No such file or directory"),
-        ("netlist.replay", ["icebreaker", "--skin", "bad.toml"], "contactfpga: rows is 0; it must lie between 1"),
+        ("netlist.replay", ["icebreaker", "--skin", "bad.toml"], "contactfpga: bad.toml: rows is 0; it must lie"),
         ("mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
         ("board.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
     ],

@@ -34,6 +34,7 @@ def test_the_command_writes_a_skin_that_loads_and_builds(file, tmp_path, capsys,
     monkeypatch.setattr(search, "CHECKED", 0)  # compiles a board
     built = []
     monkeypatch.setattr(size, "luts", lambda component, _: built.append(rtlil.convert(component())) or 423)
+    monkeypatch.setattr(size, "tools", lambda _: ())  # which may not be installed
     output = tmp_path / "my.toml"
     options = ["--pitch-mm", "20", "--labeller", "single", "--scan", "raster", "--placements", "73"]
     limits = ["--barycenter-mm", "none", "--miscounted", "10", "--missed", "10"]
