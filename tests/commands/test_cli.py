@@ -134,6 +134,7 @@ def test_json_needs_no_display(board):
     assert loaded(f"from contactfpga import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])") == "serialx"
 
 
+@pytest.mark.slow
 def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
     frames = tmp_path / "frames.npy"
     np.save(frames, np.eye(16, dtype=bool)[None])

@@ -87,6 +87,7 @@ def test_the_image_in_a_terminal(capsys):
     assert lines[-3] == "The Skin's 20 us leave too little room."
 
 
+@pytest.mark.slow
 def test_the_sheet_of_a_file_has_its_circuits_times(capsys, tmp_path):
     cells, file = np.ones((2, 4, 4), bool), tmp_path / "skin.toml"
     cells[:, 0] = False

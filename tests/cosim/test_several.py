@@ -129,6 +129,7 @@ def test_a_sheet_waits_for_one_packet_of_each_other_one():
         assert talk.stats.damaged.total() == talk.stats.lost == 0
 
 
+@pytest.mark.slow
 def test_the_compiled_board_agrees_at_the_pins():
     cycles, several = 60_000, Several.load(EXAMPLE)
     sent = asked(cycles, 2, 4)

@@ -102,6 +102,7 @@ def test_the_link_is_removed_with_its_board(tmp_path):
     assert not link.is_symlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["file", "link", "folder"])
 def test_what_took_the_place_of_the_link_stays(tmp_path, kind):
     link = tmp_path / "port"

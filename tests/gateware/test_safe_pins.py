@@ -76,6 +76,7 @@ def test_alive_turns_every_ms_while_all_is_well_and_whatever_is_pressed():
     assert trace.alive == [(1000, 1), (2000, 0), (3000, 1), (4000, 0), (5000, 1)]
 
 
+@pytest.mark.slow
 def test_alive_rests_and_contact_is_high_until_what_was_told_is_renewed():
     scan, renewed, end = facts(GUARDED).scan_clocks, 2**16, 70_002
     trace = bench_native.run(GUARDED, Timeline([], cuts=[(1_200, Cuts({1: 2})), (3_100, Cuts())]), end)
@@ -86,6 +87,7 @@ def test_alive_rests_and_contact_is_high_until_what_was_told_is_renewed():
     assert ticks == [1000, *range((falls + scan) // 1000 * 1000 + 1000, end, 1000)]
 
 
+@pytest.mark.slow
 def test_without_fail_safe_a_fault_leaves_contact_low():
     skin, cut = GUARDED.replace(fail_safe=False), Timeline([], cuts=[(100, Cuts({}, {0: 0}))])
     trace = bench_amaranth.run(skin, cut, 1_500)

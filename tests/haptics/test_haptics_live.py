@@ -97,6 +97,7 @@ def test_a_contact_that_was_alone_for_20_ms_is_where_its_center_of_pressure_was(
     assert found[-1][1].touch.point_sigma_m == pytest.approx(1e-2 / 12**0.5)
 
 
+@pytest.mark.slow
 def test_readings_of_a_frame_are_those_of_its_moment():
     """A push that rises by 1 N in 5 ms: what is felt is off by noise and steps, not by the time until it is sent."""
     cells = bumper(sigma_n=1e-6)

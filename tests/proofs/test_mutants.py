@@ -139,16 +139,19 @@ def test_what_only_a_flip_can_reach_has_no_mutants(sample):
     assert not any("upset" in mutant.place for mutant in sample.all)
 
 
+@pytest.mark.slow
 def test_without_a_stimulus_every_mutant_survives(sample):
     nothing = Stimulus("nothing", Timeline([]), 0)
     assert campaign.left_by(sample.skin, sample.mutants, [nothing]) == sample.mutants
 
 
+@pytest.mark.slow
 def test_an_untouched_sheet_leaves_more_mutants_than_a_touched_one(sample):
     untouched = Stimulus("untouched", Timeline([]), 12_000)
     assert len(campaign.left_by(sample.skin, sample.mutants, [untouched])) > 2 * len(sample.left)
 
 
+@pytest.mark.slow
 def test_the_board_without_a_mutant_is_held_to_the_golden_model(sample):
     model = netlist.model(sample.skin, sample.mutants)
     stimulus = next(stimuli.quick(sample.skin))

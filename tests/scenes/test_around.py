@@ -128,6 +128,7 @@ def test_contacts_of_a_file_keep_their_gap_over_the_seam(tmp_path):
             assert math.hypot(across, one_of.y_mm - other.y_mm) >= 60 - 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "winding"), [("around", ""), ("grip", "ring")])
 def test_zones_of_a_closed_sheet_are_printed_where_they_are(capsys, name, winding):
     port = f"sim://?scene={name}&skin={examples() / 'forearm.toml'}"

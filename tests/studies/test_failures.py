@@ -133,7 +133,7 @@ QUICK = [
 ][::2]
 """What `make test-all` turns, every second knob: with few boards beside the reference Skin's, as each is to be
 compiled."""
-FEW = [key for key in QUICK if key[0] in ("crossing", "stuck", "broken")]
+FEW = [key for key in QUICK if key[0] in ("crossing", "stuck")]
 """What `make test` turns: the reference Skin's board alone."""
 
 
@@ -240,6 +240,7 @@ def test_zones_are_those_of_image_tools(turn, name):
         assert outcome.amount == ndimage.label(outcome.cells, np.ones((3, 3)))[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("connectivity", "pitch"), sample([(8, 10), (4, 10), (8, 5), (4, 5)], quick=[(8, 10)]))
 def test_fingers_that_close_in_are_counted_as_image_tools_do(turn, connectivity, pitch):
     structure = np.ones((3, 3)) if connectivity == 8 else None
@@ -307,6 +308,7 @@ def test_a_bounce_is_seen_once_it_lasts_longer_than_the_release_time(turn, metho
     assert max(outcome.amount for outcome in found.outcomes) == 2
 
 
+@pytest.mark.slow
 def test_frames_stay_whole_until_the_middle_of_the_stop_bit_has_slipped(turn):
     """9.5 bits may add up to half a bit, give or take one look of sixteen a bit, and the width of the grid."""
     look, grid = 1 / 16, 0.25
@@ -316,6 +318,7 @@ def test_frames_stay_whole_until_the_middle_of_the_stop_bit_has_slipped(turn):
     assert turn("baud", "host slower, frames").holds_until > 2 * 1.5  # both ends as far off as a Skin allows
 
 
+@pytest.mark.slow
 def test_a_host_may_pause_until_the_systems_buffer_is_full(turn):
     frame_bytes, scan_ms = 13 + 2 * 4, 0.096
     assert between(turn("host", "every frame of `contactfpga.open()`"), line.TTY_BYTES / frame_bytes * scan_ms)
@@ -407,6 +410,7 @@ def test_lines_of_the_table(verdicts, expected):
     assert line.split(" | ")[1:-1] == ["method", *expected]
 
 
+@pytest.mark.slow
 def test_a_picture_shows_every_value(turn):
     space = "{http://www.w3.org/2000/svg}"
     for name in ("baud", "diodes", "broken"):

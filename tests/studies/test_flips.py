@@ -71,6 +71,7 @@ def test_every_bit_of_the_synthesized_design_can_be_flipped(plain, tmp_path):
     assert bits == [registers, memories]
 
 
+@pytest.mark.slow
 def test_each_place_is_drawn_as_often_as_it_has_bits(plain):
     places = plain.board.places
     for memory in (False, True):
@@ -84,6 +85,7 @@ def test_each_place_is_drawn_as_often_as_it_has_bits(plain):
         assert abs(np.mean([bit.place == wide for bit in drawn]) - share) < 0.05
 
 
+@pytest.mark.slow
 def test_a_board_returns_to_a_moment(plain):
     board, step = plain.board, plain.steps[4]
     board.go_to(step.moment)
@@ -120,6 +122,7 @@ def test_a_scan_that_waits_and_hears_of_no_touch_is_stale(fast):
     assert "stale" in {kind for _, kind in flip._wrong(fast, heard)}
 
 
+@pytest.mark.slow
 def test_the_reference_is_right_all_the_time(plain):
     heard = [one for step in plain.steps[4:] for one in step.heard]
     assert len(heard) > 100
@@ -137,6 +140,7 @@ def test_what_is_wrong_in_either_copy_ends_with_a_restart(dual, copy, place):
     assert "restarts" in {one.kind for one in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "bits"), [("scan.time", (0, 13, 23)), ("scan.pattern", (0, 3)), ("scan.driver.selected", (1, 2))]
 )
@@ -147,6 +151,7 @@ def test_a_register_of_the_scan_that_turned_starts_the_board_again(plain, place,
     assert {(one.outcome, one.kind) for one in found} == {("told", "restarts")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("region", ["filling", "waiting", "sending"])
 def test_frames_that_lost_their_places_start_the_board_again(plain, region):
     """Two of the three would share one from then on, and be sent mixed."""
@@ -156,6 +161,7 @@ def test_frames_that_lost_their_places_start_the_board_again(plain, region):
     assert {(one.outcome, one.kind) for one in found} == {("told", "restarts")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["backlog.queue.put", "backlog.queue.taken"])
 def test_a_queue_that_lost_its_place_is_right_again(plain, place):
     index, number = place_of(plain.board, place), 24
@@ -166,6 +172,7 @@ def test_a_queue_that_lost_its_place_is_right_again(plain, place):
         assert [one.said for one in heard][-30:] == right[-30:]
 
 
+@pytest.mark.slow
 def test_contact_is_high_from_a_restart_until_a_frame_after_it():
     board = state.StateBoard(PLAIN, ("contact", "received"))
     board.press(np.zeros((4, 4), bool))
@@ -181,6 +188,7 @@ def test_contact_is_high_from_a_restart_until_a_frame_after_it():
     board.close()
 
 
+@pytest.mark.slow
 def test_a_bit_that_nothing_reads_changes_nothing(plain):
     place = place_of(plain.board, "link.store")
     last = plain.board.places[place].depth // 2 - 1  # the end of a region, where short frames never come

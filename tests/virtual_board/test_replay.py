@@ -60,6 +60,7 @@ def test_shapes_that_break_labellers(record_property):
     record_property("cases", len(frames))
 
 
+@pytest.mark.slow
 @pytest.mark.recordings
 @pytest.mark.parametrize(
     ("name", "most"),
@@ -101,6 +102,7 @@ def test_a_hello_in_the_middle_costs_no_frame():
     assert index == 59_999
 
 
+@pytest.mark.slow
 def test_a_lost_frame_is_an_error(monkeypatch):
     frames = np.ones((300, 16, 16), bool)
     skin = replay.skin_for(16, 16, 8, 256)  # which another test compiles
