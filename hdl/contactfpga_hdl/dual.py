@@ -21,8 +21,8 @@ class Dual(wiring.Component):
     check. Then it rests, both copies start from reset, and the host hears a board that was restarted. With
     ``fail_safe`` the pin ``contact`` is high from the difference until a scan after the restart.
 
-    Nothing in here keeps a state of its own but for the time that a restart takes, and that counts itself to its end;
-    the register at ``contact`` is set anew in each clock.
+    This component keeps no state but the time that a restart takes, which counts itself to its end, and the register
+    at ``contact``, which is written in every clock.
 
     first (component): may have probes, which are passed on.
     second (component): the same without probes.

@@ -117,7 +117,7 @@ _NAMES = {
     "zones.watch": "Watch",
     "zones.zone": "Zone Zones",
 }
-"""Where each of these is: by module."""
+"""Modules, and the public names that each of them defines."""
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 

@@ -9,11 +9,11 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.stuck import watched
 
 RETRY_BIT = 16
-"""Of the clock in us: a column that is stuck is driven again when this bit turns."""
+"""Bit of the clock in microseconds: each time it turns, stuck columns are tried again."""
 LOOKS = 4
-"""Samples, apart from each other, of which a single one that reads released shows that a column is not stuck."""
+"""Samples of a column that lie apart. It is stuck only if it reads pressed in all of them."""
 LEAST_BITS = 4
-"""Of the clocks between two of them: no disturbance of a few clocks spoils both."""
+"""Two of these samples are at least 2 to this power clocks apart, so that a disturbance of a few clocks spoils one."""
 
 
 class Precharge(wiring.Component):
