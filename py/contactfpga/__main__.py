@@ -1,4 +1,4 @@
-"""Where the command `contactfpga` begins, also as ``python -m contactfpga``, where its folder is not on the PATH."""
+"""The entry point of the command `contactfpga`, also as ``python -m contactfpga``."""
 
 import sys
 

@@ -147,7 +147,7 @@ def test_a_folder_that_others_can_open_or_replace_is_not_used(runtime, monkeypat
         assert alone in refused()
     for long in (runtime / ("x" * 100), runtime / "a?b"):
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
-        assert "cannot be a socket: at most 100 bytes" in refused()
+        assert "a socket's path has at most 100 bytes" in refused()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime / "nowhere"))
     assert "cannot be made for the socket: No such file or directory" in refused()
 

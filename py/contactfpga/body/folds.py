@@ -26,7 +26,7 @@ STEP_RAD = 0.05
 """Angles are told apart this finely."""
 MAX_BYTES = 20_000_000
 MAX_STEPS = 10_000
-"""Of angles, each with a sheet of cells: a turn has 126."""
+"""Most steps of an angle, each with a sheet of cells; a full turn takes 126."""
 
 Cells = NDArray[np.bool_]
 

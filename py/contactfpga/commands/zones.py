@@ -77,7 +77,7 @@ class _Follow:
 
 
 class _Limited:
-    """Frames of so many seconds of device time; then it ends as a recording does."""
+    """Yield frames for this many seconds of device time, then end as a recording does."""
 
     def __init__(self, frames: Frames, seconds: float):
         self._frames, self._left_us = frames, seconds * 1e6

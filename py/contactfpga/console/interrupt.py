@@ -129,7 +129,7 @@ def _again(what: sys.UnraisableHookArgs) -> None:
 
 
 def _send(number: int) -> None:
-    """To the main thread, also where that sleeps."""
+    """Send a signal to the main thread, and wake it if it sleeps."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:  # Windows

@@ -15,7 +15,7 @@ class Parser(argparse.ArgumentParser):
     _within = False
 
     def error(self, message: str) -> NoReturn:
-        """As argparse does; what it quotes of the arguments, a terminal does not obey."""
+        """End with argparse's message, in which control characters of the arguments are shown as escapes."""
         super().error(visible_lines(shortened(message)))
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:

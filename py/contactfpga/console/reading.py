@@ -1,4 +1,4 @@
-"""How far a long file is read, on standard error: nobody waits before an empty screen."""
+"""Progress of reading a long file, on standard error."""
 
 from __future__ import annotations
 

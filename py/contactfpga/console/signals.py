@@ -8,16 +8,17 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def status(number: int) -> int:
-    """Of a command that a signal cut short, as shells count."""
+    """Exit status of a command that this signal ended, as shells count it."""
     return 128 + number
 
 
 def end_at_once(number: int, _: object = None) -> None:
-    """A handler where there is nothing to put in order: a command that starts, or one that is told twice."""
+    """Signal handler that ends the process at once: nothing is to be put in order while a command starts, or at the
+    second signal."""
     os._exit(status(number))
 
 
 def end_all_at_once() -> None:
-    """From now on the signals do."""
+    """Make :func:`end_at_once` the handler of all :data:`SIGNALS`."""
     for number in SIGNALS:
         signal.signal(number, end_at_once)

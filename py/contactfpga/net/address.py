@@ -18,9 +18,9 @@ from contactfpga.inputs.values import number_in
 
 SCHEME = "zenoh://"
 LOOPBACK = "tcp/127.0.0.1:7447"
-"""Which every user of this machine reaches."""
+"""An endpoint that every user of this machine reaches."""
 _MOST_PATH = 100
-"""Bytes of a socket's path; systems take 103 or 107."""
+"""Most bytes of a socket's path; operating systems take 103 or 107."""
 _FORM = "it reads zenoh://KEY, with ?connect=ENDPOINT, &config=FILE and &wait=SECONDS where wanted"
 
 
@@ -77,8 +77,9 @@ def own_endpoint() -> str:
     folder = Path(runtime, "contactfpga") if runtime else Path(tempfile.gettempdir(), f"contactfpga-{os.getuid()}")
     path = folder.absolute() / "zenoh.sock"
     step = f"name an endpoint, for instance {LOOPBACK}, to publisher and readers"
-    if len(os.fsencode(path)) > _MOST_PATH or re.search(r"[?#;]", str(path)):
-        raise ContactFPGAError(f"{path} cannot be a socket: at most {_MOST_PATH} bytes, and none of ? # ; {step}")
+    if (size := len(os.fsencode(path))) > _MOST_PATH or re.search(r"[?#;]", str(path)):
+        limits = f"a socket's path has at most {_MOST_PATH} bytes, and no question mark, # or semicolon"
+        raise ContactFPGAError(f"{path} has {size} bytes; {limits}; {step}")
     try:
         with contextlib.suppress(FileExistsError):
             folder.mkdir(0o700)

@@ -75,8 +75,8 @@ class Counters:
     lost_bytes: int = 0
     """Bytes of the board in them."""
     refused: int = 0
-    """Messages that are none of a publisher, came twice or too late, are of a second publisher of the key, or that no
-    later message followed."""
+    """Messages that were dropped: malformed, duplicate, late, from a second publisher of the key, or followed by no
+    later message."""
     publishers: int = 0
     """Publishers that were heard: 1, and one more for each restart."""
     breaks: int = 0
@@ -124,7 +124,7 @@ class Stream:
 
     @property
     def publisher(self) -> int | None:
-        """The one that is read."""
+        """Number of the publisher that is read; None before its first message."""
         return None if self._last is None else self._last.publisher
 
     def take(self, payload: bytes, now_s: float) -> list[tuple[bytes, bool]]:

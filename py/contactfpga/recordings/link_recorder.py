@@ -55,7 +55,7 @@ class Buffer:
                 self._taken += len(data)
 
     def end_at(self, count: int) -> bool:
-        """Take no more if so many bytes were taken in all; whether it is so."""
+        """Take no more once this many bytes were taken in all; returns whether that is so."""
         with self._lock:
             self._ended = self._ended or self._taken == count
             return self._ended
