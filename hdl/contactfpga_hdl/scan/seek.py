@@ -140,12 +140,16 @@ class Seek(wiring.Component):
             m.next = "PICK"
 
     def _search(self, m: Module, plan: _Plan) -> None:
-        """Halve the suspects by a bit of their number. Rows that differ in the lowest alone are driven alone."""
+        """Halve the suspects by a bit of their number. Rows that differ in the lowest alone are driven alone.
+
+        When no probe is left, all open rows are. The suspects are the first of them, so nothing is lost by not
+        searching on.
+        """
         rows, levels = self.skin.rows, self.derived.row_levels
         lower = Array(Const(sum(1 << row for row in range(rows) if not row >> bit & 1), rows) for bit in range(levels))
         low, high = plan.suspects & lower[plan.level], plan.suspects & ~lower[plan.level]
         ends = plan.level == 0
-        with m.If(ends | low.any() & high.any() & (plan.spare == 0)):
+        with m.If(ends | (plan.spare == 0)):
             m.next = "PICK"
             m.d.sync += [
                 plan.searching.eq(0),
