@@ -18,14 +18,14 @@ from typing import Any
 from ros_environment import DISTRIBUTIONS, ROOT, Environment
 
 import contactfpga
-from contactfpga.console import interrupt
-from contactfpga.ros import convert
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.dds import Publisher
-from contactfpga.ros.hashes import type_hash
-from contactfpga.ros.markers import markers, outline
-from contactfpga.ros.settings import TOPICS
-from contactfpga_sim.pages import writer
+from contactfpga.robot.ros import convert
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.dds import Publisher
+from contactfpga.robot.ros.hashes import type_hash
+from contactfpga.robot.ros.markers import markers, outline
+from contactfpga.robot.ros.settings import TOPICS
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import writer
 
 sys.path.append(str(ROOT / "tests" / "support"))
 
@@ -120,8 +120,8 @@ SUBSCRIBER = """
 import sys, time
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
-from contactfpga.ros import dds
-from contactfpga.ros.settings import TOPICS
+from contactfpga.robot.ros import dds
+from contactfpga.robot.ros.settings import TOPICS
 publisher = dds.Publisher("skin", int(sys.argv[1]))
 joined, readers = publisher._participant, []
 for name in sys.argv[2:]:

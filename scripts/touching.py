@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import contactfpga_hdl
-from contactfpga_sim.board import native
+from contactfpga_sim.model.board import native
 
 _FOLDER = Path(os.environ["CONTACTFPGA_TOUCHED"])
 _build = native.load

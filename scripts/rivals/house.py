@@ -1,20 +1,20 @@
 """All that is taken of contactfpga, in one place."""
 
-from contactfpga.console.interrupt import guarded
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console.interrupt import guarded
 from contactfpga_hdl.board.sizes import DEVICES, SEEDS, Device, Netlists, Registered, Size
 from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_hdl.board.tools import BitstreamFailed
-from contactfpga_sim.board import native
-from contactfpga_sim.board.labeller import LabelBench
-from contactfpga_sim.golden import all_departures
-from contactfpga_sim.pages.writer import table_of, update
-from contactfpga_sim.scenes import shapes
-from contactfpga_sim.scenes.cells import to_words
-from contactfpga_sim.studies import size
-from contactfpga_sim.studies.size import DESIGNS, square
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.pages.writer import table_of, update
+from contactfpga_sim.lab.size import DESIGNS, square
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.labeller import LabelBench
+from contactfpga_sim.model.golden import all_departures
+from contactfpga_sim.model.scenes import shapes
+from contactfpga_sim.model.scenes.cells import to_words
 
 __all__ = [
     "DESIGNS",

@@ -10,22 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.console import interrupt, outputs, tables, terminal
 from contactfpga.driver import driver
-from contactfpga.haptics import LoadCells, WithReadings, felt
+from contactfpga.robot.haptics import LoadCells, WithReadings, felt
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt, outputs, tables, terminal
 from contactfpga.wire.protocol import Frame
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, Trace, predict
-from contactfpga_sim.scenes import drawing
-from contactfpga_sim.scenes import scene as scenes
-from contactfpga_sim.scenes.felt import Felt
-from contactfpga_sim.studies import pool
+from contactfpga_sim.lab import pool
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.golden import Timeline, Trace, predict
+from contactfpga_sim.model.scenes import drawing
+from contactfpga_sim.model.scenes import scene as scenes
+from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_native
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 FORCED = "pushing"
 """The scene with force: it runs on a board with pressure units."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga import cli
 from contactfpga.boards import BOARDS, pll
 from contactfpga.boards.spec import bitstream_path
 from contactfpga.skin import Skin
+from contactfpga.tools import cli
 from contactfpga_hdl.board import build, placed, tools
 
 INSTALLED = all(importlib.util.find_spec(f"yowasp_nextpnr_{family}") for family in ("ice40", "ecp5"))

@@ -12,13 +12,13 @@ from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import build
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import model_of
-from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.netlist import ecp5_cells, extract
-from contactfpga_sim.netlist import replay as bitstream_replay
-from contactfpga_sim.netlist.replay import RUNS, replay, stimulus
-from contactfpga_sim.scenes.shapes import variants
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import model_of
+from contactfpga_sim.model.scenes.shapes import variants
+from contactfpga_sim.verify.cosim.compare import Mismatch
+from contactfpga_sim.verify.netlist import ecp5_cells, extract
+from contactfpga_sim.verify.netlist import replay as bitstream_replay
+from contactfpga_sim.verify.netlist.replay import RUNS, replay, stimulus
 
 ICEBREAKER, ULX3S = BOARDS["icebreaker"], BOARDS["ulx3s-12f"]
 SMALL = ULX3S.skin.replace(rows=3, columns=3, report="cells", settle_us=20.0, clock_hz=50_000_000)

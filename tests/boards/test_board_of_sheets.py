@@ -7,8 +7,8 @@ import pytest
 
 from contactfpga import Skin, SkinError, examples
 from contactfpga.boards import BOARDS, wiring
-from contactfpga.cli import main
 from contactfpga.skin.several import Several
+from contactfpga.tools.cli import main
 from contactfpga_hdl.board.build import plan_for
 
 ICEBREAKER = BOARDS["icebreaker"]

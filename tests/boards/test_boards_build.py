@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga import cli
 from contactfpga.boards import BOARDS
 from contactfpga.skin import Skin
+from contactfpga.tools import cli
 from contactfpga_hdl.board import build, placed
 from contactfpga_hdl.board.build import LOG, BitstreamFailed, _why
 from contactfpga_hdl.board.constraints import FOLDER, PAGE, constraints, page_with_tables

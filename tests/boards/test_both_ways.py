@@ -7,13 +7,13 @@ import pytest
 
 from contactfpga.boards import BOARDS
 from contactfpga.skin import Skin
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import model_of
-from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.netlist import both_ways, extract
-from contactfpga_sim.netlist.both_ways import WrongPins
-from contactfpga_sim.netlist.replay import RUNS, replay, stimulus
-from contactfpga_sim.sheet.matrix import Contention
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import model_of
+from contactfpga_sim.model.sheet.matrix import Contention
+from contactfpga_sim.verify.cosim.compare import Mismatch
+from contactfpga_sim.verify.netlist import both_ways, extract
+from contactfpga_sim.verify.netlist.both_ways import WrongPins
+from contactfpga_sim.verify.netlist.replay import RUNS, replay, stimulus
 
 SKIN = Skin(rows=2, columns=1, scan="reversal", precharge_us=0.25)
 ICEBOX = r"""module contactfpga (inout columns_0__io, inout [1:0] \rows_0__io , output tx);

@@ -7,11 +7,11 @@ import re
 import pytest
 from sample import sample
 
-from contactfpga import cli
 from contactfpga.boards import BOARDS, wiring
-from contactfpga.circuit import Circuit
-from contactfpga.console.wiring import Table, ohms
+from contactfpga.design.circuit import Circuit
 from contactfpga.skin.derived import Derived
+from contactfpga.tools import cli
+from contactfpga.tools.console.wiring import Table, ohms
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 

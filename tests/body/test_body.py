@@ -12,11 +12,11 @@ from model_board import DirectPort
 from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
-from contactfpga.body import Body, BodyError, JointHistory, NoJoints
-from contactfpga.body.contact import forces_of, on_link
-from contactfpga.body.pose import Pose
-from contactfpga.body.snapshot import Snapshot
-from contactfpga.body.state import LinkState
+from contactfpga.robot.body import Body, BodyError, JointHistory, NoJoints
+from contactfpga.robot.body.contact import forces_of, on_link
+from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.snapshot import Snapshot
+from contactfpga.robot.body.state import LinkState
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.units import UnitSamples

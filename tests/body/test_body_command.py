@@ -12,8 +12,8 @@ import pytest
 from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.body import Body, OpenBody, Snapshot
+from contactfpga.robot.body import Body, OpenBody, Snapshot
+from contactfpga.tools import cli
 from contactfpga.zones.units import UnitSamples
 
 UNITS = contactfpga.examples() / "units.toml"

@@ -10,10 +10,10 @@ from model_board import ModelBoard
 from wire import Wire
 
 import contactfpga
-from contactfpga.body import Body, NoLinkData
-from contactfpga.body.plan import read
-from contactfpga.body.reader import RETRY_S, WAIT_S, LinkReader
-from contactfpga.body.snapshot import Snapshot
+from contactfpga.robot.body import Body, NoLinkData
+from contactfpga.robot.body.plan import read
+from contactfpga.robot.body.reader import RETRY_S, WAIT_S, LinkReader
+from contactfpga.robot.body.snapshot import Snapshot
 
 SKIN, OTHER = contactfpga.Skin(), contactfpga.Skin(connectivity=4)
 EVERY_S = 0.01

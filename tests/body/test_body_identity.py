@@ -7,9 +7,9 @@ from fake_board import wait_until
 from two_links import FLAT, Plugged, Streaming, state_of
 
 import contactfpga
-from contactfpga.body import Body, OpenBody
-from contactfpga.body.plan import read
 from contactfpga.driver.stats import Stats
+from contactfpga.robot.body import Body, OpenBody
+from contactfpga.robot.body.plan import read
 
 LEFT, RIGHT = FLAT.replace(name="LEFT"), FLAT.replace(name="RIGHT")
 PATIENT = {"late_s": 5.0, "silent_s": 7.0}

@@ -7,9 +7,9 @@ import pytest
 from fake_board import wait_until
 from two_links import FLAT
 
-from contactfpga.body import Body, OpenBody
 from contactfpga.driver import driver
 from contactfpga.errors import PortNotFound
+from contactfpga.robot.body import Body, OpenBody
 
 
 @pytest.fixture

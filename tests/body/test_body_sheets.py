@@ -4,7 +4,7 @@ import pytest
 from net_processes import free_endpoint, publish
 
 import contactfpga
-from contactfpga.body import Body
+from contactfpga.robot.body import Body
 
 SHEETS = contactfpga.examples() / "two-sheets.toml"
 LINK = """

@@ -10,14 +10,14 @@ import pytest
 from model_board import DirectPort
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.body import BodyError, Snapshot
-from contactfpga.body.body import Body
-from contactfpga.body.folds import Folds, cells_of, learn
-from contactfpga.body.state import LinkState
+from contactfpga.robot.body import BodyError, Snapshot
+from contactfpga.robot.body.body import Body
+from contactfpga.robot.body.folds import Folds, cells_of, learn
+from contactfpga.robot.body.state import LinkState
+from contactfpga.tools import cli
 from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.body import folding
+from contactfpga_sim.lab.body import folding
 
 SKIN = contactfpga.Skin(rows=4, columns=6, report="cells")
 ROBOT = '[[links]]\nname = "arm"\nskin = "skin.toml"\nport = "a"\n'

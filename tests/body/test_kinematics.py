@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga.body import urdf
-from contactfpga.body.answer import BodyError, NoJoints
-from contactfpga.body.joints import JointHistory
-from contactfpga.body.kinematics import Kinematics
-from contactfpga.body.pose import Pose
+from contactfpga.robot.body import urdf
+from contactfpga.robot.body.answer import BodyError, NoJoints
+from contactfpga.robot.body.joints import JointHistory
+from contactfpga.robot.body.kinematics import Kinematics
+from contactfpga.robot.body.pose import Pose
 
 JVRC = "package://jvrc_description/urdf/jvrc1.urdf"
 

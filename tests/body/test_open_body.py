@@ -11,8 +11,8 @@ from fake_board import wait_until
 from two_links import Plugged
 
 import contactfpga
-from contactfpga.body import Body, NoJoints, NoLinkData, OpenBody
-from contactfpga.body.known import States
+from contactfpga.robot.body import Body, NoJoints, NoLinkData, OpenBody
+from contactfpga.robot.body.known import States
 
 
 def test_joints_that_fail_say_so_where_angles_are_needed(patient):

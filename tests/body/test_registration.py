@@ -11,11 +11,11 @@ from model_board import DirectPort
 from wire import Wire
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.body import BodyError, registration
-from contactfpga.body.plan import read
-from contactfpga.body.pose import Pose
-from contactfpga.body.registration import Press
+from contactfpga.robot.body import BodyError, registration
+from contactfpga.robot.body.plan import read
+from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.registration import Press
+from contactfpga.tools import cli
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 

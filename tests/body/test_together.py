@@ -8,8 +8,8 @@ from model_board import DirectPort
 from two_links import FLAT, ROBOT, ROUND
 
 import contactfpga
-from contactfpga.body import Body, OpenBody
-from contactfpga.body.together import LAG_S, STEP_S, Together
+from contactfpga.robot.body import Body, OpenBody
+from contactfpga.robot.body.together import LAG_S, STEP_S, Together
 
 
 def test_no_board_leaves_another_one_behind_or_is_ahead_of_real_time(rng):

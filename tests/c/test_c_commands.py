@@ -12,7 +12,7 @@ from wire import request
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request, may_number
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
-from contactfpga_sim.golden.request import command
+from contactfpga_sim.model.golden.request import command
 
 ASK = r"""
 #include <stdio.h>

@@ -24,7 +24,7 @@ from contactfpga.wire.hello import Hello
 from contactfpga.wire.protocol import FLAGS, may_number
 from contactfpga.wire.units import Sweep
 from contactfpga.zones.units import UnitSamples
-from contactfpga_sim.golden.uart import pulsed
+from contactfpga_sim.model.golden.uart import pulsed
 
 SKINS = [
     Skin(),

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from contactfpga.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static, transient
-from contactfpga.circuit.network import OFF, Drive, Network, charge
-from contactfpga.circuit.phases import Levels
-from contactfpga.circuit.values import THERMAL_V
+from contactfpga.design.circuit import SILICON, Circuit, Diode, needed, patterns, phases, static, transient
+from contactfpga.design.circuit.network import OFF, Drive, Network, charge
+from contactfpga.design.circuit.phases import Levels
+from contactfpga.design.circuit.values import THERMAL_V
 
 LEVELS = Levels.of(Circuit())
 CELL = np.ones((1, 1), bool)

@@ -5,9 +5,9 @@ import re
 
 import pytest
 
-from contactfpga import cli
-from contactfpga.circuit import Circuit, needed
+from contactfpga.design.circuit import Circuit, needed
 from contactfpga.errors import UNSOLVED
+from contactfpga.tools import cli
 
 SMALL = ["settle", "--rows", "2", "--columns", "3"]
 
@@ -21,7 +21,7 @@ def asked(capsys, *options):
 def quick(monkeypatch):
     """What the sheet needs is always the same."""
     needs = needed(Circuit(), 1, 1)
-    monkeypatch.setattr("contactfpga.circuit.needed", lambda *_: needs)
+    monkeypatch.setattr("contactfpga.design.circuit.needed", lambda *_: needs)
 
 
 def test_the_issues_example(capsys):

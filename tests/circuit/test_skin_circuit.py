@@ -3,9 +3,18 @@
 import pytest
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.circuit import SILICON, Circuit, CircuitError, Diode, check, load_checked, load_circuit, problems
+from contactfpga.design.circuit import (
+    SILICON,
+    Circuit,
+    CircuitError,
+    Diode,
+    check,
+    load_checked,
+    load_circuit,
+    problems,
+)
 from contactfpga.skin import Skin
+from contactfpga.tools import cli
 
 STATED = """rows = 8
 columns = 8

@@ -5,10 +5,10 @@ import math
 
 import pytest
 
-from contactfpga.circuit import SCHOTTKY, SILICON, Circuit, patterns, phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels
-from contactfpga_sim.sheet import agreement, spice
+from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, patterns, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
+from contactfpga_sim.model.sheet import agreement, spice
 
 pytestmark = pytest.mark.skipif(not spice.installed(), reason="ngspice is not installed")
 

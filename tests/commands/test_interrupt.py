@@ -12,8 +12,8 @@ import pytest
 from sample import sample
 from terminals import OnTerminal, alive, descendants, environment, listening, wait_for
 
-from contactfpga.console import interrupt
-from contactfpga_sim.studies import pool
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import pool
 
 SOON_S = 2.0
 """Within which a command ends, on a machine with nothing else to do."""
@@ -31,7 +31,7 @@ POOLS = {
 
 
 def command(arguments):
-    return [sys.executable, "-m", "contactfpga.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "contactfpga.tools.cli", *map(str, arguments)]
 
 
 def interrupted(arguments, ready, keys, cache, **variables):
@@ -136,7 +136,7 @@ def test_place_and_route_ends_too(keys, tmp_path):
 
 WAITS = """
 import sys, time
-from contactfpga.console import interrupt
+from contactfpga.tools.console import interrupt
 
 def body():
     print("waits", flush=True)
@@ -164,7 +164,7 @@ def test_a_command_listens_even_where_its_shell_would_have_it_ignore_the_signal(
 
 WORKERS = """
 import os, subprocess, sys, time
-from contactfpga_sim.studies import pool
+from contactfpga_sim.lab import pool
 
 def work(number):
     subprocess.run(["sleep", "60"])

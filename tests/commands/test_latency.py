@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from reversal import FAST, small
 
-from contactfpga import cli, examples
 from contactfpga.skin import Skin
-from contactfpga_sim.studies import latency
+from contactfpga.tools import cli, examples
+from contactfpga_sim.lab import latency
 
 FILE = str(examples() / "fast.toml")
 

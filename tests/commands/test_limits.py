@@ -14,20 +14,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError, cli
-from contactfpga.body import Body, BodyError, folds, packed, urdf
-from contactfpga.body.folds import Folds
-from contactfpga.body.kinematics import Kinematics
-from contactfpga.commands.haptics import reading
-from contactfpga.cover.task import Task
+from contactfpga.design.cover.task import Task
 from contactfpga.driver import mcap_part, mcap_records
-from contactfpga.haptics import LoadCells
 from contactfpga.inputs import array_file, tomlfile, values, xmlfile
+from contactfpga.robot.body import Body, BodyError, folds, packed, urdf
+from contactfpga.robot.body.folds import Folds
+from contactfpga.robot.body.kinematics import Kinematics
+from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin.several import MOST_SHEETS, Several
 from contactfpga.surfaces import Mesh, SurfaceError, mesh, mesh_file
 from contactfpga.surfaces.laying import Triangles
-from contactfpga_sim.scenes.file import SceneFile
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.studies.arm.case import Case
+from contactfpga.tools.commands.haptics import reading
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.model.scenes.file import SceneFile
+from contactfpga_sim.model.scenes.recordings import Recording
 
 DOTTED = f"a{'.a' * 300_000} = 1\n"
 """The standard library's parser takes the square of this."""

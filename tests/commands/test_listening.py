@@ -14,7 +14,7 @@ LONG = 60.0
 
 PROGRAM = """
 import contextlib, ipaddress, json, os, socket, stat, sys, threading, time
-from contactfpga import cli
+from contactfpga.tools import cli
 
 def run(arguments):
     while cli.main(arguments):  # for instance as nobody publishes yet

@@ -10,10 +10,10 @@ import pytest
 
 from contactfpga.inputs.array_file import ArrayFileError, read
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import scene
-from contactfpga_sim.scenes.cells import pressed
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.studies.fit.sources import source
+from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.model.scenes import scene
+from contactfpga_sim.model.scenes.cells import pressed
+from contactfpga_sim.model.scenes.recordings import Recording
 
 VALUES = np.array([[[0, 30], [31, 255]]], np.uint8)
 PRESSED = [[[False, False], [True, True]]]

@@ -5,10 +5,10 @@ import os
 import numpy as np
 import pytest
 
-from contactfpga import cli
-from contactfpga.console import outputs
-from contactfpga_sim.studies import pool
-from contactfpga_sim.studies.arm import latency_charts, sweep
+from contactfpga.tools import cli
+from contactfpga.tools.console import outputs
+from contactfpga_sim.lab import pool
+from contactfpga_sim.lab.arm import latency_charts, sweep
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
 
 
 def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsys):
-    from contactfpga_sim.studies.arm import report, run_pictures
+    from contactfpga_sim.lab.arm import report, run_pictures
 
     def refused(*_):
         raise OSError(28, "No space left on device")
@@ -95,8 +95,8 @@ def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsy
 
 
 def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, capsys):
-    from contactfpga.commands import replay
-    from contactfpga_sim.board import native
+    from contactfpga.tools.commands import replay
+    from contactfpga_sim.model.board import native
 
     now = [0.0]
     built = []

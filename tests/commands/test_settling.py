@@ -12,10 +12,10 @@ from model_board import DirectPort
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.circuit import Circuit
-from contactfpga.console import flags, settling
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.sheet.line import Line
+from contactfpga.design.circuit import Circuit
+from contactfpga.tools.console import flags, settling
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.sheet.line import Line
 
 SKIN = Skin(rows=4, columns=4, report="cells", settle_us=20.0, precharge_us=0.5)
 SETTLE, CLOCKS_PER_US = 240, 12

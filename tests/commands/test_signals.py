@@ -11,8 +11,8 @@ import pytest
 from sample import sample
 from terminals import environment, listening
 
-from contactfpga.console import interrupt
-from contactfpga.console.signals import SIGNALS
+from contactfpga.tools.console import interrupt
+from contactfpga.tools.console.signals import SIGNALS
 
 STATUSES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 CUT_SHORT = {
@@ -87,7 +87,7 @@ def test_a_signal_at_any_moment_of_the_start(name, seed, tmp_path):
 
 STARTS = """
 import sys
-from contactfpga.console import interrupt, signals
+from contactfpga.tools.console import interrupt, signals
 WORK
 signals.end_all_at_once()
 sys.exit(interrupt.guarded(body))

@@ -16,8 +16,8 @@ from sample import sample
 from terminals import OnTerminal, environment, on_terminal, wait_for
 
 from contactfpga import Skin
-from contactfpga.console import terminal
-from contactfpga.console.tables import tables
+from contactfpga.tools.console import terminal
+from contactfpga.tools.console.tables import tables
 
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 BIG = Skin(rows=64, columns=64, settle_us=20.0)
@@ -79,7 +79,7 @@ def test_no_line_is_wider_than_the_terminal(name, columns, files):
 
 @pytest.mark.parametrize("name", sample(COMMANDS, quick=["zones of 64x64", "doctor", "an error"], slow=["replay"]))
 def test_no_character_ends_a_command(name, files):
-    command = [sys.executable, "-m", "contactfpga.cli", *named(name, files)]
+    command = [sys.executable, "-m", "contactfpga.tools.cli", *named(name, files)]
     result = subprocess.run(command, capture_output=True, env=environment(PYTHONIOENCODING="ascii"), timeout=120)
     assert b"codec" not in result.stdout + result.stderr
     assert result.returncode == (name == "an error"), result.stderr
@@ -94,7 +94,7 @@ def test_no_color_where_none_is_wanted(variables, files):
 
 
 def test_a_terminal_that_cannot_be_rewritten_is_not():
-    dumb = OnTerminal([sys.executable, "-m", "contactfpga.cli", "zones", "sim://"], 80, TERM="dumb")
+    dumb = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", "sim://"], 80, TERM="dumb")
     wait_for(lambda: "this terminal cannot be redrawn, so one frame per second is shown" in " ".join(dumb.said.split()))
     began = time.monotonic()
     wait_for(lambda: dumb.said.count("cells pressed") == 3)
@@ -109,7 +109,7 @@ def test_the_live_view_of_a_large_sheet_stays_on_the_screen(columns, lines):
     with FakeBoard(BIG) as board:
         board.moments = [(9, 300, 300), (4, 8, 240), (30, 60, 30)]
         board.stream = board.frame
-        on = OnTerminal([sys.executable, "-m", "contactfpga.cli", "zones", board.path], columns, lines)
+        on = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", "zones", board.path], columns, lines)
         wait_for(lambda: on.said.count("cells pressed") > 2, 120)
         on.type("\x03")
         assert on.wait() == 0
@@ -155,7 +155,7 @@ def test_the_encoding_decides_on_characters(encoding, unicode):
 
 
 def test_what_an_encoding_lacks_is_written_as_what_is_nearest():
-    code = "from contactfpga.console import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
+    code = "from contactfpga.tools.console import terminal; terminal.prepare(); print('a · b, mm², δ, é, 漢, \\udcff')"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, env=environment(PYTHONIOENCODING="ascii")
     )

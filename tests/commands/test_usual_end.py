@@ -12,8 +12,8 @@ from sample import sample
 from terminals import OnTerminal, environment, wait_for
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.console import interrupt
+from contactfpga.tools import cli
+from contactfpga.tools.console import interrupt
 
 CELLS = contactfpga.Skin(rows=3, columns=6, report="cells", settle_us=20.0)
 RUNNING = {
@@ -42,7 +42,7 @@ def test_it_is_the_usual_end(words, number, tmp_path):
         board.stream = board.frame
         named = {"PORT": board.path, "FILE": tmp_path / "x.mcap"}
         arguments = [str(named.get(word, word)) for word in [*words.split(), "--timeout", "30"]]
-        terminal = OnTerminal([sys.executable, "-m", "contactfpga.cli", *arguments], 80)
+        terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *arguments], 80)
         try:
             wait_for(lambda: terminal.process.poll() is not None or RUNNING[words] in terminal.said, 60)
             terminal.process.send_signal(number)
@@ -77,7 +77,7 @@ def test_term_is_handled_as_before_when_a_command_is_done():
 
 PRINTS = """
 import sys
-from contactfpga.console import interrupt, terminal
+from contactfpga.tools.console import interrupt, terminal
 
 def body():
     SAY

@@ -13,10 +13,10 @@ import pytest
 from recorded_stream import recorded
 
 from contactfpga import ContactFPGAError, cli, examples
-from contactfpga.body.folds import Folds
 from contactfpga.inputs.files import replaced, write_text
-from contactfpga.recordings.export import export
+from contactfpga.robot.body.folds import Folds
 from contactfpga.surfaces import Mesh
+from contactfpga.tools.recordings.export import export
 
 
 @contextlib.contextmanager
@@ -52,7 +52,7 @@ def picture(path):
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     pytest.importorskip("mcap")
-    from contactfpga.recordings import Recording
+    from contactfpga.tools.recordings import Recording
 
     folder = tmp_path_factory.mktemp("recorded")
     recorded(folder, bytes_only=True)

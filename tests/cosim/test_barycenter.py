@@ -19,14 +19,14 @@ from contactfpga import Skin, cli
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
 from contactfpga_hdl.top import Top
-from contactfpga_sim.board import replay
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import stimulus
-from contactfpga_sim.golden import Timeline, predict, zones
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.scenes.shapes import variants
-from contactfpga_sim.studies.chart import errors, speed
+from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.model.board import replay
+from contactfpga_sim.model.golden import Timeline, predict, zones
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.scenes.shapes import variants
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import stimulus
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 

@@ -8,8 +8,8 @@ from shadows import zones_by_image_tools
 
 import contactfpga
 from contactfpga import Skin, SkinError
-from contactfpga_sim import golden
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 DEFAULT_SKINS, CAMPAIGN_SKINS = 1, 200
 FRAMES = 25

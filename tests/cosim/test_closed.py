@@ -14,12 +14,12 @@ from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, u
 from contactfpga.zones import around
 from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board import replay
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import Timeline, boundaries, cylinder, predict
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.board import replay
+from contactfpga_sim.model.golden import Timeline, boundaries, cylinder, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, closed, pairwise, skin_for, stimulus
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25.0, "closed": True}
 SKINS = {

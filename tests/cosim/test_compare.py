@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, Trace, boundaries, predict
-from contactfpga_sim.sheet.matrix import Matrix
+from contactfpga_sim.model.golden import Timeline, Trace, boundaries, predict
+from contactfpga_sim.model.sheet.matrix import Matrix
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 SKIN = Skin(rows=4, columns=6, report="barycenter")
 BOUNDARIES = boundaries(SKIN)

@@ -9,12 +9,12 @@ from decoded import decoded
 from sample import each_choice, sample
 
 from contactfpga.skin import Skin
-from contactfpga_sim.cosim import bench_amaranth, bench_cocotb, bench_native
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.cosim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
-from contactfpga_sim.cosim.record import OutOfTime
-from contactfpga_sim.golden import Timeline, Trace, boundaries, predict, requests
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.golden import Timeline, Trace, boundaries, predict, requests
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_cocotb, bench_native
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
+from contactfpga_sim.verify.cosim.covering import CHOICES, pairs_in, pairwise, skin_for, stimulus
+from contactfpga_sim.verify.cosim.record import OutOfTime
 
 COVERING = pairwise(CHOICES)
 NAMED = ("connectivity", "labeller", "debounce", "report", "send")

@@ -10,9 +10,9 @@ from contactfpga.skin import Skin
 from contactfpga_hdl import top
 from contactfpga_hdl.label import run, serial
 from contactfpga_hdl.scan import raster
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 SKIN = Skin(rows=4, columns=6)
 CYCLES = 4 * 72 * 8

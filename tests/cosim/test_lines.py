@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin
-from contactfpga_sim.golden.trace import Cuts
-from contactfpga_sim.sheet.matrix import Matrix
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.model.sheet.matrix import Matrix
 
 SKIN = Skin(rows=3, columns=4, guard=True, row_order=(2, 0, 1), column_order=(1, 3, 0, 2))
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import stimulus, traffic
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import heard
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import heard
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import stimulus, traffic
 
 
 @pytest.mark.parametrize("baud", [12_000_000, 8_000_000])

@@ -13,13 +13,13 @@ from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
 from contactfpga_hdl.link.turns import Turns
-from contactfpga_sim.board.several import CompiledSheets
-from contactfpga_sim.cosim import bench_several
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.cosim.covering import CHOICES, pairwise, skin_for
-from contactfpga_sim.golden import Timeline
-from contactfpga_sim.golden.predict import predict_several
-from contactfpga_sim.golden.request import request
+from contactfpga_sim.model.board.several import CompiledSheets
+from contactfpga_sim.model.golden import Timeline
+from contactfpga_sim.model.golden.predict import predict_several
+from contactfpga_sim.model.golden.request import request
+from contactfpga_sim.verify.cosim import bench_several
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
+from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for
 
 REGISTERS = {"row_drive": "74hc595", "column_read": "74hc165"}
 FAST = REGISTERS | {"clock_hz": 24_000_000, "baud": 12_000_000}  # requests come as pulses

@@ -13,13 +13,13 @@ from toy_labeller import TOY
 import contactfpga
 from contactfpga import Skin, SkinError, boards, cli
 from contactfpga.choices.choice import own_files
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.chart import methods, numbers, picture
-from contactfpga_sim.studies.chart.study import Task, study
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.chart import methods, numbers, picture
+from contactfpga_sim.lab.chart.study import Task, study
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 SKIN = Skin(rows=4, columns=6, labeller=TOY, settle_us=6.0)
 CYCLES = 6000
@@ -89,7 +89,7 @@ def test_the_virtual_board_and_the_driver_use_it():
 def test_what_is_kept_of_it_depends_on_its_file():
     assert own_files(SKIN) == {Path(toy_labeller.__file__)}
     assert own_files(Skin()) == set()
-    toy, run = (kept.made_by("contactfpga_sim.studies.kept", SKIN.replace(labeller=each)) for each in (TOY, "run"))
+    toy, run = (kept.made_by("contactfpga_sim.lab.kept", SKIN.replace(labeller=each)) for each in (TOY, "run"))
     assert toy != run
 
 

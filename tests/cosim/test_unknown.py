@@ -8,14 +8,14 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import hello_words
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.cosim import bench_unknown
-from contactfpga_sim.cosim.bench_unknown import Unknown, forget, initialized
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import stimulus
-from contactfpga_sim.golden import predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.sheet.matrix import Contention
+from contactfpga_sim.model.golden import predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.sheet.matrix import Contention
+from contactfpga_sim.verify.cosim import bench_unknown
+from contactfpga_sim.verify.cosim.bench_unknown import Unknown, forget, initialized
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import stimulus
+from contactfpga_sim.verify.proofs.inside import Inside
 
 SMALL = Skin(rows=8, columns=8)
 REVERSAL = {"scan": "reversal", "precharge_us": 0.5, "settle_us": 2.0}

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from contactfpga.cover import (
+from contactfpga.design.cover import (
     Ball,
     Cover,
     CoverError,

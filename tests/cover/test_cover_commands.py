@@ -10,8 +10,8 @@ import pytest
 from sample import sample
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.cover import elastic, sense
+from contactfpga.design.cover import elastic, sense
+from contactfpga.tools import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRST, SECOND = (ROOT / "examples" / f"paper-{name}-design.toml" for name in ("first", "second"))
@@ -33,7 +33,7 @@ def run(capsys):
 
 def test_impact_and_design_need_numpy_alone():
     code = (
-        "import sys; from contactfpga import cli; "
+        "import sys; from contactfpga.tools import cli; "
         f"cli.main(['cover', 'design', {str(FIRST)!r}]); cli.main(['cover', 'sense', '--pitch', '0.01']); "
         "print(*sorted(set(sys.modules) & {'scipy', 'matplotlib', 'rich', 'amaranth', 'contactfpga_sim', 'mpmath'}))"
     )
@@ -44,8 +44,8 @@ def test_impact_and_design_need_numpy_alone():
 def test_figures_without_matplotlib_name_what_to_install(run, monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.delitem(sys.modules, "contactfpga.cover.drawing", raising=False)
-    monkeypatch.delattr(contactfpga.cover, "drawing", raising=False)
+    monkeypatch.delitem(sys.modules, "contactfpga.design.cover.drawing", raising=False)
+    monkeypatch.delattr(contactfpga.design.cover, "drawing", raising=False)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     status, _, errors = run("figures")
     assert status == 1

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from contactfpga import Skin
-from contactfpga.cover import CoverError, line
-from contactfpga.cover.design import design
-from contactfpga.cover.foams import FOAMS, Foam, find
-from contactfpga.cover.task import Task
+from contactfpga.design.cover import CoverError, line
+from contactfpga.design.cover.design import design
+from contactfpga.design.cover.foams import FOAMS, Foam, find
+from contactfpga.design.cover.task import Task
 from contactfpga.skin.latency import latency_s
 
 ROOT = Path(__file__).resolve().parents[2]

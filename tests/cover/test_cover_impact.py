@@ -6,8 +6,8 @@ import mpmath
 import pytest
 from impacts import FIRST, ROWS, SPEED, arm, spring
 
-from contactfpga.cover import Ball, elastic, impact
-from contactfpga.cover.arm import Arm
+from contactfpga.design.cover import Ball, elastic, impact
+from contactfpga.design.cover.arm import Arm
 
 # ---- reference values, to their printed digits
 

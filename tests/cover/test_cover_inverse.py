@@ -7,9 +7,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from impacts import FIRST, SPEED, arm
 
-from contactfpga.cover import Ball, CoverError, NoSolution, elastic, impact, motion
-from contactfpga.cover.arm import Arm
-from contactfpga.cover.impact import Impact
+from contactfpga.design.cover import Ball, CoverError, NoSolution, elastic, impact, motion
+from contactfpga.design.cover.arm import Arm
+from contactfpga.design.cover.impact import Impact
 
 # ---- the inverse
 

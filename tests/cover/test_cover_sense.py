@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special
 
-from contactfpga.cover import Ball, CoverError, NoSolution, Switch, hertz, hertz_layer, medium, point, sense
-from contactfpga.cover.sense import Model, Sheet
+from contactfpga.design.cover import Ball, CoverError, NoSolution, Switch, hertz, hertz_layer, medium, point, sense
+from contactfpga.design.cover.sense import Model, Sheet
 
 SWITCH = Switch(1.0, 12.6e-6)
 PAPERS = Ball(0.038, 4.6e5)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga.cover import Ball, formula_study, paper, study_drawing
-from contactfpga.cover.foams import FOAMS
-from contactfpga.cover.sense import LADDER
-from contactfpga_sim.pages import cover_page
+from contactfpga.design.cover import Ball, formula_study, paper, study_drawing
+from contactfpga.design.cover.foams import FOAMS
+from contactfpga.design.cover.sense import LADDER
+from contactfpga_sim.lab.pages import cover_page
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
 

@@ -7,14 +7,14 @@ import pytest
 from slow_skin import SLOW
 
 import contactfpga
-from contactfpga import cli
 from contactfpga.driver import recording, sim_address
 from contactfpga.driver.ports import Candidate
 from contactfpga.driver.sim_address import SimAddress
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
-from contactfpga_sim.board import native
-from contactfpga_sim.board.pty_board import PtyBoard
+from contactfpga.tools import cli
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.pty_board import PtyBoard
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from contactfpga.driver.clock_fit import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga_sim.pages import clock_page
-from contactfpga_sim.studies import clock
-from contactfpga_sim.studies.clock import PATHS, accuracy, followed, moments
+from contactfpga_sim.lab import clock
+from contactfpga_sim.lab.clock import PATHS, accuracy, followed, moments
+from contactfpga_sim.lab.pages import clock_page
 
 SKIN = contactfpga.Skin()
 QUIET = dataclasses.replace(PATHS["usb_125us"], rate_hz=200.0)

@@ -8,8 +8,8 @@ from straight_line import SKIN, Line, arrived
 from wire import Wire, old_frame, old_hello
 
 import contactfpga
-from contactfpga.console.views import status
 from contactfpga.driver.stats import Stats
+from contactfpga.tools.console.views import status
 
 
 def errors(events):

@@ -11,7 +11,7 @@ import pytest
 from fake_board import background, wait_until
 
 import contactfpga
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 
@@ -26,7 +26,7 @@ def forever(call):
 
 @pytest.fixture
 def pty_board():
-    from contactfpga_sim.board.pty_board import PtyBoard
+    from contactfpga_sim.model.board.pty_board import PtyBoard
 
     with PtyBoard(SKIN, "two_fingers") as board:
         yield board
@@ -263,7 +263,7 @@ def test_a_client_that_left_does_not_end_the_board(pty_board):
 
 
 def test_a_scene_that_raises_ends_the_port_and_is_told():
-    from contactfpga_sim.board.pty_board import PtyBoard
+    from contactfpga_sim.model.board.pty_board import PtyBoard
 
     def press(seconds):
         if seconds > 0.3:

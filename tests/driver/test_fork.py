@@ -238,8 +238,8 @@ board.read()
 def test_a_recording_in_a_child_is_the_parents(board, tmp_path):
     pytest.importorskip("mcap", reason="the extra `record` is not installed")
     program = """
-from contactfpga.recordings import Recording
-from contactfpga.recordings.session import Session
+from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings.session import Session
 session = Session(sys.argv[2])
 session.add(port)
 session.start()
@@ -256,8 +256,8 @@ Recording(sys.argv[2])
 def test_a_body_in_a_child_is_closed(tmp_path):
     program = """
 from two_links import Plugged
-from contactfpga.body import Body
-from contactfpga.body.open_body import OpenBody
+from contactfpga.robot.body import Body
+from contactfpga.robot.body.open_body import OpenBody
 body = OpenBody(Body.load(port), opened=Plugged().opened)
 snapshots = body.subscribe()
 body.read()

@@ -11,9 +11,9 @@ import pytest
 from fake_board import FakeBoard
 
 import contactfpga
-from contactfpga import cli
 from contactfpga.boards import BOARDS
 from contactfpga.driver import finding, ports
+from contactfpga.tools import cli
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 

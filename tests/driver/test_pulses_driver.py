@@ -9,7 +9,7 @@ from world import Witness, World
 import contactfpga
 from contactfpga.driver.requests import Requests
 from contactfpga.wire import protocol
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 FAST = contactfpga.Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5, release_us=1.0)
 SMALL = contactfpga.Skin(rows=4, columns=4, baud=6_000_000)

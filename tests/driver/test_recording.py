@@ -10,9 +10,9 @@ from model_board import SCAN_US, ModelBoard
 from wire import Wire
 
 import contactfpga
-from contactfpga import cli
 from contactfpga.driver.recording import FileTap
 from contactfpga.driver.transport import RecordingTransport
+from contactfpga.tools import cli
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
 

@@ -6,7 +6,7 @@ import pytest
 from model_board import SCAN_US, DirectPort
 
 import contactfpga
-from contactfpga_sim.studies.tracking import reflex
+from contactfpga_sim.lab.tracking import reflex
 
 SKIN = contactfpga.Skin()
 LOOP = reflex.example()

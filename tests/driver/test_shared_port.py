@@ -10,10 +10,10 @@ from model_board import DirectPort
 
 import contactfpga
 from contactfpga import ContactFPGAError, PortLost, PortNotFound, Skin
-from contactfpga.cli import main
 from contactfpga.driver import finding, sheets
 from contactfpga.driver.board import Board
 from contactfpga.driver.ports import Candidate
+from contactfpga.tools.cli import main
 from contactfpga.wire.numbered import numbered, sheet_of, unnumbered
 
 SKINS = (Skin(name="chest", row_drive="74hc595", column_read="74hc165"), Skin(name="back", rows=9, columns=7))

@@ -7,9 +7,9 @@ import pytest
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga.console import live
 from contactfpga.driver import health
 from contactfpga.driver.silence import longest_pause_s
+from contactfpga.tools.console import live
 from contactfpga.wire.faults import Faults
 
 SKIN = contactfpga.Skin(guard=True)

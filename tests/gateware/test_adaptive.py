@@ -7,12 +7,12 @@ from sample import each_choice, sample
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.cosim import bench_amaranth, bench_native, record
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import ADAPTIVE, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import BOUNDARIES, Timeline, driven, predict, requests
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden import BOUNDARIES, Timeline, driven, predict, requests
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native, record
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import ADAPTIVE, pairwise, skin_for, stimulus
 
 COVERING = pairwise(ADAPTIVE)
 SMALL = {"scan": "adaptive", "rows": 4, "columns": 3, "settle_us": 3.0, "release_us": 1.0}

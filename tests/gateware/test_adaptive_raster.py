@@ -7,8 +7,8 @@ import pytest
 from sample import sample
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden.facts import facts
 
 # ---- no later than a raster scan
 

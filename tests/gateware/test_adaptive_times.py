@@ -10,12 +10,12 @@ from decoded import decoded
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire.hello import HelloReader
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict, requests, seek
-from contactfpga_sim.golden.adaptive import Scanner
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden import Timeline, predict, requests, seek
+from contactfpga_sim.model.golden.adaptive import Scanner
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 SMALL = {"scan": "adaptive", "rows": 4, "columns": 3, "settle_us": 3.0, "release_us": 1.0}
 TALL = Skin(**SMALL | {"rows": 8})  # compiled once for several tests

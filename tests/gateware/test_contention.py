@@ -7,11 +7,11 @@ import pytest
 from reversal import FAST, never_let_go, small
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import CompiledBoard, model_of
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.golden import Timeline
-from contactfpga_sim.sheet.matrix import Contention, Matrix
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.model.golden import Timeline
+from contactfpga_sim.model.sheet.matrix import Contention, Matrix
+from contactfpga_sim.verify.cosim import bench_amaranth
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
 from contactfpga_hdl.top import Top
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
 
 SMALL = Skin(rows=2, columns=3, settle_us=3.0, dual=True)
 

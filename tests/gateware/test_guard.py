@@ -11,13 +11,13 @@ from contactfpga import Skin
 from contactfpga_hdl.scan import raster
 from contactfpga_hdl.scan.guard import Told
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.record import Stimulus
-from contactfpga_sim.golden import Timeline, guard, predict, requests
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.raster import checks
-from contactfpga_sim.golden.trace import Cuts
+from contactfpga_sim.model.golden import Timeline, guard, predict, requests
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.raster import checks
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.record import Stimulus
 
 TINY = {"clock_hz": 1_000_000, "baud": 250_000, "guard": True}
 SKINS = {

@@ -7,7 +7,7 @@ from unrolled import RING, RULES, WOUND, every_frame, recorded, skin_of
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.golden import all_departures, cylinder, label
+from contactfpga_sim.model.golden import all_departures, cylinder, label
 
 SHAPES = {
     # name: rows, zones with 8-connectivity as (area, sum x counted on past the seam or ring or wound, sum y)

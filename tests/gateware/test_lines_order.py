@@ -5,12 +5,12 @@ import pytest
 from sample import sample
 
 from contactfpga import Skin
-from contactfpga_sim.cosim import bench_amaranth, record
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, driven, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.trace import Cuts
-from contactfpga_sim.sheet.shift import Sheet
+from contactfpga_sim.model.golden import Timeline, driven, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.model.sheet.shift import Sheet
+from contactfpga_sim.verify.cosim import bench_amaranth, record
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 
 KINDS = {
     "direct": {"settle_us": 12},

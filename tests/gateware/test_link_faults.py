@@ -8,11 +8,11 @@ from link_bench import SUMMARY, TAG, PackerAndLink, decisions, frame_of, packets
 from wire import digits, seal
 
 from contactfpga import Skin
-from contactfpga_sim.golden import faults
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.hello import State
-from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.request import Heard
+from contactfpga_sim.model.golden import faults
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.hello import State
+from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.request import Heard
 
 SHEET = {"rows": 4, "columns": 4, "connectivity": 4, "settle_us": 5000, "baud": 6_000_000}
 SKINS = {

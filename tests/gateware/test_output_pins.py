@@ -14,7 +14,7 @@ from contactfpga import Skin, examples
 from contactfpga.skin.several import Several
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
-from contactfpga_sim.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, pairwise, skin_for
+from contactfpga_sim.verify.cosim.covering import ADAPTIVE, CHOICES, REVERSAL, pairwise, skin_for
 
 COVERING = [*pairwise(CHOICES), *pairwise(ADAPTIVE), *pairwise(REVERSAL)]
 SOME = each_choice(COVERING)

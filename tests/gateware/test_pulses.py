@@ -9,7 +9,7 @@ from amaranth.lib import wiring
 from contactfpga.wire import framing, protocol
 from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
-from contactfpga_sim.golden.request import command, heard, pulses, request
+from contactfpga_sim.model.golden.request import command, heard, pulses, request
 
 BITS = (2, 3)
 IDLE = 5

@@ -8,7 +8,7 @@ from wire import check
 
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import Receiver
-from contactfpga_sim.golden.request import heard
+from contactfpga_sim.model.golden.request import heard
 
 BIT = 3
 BYTE = 10 * BIT

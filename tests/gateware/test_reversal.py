@@ -22,10 +22,10 @@ from toy_labeller import TOY
 
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import Widths
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import REVERSAL, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import Timeline, Trace, driven, predict
+from contactfpga_sim.model.golden import Timeline, Trace, driven, predict
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import REVERSAL, pairwise, skin_for, stimulus
 
 COVERING = pairwise(REVERSAL)
 

@@ -12,14 +12,14 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.record import Stimulus
-from contactfpga_sim.golden import Timeline, driven, predict
-from contactfpga_sim.golden import reversal_guard as golden_guard
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.trace import Cuts
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline, driven, predict
+from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.record import Stimulus
 
 SLOW = {"clock_hz": 1_000_000, "baud": 100_000, "precharge_us": 1.0, "settle_us": 2.0, "release_us": 1.0, "guard": True}
 

@@ -11,7 +11,7 @@ from reversal import Slot, frames, projected, slots, small
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import precharge, reversal
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.golden import guard
+from contactfpga_sim.model.golden import guard
 
 
 @dataclasses.dataclass(frozen=True)

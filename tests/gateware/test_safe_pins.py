@@ -9,11 +9,11 @@ from sample import sample
 from contactfpga import Skin
 from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.scan import raster
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, guard, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.trace import Cuts
+from contactfpga_sim.model.golden import Timeline, guard, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 FIELDS = {
     "rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000,

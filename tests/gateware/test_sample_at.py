@@ -12,12 +12,12 @@ from sample import sample
 from contactfpga import Skin
 from contactfpga.skin.derived import SAMPLE_AT, Derived
 from contactfpga_hdl.scan.sample_at import SampleAt, sample_at_ports
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import command, request
-from contactfpga_sim.golden.trace import Cuts
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import command, request
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
 
 TINY = {"clock_hz": 1_000_000, "baud": 250_000, "report": "cells"}
 FAST = {"scan": "reversal", "precharge_us": 3, "project_us": 6}

@@ -13,13 +13,13 @@ from contactfpga.wire.faults import SelfTestSlot
 from contactfpga.zones.self_test import SelfTest
 from contactfpga_hdl.scan import self_test as gateware
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import command, request
-from contactfpga_sim.sheet.shift import Sheet
-from contactfpga_sim.sheet.shorts import Shorts
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import command, request
+from contactfpga_sim.model.sheet.shift import Sheet
+from contactfpga_sim.model.sheet.shorts import Shorts
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
 
 
 @pytest.fixture

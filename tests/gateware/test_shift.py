@@ -14,13 +14,13 @@ from contactfpga import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.pins import column_pins, row_pins
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.cosim.covering import stimulus
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.raster import scans
-from contactfpga_sim.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, Sheet
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.raster import scans
+from contactfpga_sim.model.sheet.shift import COLUMN_PINS, ROW_PINS, ColumnRegisters, RowRegisters, Sheet
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.cosim.covering import stimulus
 
 LINES = [(1, 1), (2, 2), (8, 1), (9, 1), (9, 2), (17, 1), (17, 2), (17, 3)]
 """Lines, chains."""

@@ -13,15 +13,15 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan import raster
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.units import Units
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, guard, predict, units
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.hello import State
-from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.request import Heard, Request, command
-from contactfpga_sim.golden.trace import Cuts
-from contactfpga_sim.sheet import converter
+from contactfpga_sim.model.golden import Timeline, guard, predict, units
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.hello import State
+from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.request import Heard, Request, command
+from contactfpga_sim.model.golden.trace import Cuts
+from contactfpga_sim.model.sheet import converter
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 SMALL = {"rows": 2, "columns": 2, "settle_us": 14, "release_us": 2, "clock_hz": 1_000_000, "baud": 250_000}
 TILTED = [[1, 1, 1], [127, -127, 3], [0, 0, -5], [1, -2, 1]]

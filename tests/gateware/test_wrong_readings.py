@@ -13,14 +13,14 @@ from sample import sample
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.cosim import bench_amaranth, bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, guard, predict, requests
-from contactfpga_sim.golden import reversal_guard as golden_guard
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.sheet.matrix import Matrix
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline, guard, predict, requests
+from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.sheet.matrix import Matrix
+from contactfpga_sim.verify.cosim import bench_amaranth, bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 NOTHING = np.zeros((FAST.rows, FAST.columns), bool)
 PROJECT = facts(FAST).project

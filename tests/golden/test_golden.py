@@ -13,16 +13,16 @@ from shadows import zones_by_image_tools
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
-from contactfpga_sim import golden
-from contactfpga_sim.cosim.covering import CHOICES, pairwise, skin_for, stimulus
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.debounce import debounced
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.hello import State, hello
-from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.packet import Packet, stuff
-from contactfpga_sim.golden.request import Heard
-from contactfpga_sim.golden.uart import Byte, line, received
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.debounce import debounced
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.hello import State, hello
+from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.packet import Packet, stuff
+from contactfpga_sim.model.golden.request import Heard
+from contactfpga_sim.model.golden.uart import Byte, line, received
+from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for, stimulus
 
 SCAN = 16 * 72  # reference Skin: 60 clocks settle, 12 release
 FRESH = np.zeros((16, 16), bool)
@@ -328,6 +328,6 @@ def test_clocks_agree_with_the_gatewares_table_where_decimals_are_not_exact(mega
 
 
 def test_golden_model_runs_without_amaranth():
-    code = "import sys, contactfpga_sim.golden; print(*sys.modules)"
+    code = "import sys, contactfpga_sim.model.golden; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not [name for name in loaded if name.split(".")[0] in ("amaranth", "contactfpga_hdl")]

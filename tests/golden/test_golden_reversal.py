@@ -5,7 +5,7 @@ import pytest
 from reversal import small, zones
 
 from contactfpga.skin.widths import Widths
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.model.golden import Timeline, predict
 
 
 @pytest.mark.parametrize("labeller", ["run", "serial", "projection", "single"])

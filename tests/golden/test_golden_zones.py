@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from contactfpga_sim import golden
-from contactfpga_sim.golden.label import labelling
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.golden.label import labelling
 
 CONNECTIVITIES = (4, 8)
 SHAPES = [

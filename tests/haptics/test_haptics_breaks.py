@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga.haptics import Plane
-from contactfpga_sim.pages import failures_page, haptics_felt
-from contactfpga_sim.studies.failures.knob import Turned
-from contactfpga_sim.studies.haptics import breaks, felt, pairs
-from contactfpga_sim.studies.haptics.breaks import STUDIES
+from contactfpga.robot.haptics import Plane
+from contactfpga_sim.lab.failures.knob import Turned
+from contactfpga_sim.lab.haptics import breaks, felt, pairs
+from contactfpga_sim.lab.haptics.breaks import STUDIES
+from contactfpga_sim.lab.pages import failures_page, haptics_felt
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
 SLOW = ("shape", "skew", "edge")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bumpers import flat
 
-from contactfpga.haptics import (
+from contactfpga.robot.haptics import (
     Center,
     Closing,
     ClosingWatch,
@@ -22,7 +22,7 @@ from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.units import UnitSamples
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.haptics import coverage
+from contactfpga_sim.lab.haptics import coverage
 
 COLUMNS = 12
 AROUND_MM = 5.0 * COLUMNS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bumpers import flat
 
-from contactfpga.haptics import ClosingWatch, HapticsError, LoadCells, Plane
+from contactfpga.robot.haptics import ClosingWatch, HapticsError, LoadCells, Plane
 from contactfpga.skin import Skin
 
 ROWS = 8

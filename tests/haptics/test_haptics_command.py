@@ -8,7 +8,7 @@ import pytest
 from bumpers import exerted, flat, on_cylinder
 
 import contactfpga
-from contactfpga import cli
+from contactfpga.tools import cli
 
 WRENCH = {"force_n": [0, 0, -12], "moment_nm": [0.12, 0.24, 0]}
 ONE = {"point_m": [0.02, -0.01, 0], "normal": [0, 0, 1]}

@@ -17,8 +17,8 @@ from bumpers import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga.haptics import Cylinder, HapticsError, contacts
-from contactfpga.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
+from contactfpga.robot.haptics import Cylinder, HapticsError, contacts
+from contactfpga.robot.haptics.contact import FULL_WRENCH, PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
 
 SEEDS = st.integers(0, 2**32 - 1)
 MU = 0.5

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from contactfpga.errors import MissingExtra
-from contactfpga.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
+from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION
 
 SEEDS = st.integers(0, 2**32 - 1)
 MU = 0.5

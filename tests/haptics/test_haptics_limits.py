@@ -5,10 +5,10 @@ import time
 import numpy as np
 import pytest
 
-from contactfpga.commands.haptics.reading import MAX_CONTACTS
-from contactfpga.haptics import contacts
-from contactfpga.haptics.contact import Touch
-from contactfpga.haptics.wrench import Wrench
+from contactfpga.robot.haptics import contacts
+from contactfpga.robot.haptics.contact import Touch
+from contactfpga.robot.haptics.wrench import Wrench
+from contactfpga.tools.commands.haptics.reading import MAX_CONTACTS
 
 pytest.importorskip("clarabel")
 ROUNDING_N = 1e-12

@@ -8,8 +8,7 @@ from bumpers import flat
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.console.forces import Forces
-from contactfpga.haptics import (
+from contactfpga.robot.haptics import (
     AloneWatch,
     Cylinder,
     Drift,
@@ -21,12 +20,13 @@ from contactfpga.haptics import (
     contacts,
     felt,
 )
-from contactfpga.haptics.table import write
+from contactfpga.robot.haptics.table import write
+from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.scenes.contacts import Contact, Track, disc
-from contactfpga_sim.scenes.felt import Felt
-from contactfpga_sim.scenes.scene import Scene
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
+from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.scene import Scene
 
 SKIN = Skin(rows=4, columns=4, units=3, unit_sums=[[1, 1, 1], [127, -127, 5]])  # which other tests compile, too
 CORNER = (-0.015, -0.015)

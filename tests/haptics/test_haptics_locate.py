@@ -6,13 +6,24 @@ import numpy as np
 import pytest
 from bumpers import exerted, hexapod, on_cylinder
 
-from contactfpga.haptics import Closing, Cylinder, HapticsError, Locator, Place, Plane, Touch, closed, contacts, solve
-from contactfpga.haptics.posterior import radius_95
-from contactfpga.haptics.wrench import Wrench
+from contactfpga.robot.haptics import (
+    Closing,
+    Cylinder,
+    HapticsError,
+    Locator,
+    Place,
+    Plane,
+    Touch,
+    closed,
+    contacts,
+    solve,
+)
+from contactfpga.robot.haptics.posterior import radius_95
+from contactfpga.robot.haptics.wrench import Wrench
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.haptics import coverage
+from contactfpga_sim.lab.haptics import coverage
 
 QUIET = coverage.Case("closings", 5.0, coverage.RAMP, 0.0, 0.0)
 

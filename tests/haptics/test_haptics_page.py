@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from contactfpga_sim.pages import haptics_page, writer
+from contactfpga_sim.lab.pages import haptics_page, writer
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "haptics.md"
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from bumpers import exerted, flat, hexapod, on_cylinder, touch, units, wrench
 
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.sense import Model, Sheet
-from contactfpga.cover.switch import Switch
-from contactfpga.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, resolution
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.sense import Model, Sheet
+from contactfpga.design.cover.switch import Switch
+from contactfpga.robot.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, resolution
 from contactfpga.skin import sheet
 
 MU = 0.5

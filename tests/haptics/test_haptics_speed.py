@@ -14,7 +14,7 @@ from bumpers import (
     touch,
 )
 
-from contactfpga.haptics import Cylinder, Plane, batch, contacts
+from contactfpga.robot.haptics import Cylinder, Plane, batch, contacts
 
 MU = 0.5
 

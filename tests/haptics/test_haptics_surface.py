@@ -12,7 +12,7 @@ from bumpers import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga.haptics import Cylinder, HapticsError, Noise, Plane
+from contactfpga.robot.haptics import Cylinder, HapticsError, Noise, Plane
 
 SEEDS = st.integers(0, 2**32 - 1)
 

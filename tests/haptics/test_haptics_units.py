@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contactfpga
-from contactfpga.haptics import Bumper, DriftWatch, HapticsError, LoadCells, Motion, calibrate, table
-from contactfpga.haptics.calibrate import rank_of
+from contactfpga.robot.haptics import Bumper, DriftWatch, HapticsError, LoadCells, Motion, calibrate, table
+from contactfpga.robot.haptics.calibrate import rank_of
 
 SEEDS = st.integers(0, 2**32 - 1)
 

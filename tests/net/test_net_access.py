@@ -12,10 +12,10 @@ from net_processes import Streaming, assert_loopback_alone, free_endpoint, publi
 from small_port import SmallPort, published
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.net import port as net_port
-from contactfpga.net import session
-from contactfpga.net.message import MOST_ASKED, Message
+from contactfpga.robot.net import port as net_port
+from contactfpga.robot.net import session
+from contactfpga.robot.net.message import MOST_ASKED, Message
+from contactfpga.tools import cli
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request
 

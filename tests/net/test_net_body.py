@@ -8,9 +8,9 @@ from net_processes import free_endpoint
 from small_port import SmallPort, published
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.body import Body, NoLinkData
-from contactfpga.net import session
+from contactfpga.robot.body import Body, NoLinkData
+from contactfpga.robot.net import session
+from contactfpga.tools import cli
 
 pytest.importorskip("zenoh")
 
@@ -73,8 +73,8 @@ def test_links_on_another_machine_come_and_go_by_themselves(robot, endpoint, cap
 def test_links_that_nobody_publishes_are_lost_and_leave_nothing_behind(robot, endpoint, monkeypatch):
     """They are tried again and again: what a try leaves open would run out one day."""
     psutil = pytest.importorskip("psutil")
-    monkeypatch.setattr("contactfpga.net.port.FOUND_S", 0.02)
-    monkeypatch.setattr("contactfpga.body.reader.RETRY_S", 0.02)
+    monkeypatch.setattr("contactfpga.robot.net.port.FOUND_S", 0.02)
+    monkeypatch.setattr("contactfpga.robot.body.reader.RETRY_S", 0.02)
     tries = []
     with session.listening(endpoint):
         opened = Body.load(robot).open()

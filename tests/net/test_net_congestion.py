@@ -10,9 +10,9 @@ from small_port import SmallPort, published
 
 import contactfpga
 from contactfpga.driver import transport
-from contactfpga.net import port as net_port
-from contactfpga.net import session
-from contactfpga.net.message import Message
+from contactfpga.robot.net import port as net_port
+from contactfpga.robot.net import session
+from contactfpga.robot.net.message import Message
 
 pytest.importorskip("zenoh")
 

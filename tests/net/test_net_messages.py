@@ -8,8 +8,8 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.net.address import LOOPBACK, is_loopback, key_of, own_endpoint, parse
-from contactfpga.net.message import BEAT_S, MOST_BYTES, QUIET_S, Counters, Message, Stream
+from contactfpga.robot.net.address import LOOPBACK, is_loopback, key_of, own_endpoint, parse
+from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Counters, Message, Stream
 from contactfpga.wire.asked import Asked, asked_in
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 import contactfpga
-from contactfpga.net import port as net_port
-from contactfpga.net.message import BREAK_S, MOST_BYTES, Message
+from contactfpga.robot.net import port as net_port
+from contactfpga.robot.net.message import BREAK_S, MOST_BYTES, Message
 
 zenoh = pytest.importorskip("zenoh")
 

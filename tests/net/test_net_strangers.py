@@ -15,10 +15,10 @@ from fake_board import FakeBoard, wait_until
 from net_processes import Streaming, free_endpoint, publish, router
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.net import session
-from contactfpga.net.address import own_endpoint
-from contactfpga.net.message import Message
+from contactfpga.robot.net import session
+from contactfpga.robot.net.address import own_endpoint
+from contactfpga.robot.net.message import Message
+from contactfpga.tools import cli
 
 pytest.importorskip("zenoh")
 pytestmark = pytest.mark.usefixtures("_closed_ports")

@@ -12,10 +12,10 @@ from fake_board import FakeBoard, background, wait_until
 from net_processes import Relay, Streaming, assert_loopback_alone, free_endpoint, publish, router
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.commands import publish as command
-from contactfpga.console import interrupt
-from contactfpga.net import session
+from contactfpga.robot.net import session
+from contactfpga.tools import cli
+from contactfpga.tools.commands import publish as command
+from contactfpga.tools.console import interrupt
 
 psutil = pytest.importorskip("psutil")
 pytest.importorskip("zenoh")

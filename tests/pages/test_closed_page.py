@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from contactfpga.choices.labellers import LABELLERS
-from contactfpga_sim.pages import closed_page, writer
+from contactfpga_sim.lab.pages import closed_page, writer
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/labelling.md"
 

@@ -91,9 +91,9 @@ def there(name: str) -> bool:
 
 
 def test_a_name_that_is_not_there_is_seen():
-    assert there("contactfpga_sim.board.virtual.VirtualBoard")
-    assert there("contactfpga_sim.board.virtual")
-    assert not there("contactfpga_sim.board.VirtualBoard")
+    assert there("contactfpga_sim.model.board.virtual.VirtualBoard")
+    assert there("contactfpga_sim.model.board.virtual")
+    assert not there("contactfpga_sim.model.board.VirtualBoard")
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda path: path.name)

@@ -6,7 +6,7 @@ import pytest
 from sample import sample
 
 from contactfpga.skin import Skin
-from contactfpga_sim.pages import figures, writer
+from contactfpga_sim.lab.pages import figures, writer
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/performance.md"

@@ -9,9 +9,9 @@ import pytest
 from sample import sample
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board.labeller import LabelBench
-from contactfpga_sim.golden import volume
-from contactfpga_sim.pages import figures, label_figures, writer
+from contactfpga_sim.lab.pages import figures, label_figures, writer
+from contactfpga_sim.model.board.labeller import LabelBench
+from contactfpga_sim.model.golden import volume
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/performance.md").read_text()

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from sample import sample
 
-from contactfpga.circuit import load_checked, needed
+from contactfpga.design.circuit import load_checked, needed
 from contactfpga.skin import Skin
-from contactfpga_sim.pages import maker_page, schematic, writer
+from contactfpga_sim.lab.pages import maker_page, schematic, writer
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "maker.md"

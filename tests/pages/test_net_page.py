@@ -2,8 +2,8 @@
 
 import collections
 
-from contactfpga_sim.pages import net_page
-from contactfpga_sim.studies.net import load
+from contactfpga_sim.lab.net import load
+from contactfpga_sim.lab.pages import net_page
 
 
 def test_each_load_is_measured_once_for_all_tables_and_the_picture(monkeypatch, tmp_path):

@@ -4,7 +4,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from contactfpga_sim.pages import scenes_picture
+from contactfpga_sim.lab.pages import scenes_picture
 
 PICTURE = Path(__file__).resolve().parents[2] / "docs" / "images" / "scenes.svg"
 SVG = "{http://www.w3.org/2000/svg}"

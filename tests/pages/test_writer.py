@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from contactfpga.console.outputs import OutputError
-from contactfpga_sim.pages import writer
+from contactfpga.tools.console.outputs import OutputError
+from contactfpga_sim.lab.pages import writer
 
 PAGE = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
 

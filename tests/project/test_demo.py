@@ -8,8 +8,8 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga_sim import demo
-from contactfpga_sim.cosim import bench_cocotb
-from contactfpga_sim.scenes.scene import NAMES
+from contactfpga_sim.model.scenes.scene import NAMES
+from contactfpga_sim.verify.cosim import bench_cocotb
 
 
 def assert_all_said(out, runs, picture):

@@ -78,7 +78,7 @@ def test_the_wheel_holds_the_three_packages_and_the_examples(wheel):
     }
     expected |= {f"contactfpga/examples/{path}": data for path, data in files_in(ROOT / "examples").items()}
     texts = files_in(ROOT / "ros2" / "contactfpga_msgs" / "msg")
-    expected |= {f"contactfpga/ros/msg/{path}": data for path, data in texts.items()}
+    expected |= {f"contactfpga/robot/ros/msg/{path}": data for path, data in texts.items()}
     assert {name: data for name, data in contents(wheel).items() if ".dist-info/" not in name} == expected
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(expected)
     assert {Path(name).suffix for name in expected} >= {".py", ".toml", ".cpp", ".h", ".msg"}

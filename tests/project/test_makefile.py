@@ -73,7 +73,7 @@ def test_names_of_files_reach_the_command_as_they_are(tmp_path, goal, option, na
     variable = option.removeprefix("--").upper()
     done = make(clone(tmp_path / "clone"), "-n", goal, "BOARD=icestick", f"{variable}={name}")
     printed = done.stdout.replace("\\\n", " ").splitlines()
-    started = r"\S*(contactfpga build|python -m contactfpga_sim.netlist.replay)"
+    started = r"\S*(contactfpga build|python -m contactfpga_sim.verify.netlist.replay)"
     (command,) = (line for line in printed if re.match(started, line))
     words = shlex.split(command)
     assert words[words.index(option) + 1] == name

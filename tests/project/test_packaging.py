@@ -58,7 +58,7 @@ def test_the_command_begins_without_anything_to_load():
     assert loaded_by(project()["scripts"]["contactfpga"].partition(":")[0]) == {"contactfpga"}
 
 
-@pytest.mark.parametrize("module", ["contactfpga.driver.driver", "contactfpga.haptics", "contactfpga.cli"])
+@pytest.mark.parametrize("module", ["contactfpga.driver.driver", "contactfpga.robot.haptics", "contactfpga.tools.cli"])
 def test_host_loads_only_its_dependencies(module):
     direct = {normal(requirement) for requirement in project()["dependencies"]}
     provided = importlib.metadata.packages_distributions()
@@ -67,7 +67,7 @@ def test_host_loads_only_its_dependencies(module):
 
 
 def test_golden_model_loads_no_amaranth():
-    assert loaded_by("contactfpga_sim.golden").isdisjoint({"amaranth", "contactfpga_hdl"})
+    assert loaded_by("contactfpga_sim.model.golden").isdisjoint({"amaranth", "contactfpga_hdl"})
 
 
 def test_pin_tables_load_no_amaranth():

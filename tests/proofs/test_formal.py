@@ -5,11 +5,11 @@ from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
-from contactfpga_sim.proofs import upset
-from contactfpga_sim.proofs.__main__ import CASES, main
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.solve import prove, search
+from contactfpga_sim.verify.proofs import upset
+from contactfpga_sim.verify.proofs.__main__ import CASES, main
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.solve import prove, search
 
 LONG_S = 7000
 LONG = {

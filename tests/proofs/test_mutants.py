@@ -7,14 +7,14 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga.skin.units import SUM_THRESHOLD, THRESHOLD
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.golden import Timeline, units
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import heard
-from contactfpga_sim.mutants import aig, campaign, netlist, options, proof, sheets, solve, stimuli, trial
-from contactfpga_sim.mutants.skins import OPTIONS, SEVERAL, SKINS
-from contactfpga_sim.mutants.stimuli import Stimulus
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden import Timeline, units
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import heard
+from contactfpga_sim.verify.cosim.compare import Mismatch
+from contactfpga_sim.verify.mutants import aig, campaign, netlist, options, proof, sheets, solve, stimuli, trial
+from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
+from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 SAMPLE = 40
 

@@ -34,15 +34,15 @@ import contactfpga
 from contactfpga import Skin
 from contactfpga.driver import mcap_part, mcap_records
 from contactfpga.driver.mcap_records import MAGIC, RecordingError
-from contactfpga.recordings import Recording, Session, messages
-from contactfpga.recordings.mcap_file import McapFile
-from contactfpga.recordings.recover import recover
+from contactfpga.tools.recordings import Recording, Session, messages
+from contactfpga.tools.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings.recover import recover
 
 BIG = 300 << 20
 PEAK = 150e6
 LONG_S = 60.0
 ALONE = """import re, sys
-from contactfpga import cli
+from contactfpga.tools import cli
 status = cli.main(sys.argv[1:])
 print(re.search(r"VmHWM:\\s*(\\d+) kB", open("/proc/self/status").read())[1])
 sys.exit(status)"""

@@ -11,7 +11,7 @@ from recorded_stream import StreamPort, recorded
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.recordings import Recording, table
+from contactfpga.tools.recordings import Recording, table
 from contactfpga.wire.protocol import Frame, no_records
 
 

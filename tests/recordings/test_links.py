@@ -9,8 +9,8 @@ from rosbags.highlevel import AnyReader
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.body import Body
-from contactfpga.recordings import Recording, Session
+from contactfpga.robot.body import Body
+from contactfpga.tools.recordings import Recording, Session
 from contactfpga.wire.hellos import Cutter
 
 SKIN = Skin()
@@ -60,8 +60,8 @@ def test_a_stream_is_cut_before_the_delimiter_of_its_hello(before, size):
 
 
 def test_a_link_without_a_hello_is_left_out(tmp_path):
-    from contactfpga.recordings import messages
-    from contactfpga.recordings.mcap_file import McapFile
+    from contactfpga.tools.recordings import messages
+    from contactfpga.tools.recordings.mcap_file import McapFile
 
     file = McapFile(tmp_path / "x.mcap")
     for link, data in (("arm", ModelBoard(SKIN).hello() + ModelBoard(SKIN).frame()), ("leg", b"\0\0noise\0")):
@@ -75,8 +75,8 @@ def test_a_link_without_a_hello_is_left_out(tmp_path):
 
 def test_links_are_in_the_order_in_which_they_were_added(tmp_path):
     """And not in that in which their boards spoke."""
-    from contactfpga.recordings import messages
-    from contactfpga.recordings.mcap_file import McapFile
+    from contactfpga.tools.recordings import messages
+    from contactfpga.tools.recordings.mcap_file import McapFile
 
     file = McapFile(tmp_path / "x.mcap")
     for link in ("arm", "leg", "chest"):
@@ -222,7 +222,7 @@ def test_forces_of_units_are_messages(tmp_path):
     taken = []
 
     class Found(list):
-        from contactfpga.haptics import Wrench
+        from contactfpga.robot.haptics import Wrench
 
         wrench = Wrench((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), frame="bumper")
 

@@ -9,8 +9,8 @@ from recorded_stream import StreamPort, recorded
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.recordings import Recording
-from contactfpga.recordings.session import Session
+from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings.session import Session
 
 SKIN = Skin()
 LONG = 60.0

@@ -4,7 +4,7 @@ import pytest
 import ros_types
 
 from contactfpga.driver import mcap_part
-from contactfpga.recordings import messages
+from contactfpga.tools.recordings import messages
 from contactfpga.zones.units import UnitSamples
 
 NS = 1_700_000_000_123_456_789

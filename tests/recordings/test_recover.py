@@ -14,10 +14,10 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.recordings import Recording
-from contactfpga.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
-from contactfpga.recordings.recover import recover
-from contactfpga.recordings.whole_file import RecordingFailed
+from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
+from contactfpga.tools.recordings.recover import recover
+from contactfpga.tools.recordings.whole_file import RecordingFailed
 
 SKIN = Skin()
 LONG = 60.0

@@ -4,9 +4,9 @@ import pytest
 from recorded_stream import NAMES, StreamPort, recorded, recorded_both
 
 import contactfpga
-from contactfpga import cli
-from contactfpga.recordings import Recording
-from contactfpga.recordings.recorder import Split
+from contactfpga.tools import cli
+from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings.recorder import Split
 
 SPLIT = {"split": Split(bytes=3_000), "bytes_only": True}
 
@@ -30,7 +30,7 @@ def test_split_files_each_begin_with_a_hello_and_lose_nothing(tmp_path):
 
 
 def test_a_link_that_says_no_hello_delays_no_file_for_long(tmp_path, monkeypatch):
-    from contactfpga.recordings import recorder
+    from contactfpga.tools.recordings import recorder
 
     monkeypatch.setattr(recorder, "PATIENCE_S", 0.0)
     port = StreamPort(frames=1000, hello_every=1 << 30)

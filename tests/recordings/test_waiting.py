@@ -11,9 +11,9 @@ from recorded_stream import StreamPort, recorded
 
 import contactfpga
 from contactfpga.driver.conversation import Conversation
-from contactfpga.recordings import link_recorder
-from contactfpga.recordings.link_messages import LinkMessages
-from contactfpga.recordings.session import Session
+from contactfpga.tools.recordings import link_recorder
+from contactfpga.tools.recordings.link_messages import LinkMessages
+from contactfpga.tools.recordings.session import Session
 
 
 @pytest.mark.parametrize(("slow_s", "end_s"), [(9.0, 0.05), (0.8, 60.0)])

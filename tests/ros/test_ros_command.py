@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from contactfpga import cli
+from contactfpga.tools import cli
 
 
 def refused(capsys, *arguments):

@@ -9,9 +9,9 @@ import pytest
 from ros_messages import HEAD, samples
 
 import contactfpga
-from contactfpga.ros import dds
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.settings import TOPICS
+from contactfpga.robot.ros import dds
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.settings import TOPICS
 
 pytest.importorskip("cyclonedds")
 

@@ -10,10 +10,10 @@ from tracked import SKIN, frame
 from contactfpga import Skin
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ReadTimeout, ReplayEnded
-from contactfpga.haptics import LoadCells, Plane, Unit, contacts
-from contactfpga.ros.feed import Feed
-from contactfpga.ros.moments import Moments
-from contactfpga.ros.settings import TOPICS, Settings
+from contactfpga.robot.haptics import LoadCells, Plane, Unit, contacts
+from contactfpga.robot.ros.feed import Feed
+from contactfpga.robot.ros.moments import Moments
+from contactfpga.robot.ros.settings import TOPICS, Settings
 from contactfpga.zones.host_line import HostLine
 
 NOW_NS = 1_795_000_000_000_000_000

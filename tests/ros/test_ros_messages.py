@@ -11,8 +11,8 @@ from tracked import SKIN, frame
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.ros import cdr, convert, hashes, types
-from contactfpga.ros.standard import STANDARD
+from contactfpga.robot.ros import cdr, convert, hashes, types
+from contactfpga.robot.ros.standard import STANDARD
 
 
 @pytest.mark.parametrize(("name", "message"), list(samples()), ids=lambda one: one if isinstance(one, str) else "")

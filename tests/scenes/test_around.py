@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from contactfpga import cli, examples
-from contactfpga.cover import Cover
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes import scene as scenes
-from contactfpga_sim.scenes.contacts import Contact
-from contactfpga_sim.scenes.families import placements
-from contactfpga_sim.scenes.file import SceneFile
-from contactfpga_sim.scenes.placing import scene_of
-from contactfpga_sim.scenes.scene import Scene
+from contactfpga.tools import cli, examples
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes import scene as scenes
+from contactfpga_sim.model.scenes.contacts import Contact
+from contactfpga_sim.model.scenes.families import placements
+from contactfpga_sim.model.scenes.file import SceneFile
+from contactfpga_sim.model.scenes.placing import scene_of
+from contactfpga_sim.model.scenes.scene import Scene
 
 FOREARM = Skin.load(examples() / "forearm.toml")
 PITCH = FOREARM.pitch_x_mm

@@ -6,9 +6,9 @@ import pickle
 import numpy as np
 import pytest
 
-from contactfpga.cover import Cover, Switch
+from contactfpga.design.cover import Cover, Switch
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.families import FAMILIES, placements
+from contactfpga_sim.model.scenes.families import FAMILIES, placements
 
 FINE = Skin(rows=64, columns=64, pitch_x_mm=5.0, pitch_y_mm=5.0, settle_us=20.0)
 SMALL = Skin(rows=13, columns=6, pitch_x_mm=3.4, pitch_y_mm=3.4, settle_us=20.0)

@@ -8,14 +8,14 @@ import pytest
 from sample import sample
 from scipy import ndimage
 
-from contactfpga.cover import Ball, Cover, Switch
+from contactfpga.design.cover import Ball, Cover, Switch
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes import scene as scenes
-from contactfpga_sim.scenes.contacts import Contact, Swing, Track
-from contactfpga_sim.scenes.recordings import DEFAULT_HZ, Recording
-from contactfpga_sim.scenes.scene import Scene
-from contactfpga_sim.scenes.shapes import SHAPES, variants
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes import scene as scenes
+from contactfpga_sim.model.scenes.contacts import Contact, Swing, Track
+from contactfpga_sim.model.scenes.recordings import DEFAULT_HZ, Recording
+from contactfpga_sim.model.scenes.scene import Scene
+from contactfpga_sim.model.scenes.shapes import SHAPES, variants
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")

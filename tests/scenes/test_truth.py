@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import integrate, ndimage
 
-from contactfpga.cover import Ellipse, Rectangle
-from contactfpga_sim.scenes.truth import TOUCH_M, Box, truth_of
+from contactfpga.design.cover import Ellipse, Rectangle
+from contactfpga_sim.model.scenes.truth import TOUCH_M, Box, truth_of
 
 CM = 0.01
 

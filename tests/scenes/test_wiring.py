@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from reversal import FAST
 
-from contactfpga.circuit import Circuit, phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels
+from contactfpga.design.circuit import Circuit, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
 from contactfpga.skin import Skin
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.sheet.levels import at_rest
-from contactfpga_sim.sheet.line import Line, RowLine, lines_of
-from contactfpga_sim.sheet.wiring import Wiring
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet.levels import at_rest
+from contactfpga_sim.model.sheet.line import Line, RowLine, lines_of
+from contactfpga_sim.model.sheet.wiring import Wiring
 
 SIZE = 3
 PATTERNS = (np.arange(1 << SIZE * SIZE)[:, None] >> np.arange(SIZE * SIZE) & 1).astype(bool).reshape(-1, SIZE, SIZE)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin, SkinError, examples
-from contactfpga.cover import Cover, CoverError, Switch, load_cover, table
+from contactfpga.design.cover import Cover, CoverError, Switch, load_cover, table
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}

@@ -9,8 +9,8 @@ import pytest
 
 import contactfpga
 from contactfpga import Skin, SkinError, cli
-from contactfpga.body import Body, BodyError
 from contactfpga.choices.choice import FIELDS
+from contactfpga.robot.body import Body, BodyError
 from contactfpga.skin.several import Several
 
 NAMED = "evil_module:x"
@@ -181,8 +181,8 @@ def test_every_command_refuses_and_says_what_to_do(mark, skin, tmp_path, capsys,
 def test_the_texts_of_a_recording_import_nothing(mark, tmp_path, monkeypatch, capsys):
     pytest.importorskip("amaranth")
     pytest.importorskip("mcap")
-    from contactfpga.body import packed
-    from contactfpga.recordings import Recording
+    from contactfpga.robot.body import packed
+    from contactfpga.tools.recordings import Recording
 
     evil = f'"l\\u0061beller" = "{NAMED}"\n'
     (tmp_path / "skin.toml").write_text(Skin().to_toml())

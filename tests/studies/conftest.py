@@ -5,9 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from fits import Shortcuts
 
-from contactfpga_sim.studies import kept, pool
-from contactfpga_sim.studies.chart import speed
-from contactfpga_sim.studies.fit import cost
+from contactfpga_sim.lab import kept, pool
+from contactfpga_sim.lab.chart import speed
+from contactfpga_sim.lab.fit import cost
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from contactfpga.cover.arm import Arm
-from contactfpga.cover.impact import COMPRESSION_TIME
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.plant import Plant
-from contactfpga_sim.studies.arm.run import run
+from contactfpga.design.cover.arm import Arm
+from contactfpga.design.cover.impact import COMPRESSION_TIME
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.plant import Plant
+from contactfpga_sim.lab.arm.run import run
 
 PAPER = Case.load("paper")
 STIFFNESS = 119560.68

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga import cli
 from contactfpga.skin import Skin
-from contactfpga_sim.pages import arm_page
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.arm import latency_charts, sweep
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.run import run
-from contactfpga_sim.studies.arm.sweep import Task
+from contactfpga.tools import cli
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.arm import latency_charts, sweep
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.run import run
+from contactfpga_sim.lab.arm.sweep import Task
+from contactfpga_sim.lab.pages import arm_page
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -81,8 +81,8 @@ def test_charts_of_an_arm_at_rest_are_refused(capsys):
 
 
 def test_the_arm_needs_no_more_than_the_simulation():
-    arm = "contactfpga_sim.studies.arm"
-    code = f"import sys, contactfpga.cli, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
+    arm = "contactfpga_sim.lab.arm"
+    code = f"import sys, contactfpga.tools.cli, {arm}.latency_charts; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -7,13 +7,13 @@ import pytest
 from sample import sample
 from scipy.optimize import brentq
 
-from contactfpga.cover import point
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import point
+from contactfpga.design.cover.switch import Switch
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.plant import Plant, finite
-from contactfpga_sim.studies.arm.run import run
-from contactfpga_sim.studies.arm.world import Faults
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.plant import Plant, finite
+from contactfpga_sim.lab.arm.run import run
+from contactfpga_sim.lab.arm.world import Faults
 
 PAPER = Case.load("paper")
 UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}

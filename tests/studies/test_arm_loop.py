@@ -11,12 +11,12 @@ import pytest
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.latency import latency_s
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.run import run
-from contactfpga_sim.studies.arm.usb import Chip
-from contactfpga_sim.studies.arm.world import Faults
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.run import run
+from contactfpga_sim.lab.arm.usb import Chip
+from contactfpga_sim.lab.arm.world import Faults
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline, predict
 
 SKIN = Skin()
 PAPER = Case.load("paper")

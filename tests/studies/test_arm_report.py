@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga import cli
-from contactfpga_sim.pages import arm_page, writer
-from contactfpga_sim.studies.arm import comply, report
-from contactfpga_sim.studies.arm.case import Case, CaseError, names
-from contactfpga_sim.studies.arm.run import run
+from contactfpga.tools import cli
+from contactfpga_sim.lab.arm import comply, report
+from contactfpga_sim.lab.arm.case import Case, CaseError, names
+from contactfpga_sim.lab.arm.run import run
+from contactfpga_sim.lab.pages import arm_page, writer
 
 PAPER = Case.load("paper")
 PUSH = Case.load("push")

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga import cli
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm import report
-from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.run import WITH_UNITS, run
-from contactfpga_sim.studies.arm.under import THRESHOLD_N, Under
+from contactfpga.tools import cli
+from contactfpga_sim.lab.arm import report
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.run import WITH_UNITS, run
+from contactfpga_sim.lab.arm.under import THRESHOLD_N, Under
 
 PAPER = Case.load("paper").but(run={"duration_s": 0.03})
 HALFWAY = PAPER.but(touch=({"x_mm": 85.0, "y_mm": 85.0},))

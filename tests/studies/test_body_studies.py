@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.body import outages, registering
+from contactfpga_sim.lab.body import outages, registering
 
 
 @pytest.mark.parametrize("outage", [outages.OUTAGES[0], outages.OUTAGES[3]], ids=lambda outage: outage.name)

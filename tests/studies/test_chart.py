@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.cosim.compare import Mismatch
-from contactfpga_sim.golden import predict, zones
-from contactfpga_sim.pages import chart_page, chart_pictures, writer
-from contactfpga_sim.scenes.scene import edge, fingertip, palm, two_fingers
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.chart import errors, front_picture, host, numbers, picture, speed, steady, study
-from contactfpga_sim.studies.chart.errors import Blob, Interval
-from contactfpga_sim.studies.chart.methods import EXTENT_MM, METHODS
-from contactfpga_sim.studies.chart.study import FAMILIES_DRAWN, Task
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.chart import errors, front_picture, host, numbers, picture, speed, steady, study
+from contactfpga_sim.lab.chart.errors import Blob, Interval
+from contactfpga_sim.lab.chart.methods import EXTENT_MM, METHODS
+from contactfpga_sim.lab.chart.study import FAMILIES_DRAWN, Task
+from contactfpga_sim.lab.pages import chart_page, chart_pictures, writer
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden import predict, zones
+from contactfpga_sim.model.scenes.scene import edge, fingertip, palm, two_fingers
+from contactfpga_sim.verify.cosim.compare import Mismatch
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = METHODS["run, 20 mm"]

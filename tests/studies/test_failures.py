@@ -13,14 +13,14 @@ from sample import sample
 from scipy import ndimage
 from shadows import zones_by_image_tools
 
-from contactfpga import cli
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import failures_page, writer
-from contactfpga_sim.studies.failures import axes, electric, knob_pictures, line, shapes, touch
-from contactfpga_sim.studies.failures.catalogue import STUDIES
-from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
-from contactfpga_sim.studies.failures.uart import Line
+from contactfpga.tools import cli
+from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, touch
+from contactfpga_sim.lab.failures.catalogue import STUDIES
+from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
+from contactfpga_sim.lab.failures.uart import Line
+from contactfpga_sim.lab.pages import failures_page, writer
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 

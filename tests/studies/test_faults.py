@@ -8,14 +8,14 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import safety_page, writer
-from contactfpga_sim.sheet import guards
-from contactfpga_sim.studies.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.studies.faults import start, study, trial
-from contactfpga_sim.studies.faults.catalogue import FAULTS
-from contactfpga_sim.studies.faults.hurt import Hurt
-from contactfpga_sim.studies.faults.study import Place
-from contactfpga_sim.studies.faults.trial import Told
+from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
+from contactfpga_sim.lab.faults import start, study, trial
+from contactfpga_sim.lab.faults.catalogue import FAULTS
+from contactfpga_sim.lab.faults.hurt import Hurt
+from contactfpga_sim.lab.faults.study import Place
+from contactfpga_sim.lab.faults.trial import Told
+from contactfpga_sim.lab.pages import safety_page, writer
+from contactfpga_sim.model.sheet import guards
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 

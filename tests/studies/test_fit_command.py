@@ -9,16 +9,16 @@ import pytest
 from amaranth.back import rtlil
 from fits import APART, BUMPER, HANDS, SECOND, chosen
 
-from contactfpga import cli
 from contactfpga.skin import Skin
+from contactfpga.tools import cli
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.pages import figures, fit_page, writer
-from contactfpga_sim.studies import size
-from contactfpga_sim.studies.fit import cost, search
-from contactfpga_sim.studies.fit.goals import Goals
-from contactfpga_sim.studies.fit.sources import source
-from contactfpga_sim.studies.fit.trial import Task
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.fit import cost, search
+from contactfpga_sim.lab.fit.goals import Goals
+from contactfpga_sim.lab.fit.sources import source
+from contactfpga_sim.lab.fit.trial import Task
+from contactfpga_sim.lab.pages import figures, fit_page, writer
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -8,13 +8,13 @@ from fits import BUMPER, HANDS, chosen, made_up
 from scipy.stats import binomtest
 
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.chart import speed
-from contactfpga_sim.studies.chart.errors import Interval, interval
-from contactfpga_sim.studies.chart.speed import Speed
-from contactfpga_sim.studies.fit import cost, search
-from contactfpga_sim.studies.fit.candidates import METHODS, candidates, pitches_for, size_for
-from contactfpga_sim.studies.fit.goals import Goals, Measured
-from contactfpga_sim.studies.fit.sources import source
+from contactfpga_sim.lab.chart import speed
+from contactfpga_sim.lab.chart.errors import Interval, interval
+from contactfpga_sim.lab.chart.speed import Speed
+from contactfpga_sim.lab.fit import cost, search
+from contactfpga_sim.lab.fit.candidates import METHODS, candidates, pitches_for, size_for
+from contactfpga_sim.lab.fit.goals import Goals, Measured
+from contactfpga_sim.lab.fit.sources import source
 
 pytestmark = pytest.mark.usefixtures("alone")
 

@@ -11,16 +11,16 @@ import pytest
 
 from contactfpga import Skin, cli
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board import native, state
-from contactfpga_sim.board.state import Bit
-from contactfpga_sim.pages import flips_page, writer
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.flips import campaign, designs, flip, reference, summary, touches
-from contactfpga_sim.studies.flips.campaign import Row
-from contactfpga_sim.studies.flips.designs import DESIGNS
-from contactfpga_sim.studies.flips.flip import Flip, Found
-from contactfpga_sim.studies.flips.reference import Heard, Reference
-from contactfpga_sim.studies.flips.summary import Design
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, touches
+from contactfpga_sim.lab.flips.campaign import Row
+from contactfpga_sim.lab.flips.designs import DESIGNS
+from contactfpga_sim.lab.flips.flip import Flip, Found
+from contactfpga_sim.lab.flips.reference import Heard, Reference
+from contactfpga_sim.lab.flips.summary import Design
+from contactfpga_sim.lab.pages import flips_page, writer
+from contactfpga_sim.model.board import native, state
+from contactfpga_sim.model.board.state import Bit
 
 PLAIN = Skin(rows=4, columns=4, labeller="serial", fail_safe=True, clock_hz=4_000_000, baud=1_000_000)
 DUAL = PLAIN.replace(dual=True, fail_safe=False)

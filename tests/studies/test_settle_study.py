@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga.circuit import Circuit
-from contactfpga_sim.pages import settle_page, writer
-from contactfpga_sim.studies.settle import breaks, shorted
+from contactfpga.design.circuit import Circuit
+from contactfpga_sim.lab.pages import settle_page, writer
+from contactfpga_sim.lab.settle import breaks, shorted
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
 

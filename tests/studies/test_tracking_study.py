@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from sample import sample
 
-from contactfpga_sim.pages import failures_page, tracking_page, writer
-from contactfpga_sim.pages.figures import RECORDINGS
-from contactfpga_sim.studies.tracking import breaks, frames, judge, recorded, scenes, scores, speed
-from contactfpga_sim.studies.tracking.nearest import Nearest
+from contactfpga_sim.lab.pages import failures_page, tracking_page, writer
+from contactfpga_sim.lab.pages.figures import RECORDINGS
+from contactfpga_sim.lab.tracking import breaks, frames, judge, recorded, scenes, scores, speed
+from contactfpga_sim.lab.tracking.nearest import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/tracking.md"

@@ -1,8 +1,8 @@
-"""Bumpers and loads of the tests of contactfpga.haptics, written without its code."""
+"""Bumpers and loads of the tests of contactfpga.robot.haptics, written without its code."""
 
 import numpy as np
 
-from contactfpga.haptics import LoadCells, Touch, Unit, Wrench, contacts
+from contactfpga.robot.haptics import LoadCells, Touch, Unit, Wrench, contacts
 
 DEGREE = np.pi / 180
 

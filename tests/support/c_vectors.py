@@ -8,7 +8,7 @@ from wire import Wire
 
 from contactfpga import Skin
 from contactfpga.wire.protocol import may_number
-from contactfpga_sim.golden.request import command, request
+from contactfpga_sim.model.golden.request import command, request
 
 PATH = Path(__file__).parents[2] / "c" / "vectors.txt"
 HEAD = """\

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 ABSENT = {"fcntl", "grp", "pty", "pwd", "resource", "termios", "tty", "amaranth", "contactfpga_hdl"}
-SIMULATION, PRESENT = "contactfpga_sim", "contactfpga_sim.golden"  # the golden model needs numpy alone
+SIMULATION, PRESENT = "contactfpga_sim", "contactfpga_sim.model.golden"  # the golden model needs numpy alone
 FIXTURES = {"bench", "board"}  # of conftest.py, which import some of them
 
 

@@ -1,7 +1,7 @@
 """Impacts on the cover, with the digits that were printed of them."""
 
-from contactfpga.cover import Ball, elastic
-from contactfpga.cover.arm import Arm
+from contactfpga.design.cover import Ball, elastic
+from contactfpga.design.cover.arm import Arm
 
 BASE = (0.6, 0.038, 0.15, 0.2)
 SPEED = 0.4

@@ -2,8 +2,8 @@
 
 from wire import EPOCH_US, Wire, taken_in
 
-from contactfpga_sim.golden.request import heard
-from contactfpga_sim.golden.uart import pulsed
+from contactfpga_sim.model.golden.request import heard
+from contactfpga_sim.model.golden.uart import pulsed
 
 ZONE = (4, 10, 6)
 """The zone it reports unless told otherwise: area, sum x, sum y."""

@@ -17,7 +17,7 @@ CHUNK = 4096
 
 ROUTER = """
 import sys, time
-from contactfpga.net import session
+from contactfpga.robot.net import session
 with session.listening(sys.argv[1]):
     print("ready", flush=True)
     time.sleep(600)

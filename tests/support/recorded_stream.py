@@ -4,7 +4,7 @@ from fake_board import wait_until
 from model_board import ModelBoard
 
 from contactfpga import Skin
-from contactfpga.recordings.session import Session
+from contactfpga.tools.recordings.session import Session
 
 SKIN = Skin()
 NAMES = ("left arm", "chest")

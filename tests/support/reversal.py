@@ -10,10 +10,10 @@ from contactfpga import examples
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan import reversal, reversal_guard
 from contactfpga_hdl.scan.precharge import Precharge
-from contactfpga_sim.cosim import record
-from contactfpga_sim.golden import Timeline, guard, requests
-from contactfpga_sim.golden import reversal_guard as golden_guard
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.golden import Timeline, guard, requests
+from contactfpga_sim.model.golden import reversal_guard as golden_guard
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.verify.cosim import record
 
 FAST = Skin.load(examples() / "fast.toml")
 """The reference sheet; tests share its compiled board."""

@@ -9,7 +9,7 @@ from tracked import SKIN, frame
 import contactfpga
 from contactfpga import Skin, Zones
 from contactfpga.driver.conversation import Conversation
-from contactfpga.ros import convert, diagnostics, markers
+from contactfpga.robot.ros import convert, diagnostics, markers
 from contactfpga.wire.hello import encode_hello
 from contactfpga.wire.protocol import Frame
 

@@ -6,7 +6,7 @@ import functools
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from contactfpga.ros import PACKAGE, messages
+from contactfpga.robot.ros import PACKAGE, messages
 
 STORES = (Stores.ROS2_JAZZY, Stores.ROS2_KILTED)
 OURS = sorted(f"{PACKAGE}/{path.stem}" for path in messages().glob("*.msg"))

@@ -7,7 +7,7 @@ import time
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga.net.publisher import Publisher
+from contactfpga.robot.net.publisher import Publisher
 
 
 class SmallPort(ModelBoard):

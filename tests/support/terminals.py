@@ -66,7 +66,7 @@ class OnTerminal:
 
 def on_terminal(arguments, columns, seconds=120, **variables):
     """Status and output of a contactfpga command on a terminal so wide."""
-    terminal = OnTerminal([sys.executable, "-m", "contactfpga.cli", *map(str, arguments)], columns, **variables)
+    terminal = OnTerminal([sys.executable, "-m", "contactfpga.tools.cli", *map(str, arguments)], columns, **variables)
     return terminal.wait(seconds), terminal.said
 
 

@@ -8,7 +8,7 @@ from contactfpga.choices.labellers import Labeller
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.ports import labeller_ports
 from contactfpga_hdl.util.row_number import row_number
-from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
+from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
 
 TOY = Labeller(
     name="toy_labeller:TOY",

@@ -4,7 +4,7 @@ import numpy as np
 
 from contactfpga import Skin, Zones
 from contactfpga.wire.protocol import Frame
-from contactfpga_sim import golden
+from contactfpga_sim.model import golden
 
 SKIN = Skin()
 FINGER = 9

@@ -8,7 +8,7 @@ import time
 from model_board import DirectPort
 
 import contactfpga
-from contactfpga.body.state import LinkState
+from contactfpga.robot.body.state import LinkState
 
 URDF = """<robot name="two"><link name="torso"/><link name="arm"/>
 <joint name="elbow" type="revolute"><parent link="torso"/><child link="arm"/>

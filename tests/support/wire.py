@@ -5,10 +5,10 @@ import zlib
 
 from cobs import cobs
 
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.frame import join
-from contactfpga_sim.golden.packet import check, crc16, stuff
-from contactfpga_sim.golden.request import request
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.frame import join
+from contactfpga_sim.model.golden.packet import check, crc16, stuff
+from contactfpga_sim.model.golden.request import request
 
 __all__ = ["check", "crc16", "request"]  # some tests take apart what others take whole
 

@@ -10,10 +10,10 @@ import sys
 import numpy as np
 import pytest
 
-from contactfpga import cli
-from contactfpga.body.pose import Pose
+from contactfpga.robot.body.pose import Pose
 from contactfpga.surfaces import Cylinder, Mesh, SurfaceError
 from contactfpga.surfaces.laying import Laid, Triangles
+from contactfpga.tools import cli
 
 trimesh = pytest.importorskip("trimesh")
 POSE = Pose.of((20.0, -30.0, 5.0), (0.3, -0.4, 0.5))

@@ -78,7 +78,7 @@ def test_tracks_are_a_table_by_their_ids():
 
 
 def test_forces_are_a_table_with_their_intervals():
-    from contactfpga import haptics
+    from contactfpga.robot import haptics
 
     touch = haptics.Touch((0.01, 0.02, 0.0), (0.0, 0.0, 1.0))
     wrench = haptics.Wrench((0.0, 0.0, -5.0), (-0.1, 0.05, 0.0))

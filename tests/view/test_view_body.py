@@ -8,12 +8,12 @@ import pytest
 
 pytest.importorskip("viser")
 
-from contactfpga.body import Body, BodyError
 from contactfpga.driver import driver
 from contactfpga.errors import PortNotFound
-from contactfpga.view import robot
-from contactfpga.view import server as serving
-from contactfpga.view.bodies import BodySource
+from contactfpga.robot.body import Body, BodyError
+from contactfpga.tools.view import robot
+from contactfpga.tools.view import server as serving
+from contactfpga.tools.view.bodies import BodySource
 
 URDF = """<robot name="arm">
   <link name="base"/>

@@ -6,8 +6,8 @@ pytest.importorskip("viser")
 pytest.importorskip("playwright")
 pytest.importorskip("amaranth")
 
-from contactfpga.view import opening
-from contactfpga_sim.pages import browser, view_page
+from contactfpga.tools.view import opening
+from contactfpga_sim.lab.pages import browser, view_page
 
 pytestmark = [
     pytest.mark.campaign,  # the browser draws with the processor

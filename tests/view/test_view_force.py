@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from tracked import frame
 
-from contactfpga.haptics import Contacts, LoadCells, Wrench, contacts
+from contactfpga.robot.haptics import Contacts, LoadCells, Wrench, contacts
 from contactfpga.surfaces import Cylinder, Plane
-from contactfpga.view import picture
+from contactfpga.tools.view import picture
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FLAT = EXAMPLES / "units-flat.toml"
@@ -42,7 +42,7 @@ def test_what_is_not_known_has_no_arrow():
 @pytest.mark.campaign  # a board with units takes a while to compile
 def test_the_mouses_force_is_felt():
     pytest.importorskip("viser")
-    from contactfpga.view import opening
+    from contactfpga.tools.view import opening
 
     source, hand = opening._source(opening.Named(f"sim://?scene=nothing&skin={EXAMPLES}/force.toml&units={FLAT}"))
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.view.guard import Guard
+from contactfpga.tools.view.guard import Guard
 
 pytest.importorskip("viser")
 pytest.importorskip("websockets")
@@ -17,7 +17,7 @@ pytest.importorskip("websockets")
 from viewed import Page, camera, click, cookie, socket_of
 from websockets.exceptions import InvalidStatus
 
-from contactfpga.view import server as serving
+from contactfpga.tools.view import server as serving
 
 
 @pytest.fixture(scope="module")

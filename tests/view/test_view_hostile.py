@@ -9,12 +9,12 @@ from two_links import FLAT, ROBOT, ROUND, write_robot
 
 pytest.importorskip("viser")
 
-from contactfpga import cli
-from contactfpga.body import packed
-from contactfpga.recordings import Recording, Session
-from contactfpga.view import opening
-from contactfpga.view.panel import as_markdown
-from contactfpga_sim.pages import browser
+from contactfpga.robot.body import packed
+from contactfpga.tools import cli
+from contactfpga.tools.recordings import Recording, Session
+from contactfpga.tools.view import opening
+from contactfpga.tools.view.panel import as_markdown
+from contactfpga_sim.lab.pages import browser
 
 SCRIPT = "parent.document.title = parent.hostile = 'ran'"
 HOSTILE = [

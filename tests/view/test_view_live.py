@@ -11,14 +11,14 @@ pytest.importorskip("amaranth")
 from viewed import Page, camera, click, drag
 
 import contactfpga
-from contactfpga.view import opening
+from contactfpga.tools.view import opening
 
 CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circles"
 
 
 @pytest.fixture(scope="module")
 def shown():
-    from contactfpga_sim.pages.browser import running
+    from contactfpga_sim.lab.pages.browser import running
 
     with opening.opened(opening.Named("sim://?scene=nothing"), http_port=0) as shown, running(shown):
         yield shown

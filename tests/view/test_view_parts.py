@@ -13,12 +13,12 @@ from contactfpga.driver import driver
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
 from contactfpga.surfaces import Cone
+from contactfpga.tools.view import opening, picture
+from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.meter import CHART_S, Meter
+from contactfpga.tools.view.pace import MAX_LAG_S, MOMENT_S, Pace
+from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.view import opening, picture
-from contactfpga.view.fingers import Hand
-from contactfpga.view.meter import CHART_S, Meter
-from contactfpga.view.pace import MAX_LAG_S, MOMENT_S, Pace
-from contactfpga.view.tiles import Tiles
 from contactfpga.zones.batch import Batch
 
 TILES = {
@@ -274,7 +274,7 @@ def test_latency_is_from_the_sample_to_the_last_byte():
 def test_silence_is_said(board):
     """No data is never no contact: what is drawn then is said to be old."""
     import contactfpga
-    from contactfpga.view.sources import BoardSource
+    from contactfpga.tools.view.sources import BoardSource
 
     with contactfpga.open(board.path) as port:
         source = BoardSource(port, "board")

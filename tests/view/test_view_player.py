@@ -5,12 +5,12 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga import Skin, cli
-from contactfpga.console import reading
 from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.view import opening, replayed
-from contactfpga.view import player as playing
-from contactfpga.view.player import Player
-from contactfpga.view.replayed import ByteRecording, Clock
+from contactfpga.tools.console import reading
+from contactfpga.tools.view import opening, replayed
+from contactfpga.tools.view import player as playing
+from contactfpga.tools.view.player import Player
+from contactfpga.tools.view.replayed import ByteRecording, Clock
 
 
 @pytest.fixture(scope="module")

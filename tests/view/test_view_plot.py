@@ -7,7 +7,7 @@ import pytest
 from tracked import frame, pressed
 
 from contactfpga import Skin
-from contactfpga.view.touches import STEPS, Touches
+from contactfpga.tools.view.touches import STEPS, Touches
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
 
@@ -43,7 +43,7 @@ def recorded(count, places):
 
 
 def test_where_and_for_how_long(monkeypatch):
-    monkeypatch.setattr("contactfpga.view.touches.CHUNK", 7)
+    monkeypatch.setattr("contactfpga.tools.view.touches.CHUNK", 7)
     found = Touches.of(Recording(recorded(1001, lambda number: [(3, 4)] if number < 250 else [(9.4, 11), (1, 1)])))
     wanted = np.zeros((16, 16))
     wanted[4, 3], wanted[11, 9], wanted[1, 1] = 0.25, 0.75, 0.75
@@ -107,7 +107,7 @@ def test_cells_count_by_themselves():
 @pytest.mark.slow
 @pytest.mark.parametrize("late", [(), [(0.1, 0.0), (0.2, 0.004)]])
 def test_it_is_drawn_and_says_what_is_not_known(tmp_path, late):
-    plot = pytest.importorskip("contactfpga.view.plot")
+    plot = pytest.importorskip("contactfpga.tools.view.plot")
     frames = recorded(500, lambda number: [(number / 50, 5)])
     path = plot.draw(Recording(frames, late=late), tmp_path / "plot.svg")
     text = path.read_text()
@@ -121,7 +121,7 @@ def test_it_is_drawn_and_says_what_is_not_known(tmp_path, late):
 def test_the_command_draws_a_recording_and_refuses_what_is_none(tmp_path, capsys, monkeypatch):
     pytest.importorskip("amaranth")
     import contactfpga
-    from contactfpga import cli
+    from contactfpga.tools import cli
 
     monkeypatch.chdir(tmp_path)
     with contactfpga.open("sim://?scene=palm", record="palm.bin") as board:

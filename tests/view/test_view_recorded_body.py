@@ -10,14 +10,14 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 
 pytest.importorskip("viser")
 
-from contactfpga.body import Body, BodyError, packed
-from contactfpga.body.contact import on_link
-from contactfpga.recordings import Recording, Session
-from contactfpga.view import opening, picture
-from contactfpga.view import playback as playing
-from contactfpga.view.bodies import pushes
-from contactfpga.view.player import Player
-from contactfpga.view.recorded_body import BodyPlayer
+from contactfpga.robot.body import Body, BodyError, packed
+from contactfpga.robot.body.contact import on_link
+from contactfpga.tools.recordings import Recording, Session
+from contactfpga.tools.view import opening, picture
+from contactfpga.tools.view import playback as playing
+from contactfpga.tools.view.bodies import pushes
+from contactfpga.tools.view.player import Player
+from contactfpga.tools.view.recorded_body import BodyPlayer
 
 TIMES = "[[links]]\nlate_s = 0.2\nsilent_s = 0.4"
 

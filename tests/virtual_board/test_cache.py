@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from contactfpga_sim.board import cache
-from contactfpga_sim.board.cache import CacheError
-from contactfpga_sim.studies import kept
+from contactfpga_sim.lab import kept
+from contactfpga_sim.model.board import cache
+from contactfpga_sim.model.board.cache import CacheError
 
 ME = os.geteuid()
 OTHER = 12345
@@ -144,7 +144,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path):
 
 def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
     code = (
-        "import sys, time; from pathlib import Path; from contactfpga_sim.board import cache\n"
+        "import sys, time; from pathlib import Path; from contactfpga_sim.model.board import cache\n"
         "with cache.scratch(Path(sys.argv[1]), 'build') as work: print(work, flush=True); time.sleep(60)"
     )
     command = [sys.executable, "-c", code, str(tmp_path)]
@@ -165,7 +165,7 @@ def test_what_a_killed_build_left_is_removed_and_what_works_stays(tmp_path):
 ANSWER = """
 import ctypes, subprocess, sys
 from pathlib import Path
-from contactfpga_sim.board import cache, native
+from contactfpga_sim.model.board import cache, native
 
 def build(model, compiler, library):
     with cache.scratch(library.parent, "build") as work:
@@ -248,7 +248,7 @@ def test_a_damaged_result_is_worked_out_again(tmp_path, monkeypatch, capsys):
 @pytest.mark.campaign  # it compiles a board in a cache of its own
 def test_the_cache_may_be_the_current_folder(tmp_path):
     code = (
-        "from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard\n"
+        "from contactfpga.skin import Skin; from contactfpga_sim.model.board.compiled import CompiledBoard\n"
         "with CompiledBoard(Skin(rows=2, columns=2)) as board: board.run(10)"
     )
     environment = os.environ | {"CONTACTFPGA_CACHE": "."}

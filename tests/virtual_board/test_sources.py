@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from sample import sample
 
-from contactfpga_sim.board import sources
+from contactfpga_sim.model.board import sources
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {"contactfpga": "py", "contactfpga_hdl": "hdl", "contactfpga_sim": "sim"}
@@ -54,7 +54,7 @@ KEYS = """
 import functools, sys
 from pathlib import Path
 from contactfpga.skin import Skin
-from contactfpga_sim.board import native, sources
+from contactfpga_sim.model.board import native, sources
 sources._imported = functools.cache(sources._imported)  # it knows the text only
 for line in ["", *sys.stdin.read().splitlines()]:
     file = Path(line) if line else None
@@ -128,20 +128,24 @@ def test_each_file_that_python_loads_for_the_gateware_changes_the_key_of_a_board
 
 def test_a_file_that_the_gateware_does_not_need_leaves_the_key(copy):
     others = [
-        *("py/contactfpga/driver/board.py", "py/contactfpga/tracking/tracker.py", "py/contactfpga/cover/hertz.py"),
-        *("py/contactfpga/cli.py", "py/contactfpga/skin/latency.py", "py/contactfpga/zones/zone.py"),
-        *("sim/contactfpga_sim/golden/reversal.py", "sim/contactfpga_sim/pages/writer.py"),
+        *(
+            "py/contactfpga/driver/board.py",
+            "py/contactfpga/tracking/tracker.py",
+            "py/contactfpga/design/cover/hertz.py",
+        ),
+        *("py/contactfpga/tools/cli.py", "py/contactfpga/skin/latency.py", "py/contactfpga/zones/zone.py"),
+        *("sim/contactfpga_sim/model/golden/reversal.py", "sim/contactfpga_sim/lab/pages/writer.py"),
     ]
     now, changed = keys(copy, BOARD, [copy / name for name in others])
     assert [str(file) for file, key in changed.items() if key != now] == []
 
 
-BUILT = """native._cache_key(__import__('contactfpga_sim.board.compiled', fromlist=['']).model_of(skin),
+BUILT = """native._cache_key(__import__('contactfpga_sim.model.board.compiled', fromlist=['']).model_of(skin),
     native.find_compiler())"""
 
 
 def test_what_a_library_is_compiled_from_changes_its_key(copy):
-    drivers = copy / "sim/contactfpga_sim/board/drivers"
+    drivers = copy / "sim/contactfpga_sim/model/board/drivers"
     taken = [*drivers.glob("*.h"), drivers / "board.cpp", drivers.parent / "native.py"]
     others = [drivers / "label.cpp", drivers.parent / "received.py"]
     now, changed = keys(copy, BUILT, [*taken, *others])
@@ -153,23 +157,36 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
     ("module", "files"),
     [
         (
-            "contactfpga_sim.studies.flips.campaign",
-            ["flips/touches.py", "flips/flip.py", "../board/drivers/state.h", "../../../hdl/contactfpga_hdl/top.py"],
+            "contactfpga_sim.lab.flips.campaign",
+            [
+                "flips/touches.py",
+                "flips/flip.py",
+                "../model/board/drivers/state.h",
+                "../../../hdl/contactfpga_hdl/top.py",
+            ],
         ),
         ("contactfpga_hdl.board.sizes", ["../../../hdl/contactfpga_hdl/board/" + name for name in SIZING]),
         (
-            "contactfpga_sim.studies.chart.study",
-            ["chart/errors.py", "chart/speed.py", "../golden/label.py", "../../../py/contactfpga/skin/row_times.py"],
+            "contactfpga_sim.lab.chart.study",
+            [
+                "chart/errors.py",
+                "chart/speed.py",
+                "../model/golden/label.py",
+                "../../../py/contactfpga/skin/row_times.py",
+            ],
         ),
-        ("contactfpga_sim.studies.fit.measuring", ["fit/sources.py", "chart/study.py", "../scenes/shapes.py"]),
-        ("contactfpga_sim.studies.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../board/compiled.py"]),
-        ("contactfpga_sim.mutants.campaign", ["../mutants/trial.py", "../mutants/stimuli.py", "../board/native.py"]),
+        ("contactfpga_sim.lab.fit.measuring", ["fit/sources.py", "chart/study.py", "../model/scenes/shapes.py"]),
+        ("contactfpga_sim.lab.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../model/board/compiled.py"]),
+        (
+            "contactfpga_sim.verify.mutants.campaign",
+            ["../verify/mutants/trial.py", "../verify/mutants/stimuli.py", "../model/board/native.py"],
+        ),
     ],
 )
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
-    key = f"__import__('contactfpga_sim.studies.kept', fromlist=['']).made_by({module!r})"
-    paths = [(copy / "sim/contactfpga_sim/studies" / name).resolve() for name in files]
-    page = copy / "sim/contactfpga_sim/pages/flips_page.py"
+    key = f"__import__('contactfpga_sim.lab.kept', fromlist=['']).made_by({module!r})"
+    paths = [(copy / "sim/contactfpga_sim/lab" / name).resolve() for name in files]
+    page = copy / "sim/contactfpga_sim/lab/pages/flips_page.py"
     now, changed = keys(copy, key, [*paths, page])
     assert [file for file, key in changed.items() if key == now] == [page]
 
@@ -265,7 +282,7 @@ def test_code_that_changed_while_it_ran_is_seen(tmp_path, monkeypatch):
 
 
 def test_another_compiler_version_or_option_is_another_library(tmp_path, monkeypatch):
-    from contactfpga_sim.board import native
+    from contactfpga_sim.model.board import native
 
     def key(command):
         monkeypatch.setenv("CXX", command)
@@ -289,7 +306,7 @@ COUNTED = """
 import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.compiled import CompiledBoard
 skin = Skin(rows=2, columns=2)
 with CompiledBoard(skin, capture=("rows",)) as board:
     board.run(2000)

@@ -9,11 +9,11 @@ import pytest
 import contactfpga
 from contactfpga import Skin, SkinError
 from contactfpga.driver import health
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 SKIN = Skin(rows=4, columns=4, units=3, unit_sums=[[1, 1, 1], [127, -127, 5]])
 

@@ -19,13 +19,13 @@ import contactfpga
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_sim.board import native, pty_board
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.pty_board import PtyBoard
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict, requests
+from contactfpga_sim.model.board import native, pty_board
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.pty_board import PtyBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.golden import Timeline, predict, requests
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 
 def test_the_compiled_board_is_the_golden_models_in_every_clock(record_property):
@@ -164,7 +164,7 @@ def test_a_board_that_falls_behind_says_so_and_never_claims_real_time(monkeypatc
 def test_the_command_ends_cleanly_and_takes_its_link_away(tmp_path, number):
     skin, link = tmp_path / "slow.toml", tmp_path / "port"
     skin.write_text(SLOW.to_toml())
-    command = [sys.executable, "-m", "contactfpga.cli", "board", "--skin", str(skin), "--link", str(link)]
+    command = [sys.executable, "-m", "contactfpga.tools.cli", "board", "--skin", str(skin), "--link", str(link)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline().strip() == str(link)
     assert read_for(link, 0.5)

@@ -10,9 +10,9 @@ from contactfpga import Skin
 from contactfpga.driver.conversation import Conversation
 from contactfpga.wire import framing, numbered, protocol
 from contactfpga.wire.framing import PacketError
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.hello import hello
-from contactfpga_sim.golden.request import request
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.hello import hello
+from contactfpga_sim.model.golden.request import request
 
 SKIN = Skin(row_drive="74hc595", column_read="74hc165")
 

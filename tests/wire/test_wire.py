@@ -11,7 +11,7 @@ import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import protocol
 from contactfpga.wire.command import Command, encode_command
-from contactfpga_sim.golden.request import command
+from contactfpga_sim.model.golden.request import command
 
 SKINS = {
     "reference": contactfpga.Skin(),

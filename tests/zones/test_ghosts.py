@@ -16,10 +16,10 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import HelloReader
 from contactfpga_hdl.board.build import plan_for
-from contactfpga_sim.cosim import bench_amaranth
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, predict, requests
-from contactfpga_sim.sheet.wiring import Wiring
+from contactfpga_sim.model.golden import Timeline, predict, requests
+from contactfpga_sim.model.sheet.wiring import Wiring
+from contactfpga_sim.verify.cosim import bench_amaranth
+from contactfpga_sim.verify.cosim.compare import compare
 
 BARE = Wiring(bare=np.ones((1, 1), bool), floating=True)
 

@@ -18,8 +18,8 @@ from contactfpga.driver.stats import Stats
 from contactfpga.zones import labels
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import DTYPE
-from contactfpga_sim import golden
-from contactfpga_sim.scenes.shapes import variants
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.scenes.shapes import variants
 
 SKIN = contactfpga.Skin(rows=12, columns=20, pitch_x_mm=4.0, pitch_y_mm=7.5, settle_us=20.0)
 RADIUS_MM = 40.0
@@ -151,8 +151,8 @@ def test_a_frame_flagged_mismatch_reaches_the_user_whatever_it_holds():
 @pytest.mark.parametrize("moments", [[(0, 3, 3)], [(1, 31, 15)], [(1, 200, 3)], [(255, 0, 0), (0, 0, 0)]])
 def test_a_frame_flagged_mismatch_can_be_shown(moments):
     """Whatever the records hold: zones beyond the sheet are not drawn."""
-    from contactfpga.console.live import Room
-    from contactfpga.console.views import zones_view
+    from contactfpga.tools.console.live import Room
+    from contactfpga.tools.console.views import zones_view
 
     zones = zones_of(moments, cells=9, flags=["mismatch"])
     board = SimpleNamespace(port="x", stats=Stats(), skin=SKIN)
@@ -163,7 +163,7 @@ def test_a_frame_flagged_mismatch_can_be_shown(moments):
 
 @pytest.mark.parametrize(("turned", "name"), [(16, "ring"), (511, "wound")])
 def test_the_table_says_why_a_zone_has_no_x(turned, name):
-    from contactfpga.console.views import table
+    from contactfpga.tools.console.views import table
 
     skin = contactfpga.Skin(surface="cylinder", radius_mm=40.0, closed=True)
     host, wire = Conversation("x"), Wire(skin)

@@ -28,7 +28,7 @@ class Converter(Choice):
     """Pressure units in, readings out, in sweeps over all units.
 
     ``gateware`` is a component with the ports of :func:`contactfpga_hdl.units.ports.converter_ports`. ``golden`` is a
-    :class:`contactfpga_sim.golden.units.ConverterRule`.
+    :class:`contactfpga_sim.model.golden.units.ConverterRule`.
     """
 
     bits: int
@@ -62,7 +62,7 @@ CONVERTERS: dict[str, Converter] = {
             name="mcp3208",
             title="MCP3208",
             gateware="contactfpga_hdl.units.mcp3208:Mcp3208",
-            golden="contactfpga_sim.golden.units:MCP3208",
+            golden="contactfpga_sim.model.golden.units:MCP3208",
             bits=12,
             channels=8,
             limits=((2.7, 1_000_000), (5.0, 2_000_000)),
@@ -79,7 +79,7 @@ CONVERTERS: dict[str, Converter] = {
             name="ads131m08",
             title="ADS131M08",
             gateware="contactfpga_hdl.units.ads131m08:Ads131m08",
-            golden="contactfpga_sim.golden.units:ADS131M08",
+            golden="contactfpga_sim.model.golden.units:ADS131M08",
             bits=24,
             channels=8,
             limits=((2.7, 25_000_000),),

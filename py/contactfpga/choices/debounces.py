@@ -14,7 +14,7 @@ class Debounce(Choice):
     """Rows in, rows out.
 
     ``gateware`` counts scan periods, for scans that sample evenly; ``timed_gateware`` counts row times, for the others.
-    ``golden`` is a :class:`contactfpga_sim.golden.debounce.DebounceRule`.
+    ``golden`` is a :class:`contactfpga_sim.model.golden.debounce.DebounceRule`.
     """
 
     timed_gateware: str
@@ -38,7 +38,7 @@ DEBOUNCES: dict[str, Debounce] = {
             title="not debounced",
             gateware="",
             timed_gateware="",
-            golden="contactfpga_sim.golden.debounce:NONE",
+            golden="contactfpga_sim.model.golden.debounce:NONE",
             delays_press=False,
         ),
         Debounce(
@@ -46,7 +46,7 @@ DEBOUNCES: dict[str, Debounce] = {
             title="debounced, deferred",
             gateware=_EVEN,
             timed_gateware=_TIMED,
-            golden="contactfpga_sim.golden.debounce:SYM_DEFER",
+            golden="contactfpga_sim.model.golden.debounce:SYM_DEFER",
             delays_press=True,
         ),
         Debounce(
@@ -54,7 +54,7 @@ DEBOUNCES: dict[str, Debounce] = {
             title="debounced, eager",
             gateware=_EVEN,
             timed_gateware=_TIMED,
-            golden="contactfpga_sim.golden.debounce:ASYM_EAGER_DEFER",
+            golden="contactfpga_sim.model.golden.debounce:ASYM_EAGER_DEFER",
             delays_press=False,
         ),
     )

@@ -20,7 +20,7 @@ class Labeller(Choice):
     """Rows in, zone records out.
 
     ``gateware`` is a component with the ports of :func:`contactfpga_hdl.label.ports.labeller_ports`. ``golden`` is a
-    :class:`contactfpga_sim.golden.work.LabellerRule`.
+    :class:`contactfpga_sim.model.golden.work.LabellerRule`.
     """
 
     exact: bool
@@ -45,7 +45,7 @@ LABELLERS: dict[str, Labeller] = {
             name="run",
             title="run",
             gateware="contactfpga_hdl.label.run:RunLabeller",
-            golden="contactfpga_sim.golden.label:RUN",
+            golden="contactfpga_sim.model.golden.label:RUN",
             exact=True,
             end_clocks=lambda derived: derived.open_zones + derived.skin.closed + 3,
             row_clocks=lambda derived: derived.open_zones + derived.skin.closed + 1,
@@ -55,7 +55,7 @@ LABELLERS: dict[str, Labeller] = {
             name="serial",
             title="serial",
             gateware="contactfpga_hdl.label.serial:SerialLabeller",
-            golden="contactfpga_sim.golden.label:SERIAL",
+            golden="contactfpga_sim.model.golden.label:SERIAL",
             exact=True,
             end_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
             row_clocks=lambda derived: derived.skin.columns + derived.open_zones + 2 + 2 * derived.skin.closed,
@@ -66,7 +66,7 @@ LABELLERS: dict[str, Labeller] = {
             name="projection",
             title="projection",
             gateware="contactfpga_hdl.label.projection:ProjectionLabeller",
-            golden="contactfpga_sim.golden.label_shadows:PROJECTION",
+            golden="contactfpga_sim.model.golden.label_shadows:PROJECTION",
             exact=False,
             end_clocks=lambda derived: derived.skin.columns + 3,
             row_clocks=lambda derived: derived.skin.columns + 1,
@@ -75,7 +75,7 @@ LABELLERS: dict[str, Labeller] = {
             name="single",
             title="single",
             gateware="contactfpga_hdl.label.single:SingleLabeller",
-            golden="contactfpga_sim.golden.label_shadows:SINGLE",
+            golden="contactfpga_sim.model.golden.label_shadows:SINGLE",
             exact=False,
             end_clocks=lambda derived: derived.skin.columns + 4,
             row_clocks=lambda derived: derived.skin.columns + 2,

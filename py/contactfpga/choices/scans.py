@@ -25,7 +25,7 @@ class Scan(Choice):
 
     ``gateware`` is a component with the ports of :func:`contactfpga_hdl.scan.ports.scan_ports`, and one that is not
     ``even`` also with those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden`` is a
-    :class:`contactfpga_sim.golden.scan.ScanRule`.
+    :class:`contactfpga_sim.model.golden.scan.ScanRule`.
     """
 
     even: bool
@@ -120,7 +120,7 @@ SCANS: dict[str, Scan] = {
             name="raster",
             title="raster",
             gateware="contactfpga_hdl.scan.raster:Scanner",
-            golden="contactfpga_sim.golden.raster:RASTER",
+            golden="contactfpga_sim.model.golden.raster:RASTER",
             even=True,
             reads_rows=False,
             waits=False,
@@ -136,7 +136,7 @@ SCANS: dict[str, Scan] = {
             name="adaptive",
             title="adaptive",
             gateware="contactfpga_hdl.scan.adaptive:AdaptiveScanner",
-            golden="contactfpga_sim.golden.adaptive:ADAPTIVE",
+            golden="contactfpga_sim.model.golden.adaptive:ADAPTIVE",
             even=False,
             reads_rows=False,
             waits=False,
@@ -150,7 +150,7 @@ SCANS: dict[str, Scan] = {
             name="reversal",
             title="reversal",
             gateware="contactfpga_hdl.scan.reversal:ReversalScanner",
-            golden="contactfpga_sim.golden.reversal:REVERSAL",
+            golden="contactfpga_sim.model.golden.reversal:REVERSAL",
             even=False,
             reads_rows=True,
             waits=True,

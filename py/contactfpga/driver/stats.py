@@ -6,7 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable
 
-from contactfpga.net.message import Counters
+from contactfpga.robot.net.message import Counters
 
 
 @dataclasses.dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.driver.conversation import Conversation
 from contactfpga.errors import BoardSilent, OnlyNoise, ReadTimeout
-from contactfpga.net.message import Counters, refused
+from contactfpga.robot.net.message import Counters, refused
 
 
 def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Counters | None) -> ReadTimeout:

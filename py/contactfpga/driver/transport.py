@@ -9,15 +9,15 @@ import time
 import weakref
 from typing import Protocol
 
-from contactfpga.circuit import Circuit, load_checked
-from contactfpga.cover import Cover, load_cover
+from contactfpga.design.circuit import Circuit, load_checked
+from contactfpga.design.cover import Cover, load_cover
 from contactfpga.driver import forks, recording, sheets, sim_address
 from contactfpga.driver.replay import ReplayTransport
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
-from contactfpga.net.address import SCHEME
-from contactfpga.net.message import Counters
-from contactfpga.net.port import ZenohPort
+from contactfpga.robot.net.address import SCHEME
+from contactfpga.robot.net.message import Counters
+from contactfpga.robot.net.port import ZenohPort
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
 
@@ -128,7 +128,7 @@ def _user(name: str) -> str:
 
 
 class SimulatedPort(Protocol):
-    """A board in simulated time, such as :class:`contactfpga_sim.board.virtual.VirtualBoard`."""
+    """A board in simulated time, such as :class:`contactfpga_sim.model.board.virtual.VirtualBoard`."""
 
     def read(self, seconds: float) -> bytes:
         """Let simulated time pass until bytes have come, at most ``seconds``; returns those that came."""
@@ -264,18 +264,18 @@ def _virtual_board(
     asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None, circuit: Circuit | None
 ) -> SimulatedPort:
     """The one place at which the host loads the simulation, which need not be installed."""
-    from contactfpga_sim.board import virtual
+    from contactfpga_sim.model.board import virtual
 
     units = None
     if asked.units is not None:
-        from contactfpga.haptics import LoadCells  # which most boards have no use for
+        from contactfpga.robot.haptics import LoadCells  # which most boards have no use for
 
         units = LoadCells.load(asked.units)
     return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
 
 
 def _virtual_sheets(asked: sim_address.SimAddress, several: Several) -> SimulatedPort:
-    from contactfpga_sim.board import virtual
+    from contactfpga_sim.model.board import virtual
 
     return virtual.sheets_for(several, asked.scene)
 

@@ -153,8 +153,8 @@ class Skin:
     @classmethod
     def load(cls, path: str | Path, trust: bool = False) -> Skin:
         """Read a Skin from a TOML file whose keys are the fields of this class. The tables ``[cover]`` and
-        ``[circuit]`` are not the Skin's: :func:`contactfpga.cover.load_cover` and
-        :func:`contactfpga.circuit.load_circuit` read them. A file that names a module, such as
+        ``[circuit]`` are not the Skin's: :func:`contactfpga.design.cover.load_cover` and
+        :func:`contactfpga.design.circuit.load_circuit` read them. A file that names a module, such as
         ``labeller = "module:attribute"``, is refused without ``trust``, because importing it runs its code."""
         values = tomlfile.load(path, SkinError)
         with trusted(trust):

@@ -9,7 +9,8 @@ from typing import Protocol
 
 from contactfpga import __version__
 from contactfpga.choices.choice import trusted
-from contactfpga.commands import (
+from contactfpga.errors import MissingExtra
+from contactfpga.tools.commands import (
     arm,
     board,
     body,
@@ -36,13 +37,13 @@ from contactfpga.commands import (
     wire,
     zones,
 )
-from contactfpga.console import interrupt
-from contactfpga.console.parser import Parser
-from contactfpga.errors import MissingExtra
+from contactfpga.tools.console import interrupt
+from contactfpga.tools.console.parser import Parser
 
 
 class Command(Protocol):
-    """A file of :mod:`contactfpga.commands`. It loads with the host alone; what else ``run`` needs, it imports."""
+    """A file of :mod:`contactfpga.tools.commands`. It loads with the host alone; what else ``run`` needs, it
+    imports."""
 
     @property
     def HELP(self) -> str:  # noqa: N802

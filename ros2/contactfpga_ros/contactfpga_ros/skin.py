@@ -1,6 +1,6 @@
 """A lifecycle node that publishes what a board says: `ros2 run contactfpga_ros skin`.
 
-What is published, and when, is decided by contactfpga.ros.feed, which hands over messages as bytes; without ROS,
+What is published, and when, is decided by contactfpga.robot.ros.feed, which hands over messages as bytes; without ROS,
 `contactfpga ros` publishes the same.
 """
 
@@ -19,13 +19,13 @@ from rclpy.signals import SignalHandlerOptions
 
 from contactfpga import ContactFPGAError
 from contactfpga import open as open_board
-from contactfpga.console.forces import Forces
 from contactfpga.driver.driver import Board
-from contactfpga.haptics import WithReadings
-from contactfpga.ros import convert, diagnostics
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.feed import Feed
-from contactfpga.ros.settings import TOPICS, Settings, Topic
+from contactfpga.robot.haptics import WithReadings
+from contactfpga.robot.ros import convert, diagnostics
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.feed import Feed
+from contactfpga.robot.ros.settings import TOPICS, Settings, Topic
+from contactfpga.tools.console.forces import Forces
 
 AUTOSTART = "Configure and activate without being asked. Turn it off for a lifecycle manager."
 SETTINGS = {

@@ -10,8 +10,8 @@ from typing import Any
 
 from contactfpga.choices.choice import own_files
 from contactfpga.skin import Skin
-from contactfpga_sim.board import sources
-from contactfpga_sim.board.cache import cache_folder, put, ready, scratch, whole
+from contactfpga_sim.model.board import sources
+from contactfpga_sim.model.board.cache import cache_folder, put, ready, scratch, whole
 
 
 def made_by(module: str, *skins: Skin) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.received import Received, Receiver
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.received import Received, Receiver
 
 GOLDEN = 0.6180339887498949
 """Its multiples lie evenly between two instants, whatever their number."""

@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 
-from contactfpga.console import terminal
-from contactfpga.console.interrupt import silence_amaranth
+from contactfpga.tools.console import terminal
+from contactfpga.tools.console.interrupt import silence_amaranth
 
 GRACE_S = 0.5
 """What a worker that is told to end has to tidy up, until it is ended."""

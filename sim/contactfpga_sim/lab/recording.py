@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
-from contactfpga.recordings import Recording, link_recorder
-from contactfpga.recordings.export import export
-from contactfpga.recordings.recover import recover
-from contactfpga.recordings.session import Session
 from contactfpga.skin import Skin
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga.tools.recordings import Recording, link_recorder
+from contactfpga.tools.recordings.export import export
+from contactfpga.tools.recordings.recover import recover
+from contactfpga.tools.recordings.session import Session
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {10_000: Skin(), 1_000: Skin(settle_us=61.5)}
 """Boards by about how many frames they send per second."""

@@ -15,8 +15,8 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.board.sizes import Device, Netlists, Size
 from contactfpga_hdl.top import Top
-from contactfpga_sim.board import native
-from contactfpga_sim.studies import kept
+from contactfpga_sim.lab import kept
+from contactfpga_sim.model.board import native
 
 
 def _whole(labeller: Labeller, skin: Skin) -> wiring.Component:

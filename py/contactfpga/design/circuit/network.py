@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga.circuit.values import THERMAL_V, Circuit, Diode, knee_v
+from contactfpga.design.circuit.values import THERMAL_V, Circuit, Diode, knee_v
 
 PF = 1e-12
 LEAK_S = 1e-12

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from contactfpga.circuit import transient
-from contactfpga.circuit.network import OFF, Drive, Network
-from contactfpga.circuit.patterns import middle
-from contactfpga.circuit.values import Circuit
+from contactfpga.design.circuit import transient
+from contactfpga.design.circuit.network import OFF, Drive, Network
+from contactfpga.design.circuit.patterns import middle
+from contactfpga.design.circuit.values import Circuit
 
 FULL = 0.95
 """Share of the supply at which a line counts as charged, and a row as released."""
@@ -20,7 +20,7 @@ NEAR_V = 0.05
 
 @dataclasses.dataclass(frozen=True)
 class Levels:
-    """Volts in the frame of :mod:`contactfpga.circuit.network`: what surely reads low, and what surely reads high."""
+    """Volts in the frame of :mod:`contactfpga.design.circuit.network`: what surely reads low, and surely high."""
 
     low: float
     high: float

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contactfpga.circuit import patterns, phases, transient
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels, Phase
-from contactfpga.circuit.values import Circuit, CircuitError
+from contactfpga.design.circuit import patterns, phases, transient
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels, Phase
+from contactfpga.design.circuit.values import Circuit, CircuitError
 
 NOISE_V = 0.3
 """Between a level and VIL or VIH at least."""

@@ -6,8 +6,8 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from contactfpga.circuit import static
-from contactfpga.circuit.values import DIODES, Circuit, CircuitError, Diode
+from contactfpga.design.circuit import static
+from contactfpga.design.circuit.values import DIODES, Circuit, CircuitError, Diode
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin

@@ -6,10 +6,10 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping
 
-from contactfpga.circuit import patterns, phases, static
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels, Passed, Phase
-from contactfpga.circuit.values import Circuit
+from contactfpga.design.circuit import patterns, phases, static
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels, Passed, Phase
+from contactfpga.design.circuit.values import Circuit
 
 MARGIN = 1.3
 """What is recommended is this many times what the model takes."""

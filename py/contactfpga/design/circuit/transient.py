@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.circuit.network import Drive, Network, State, charge, current, held_back
-from contactfpga.circuit.values import CircuitError, Diode
+from contactfpga.design.circuit.network import Drive, Network, State, charge, current, held_back
+from contactfpga.design.circuit.values import CircuitError, Diode
 
 GAMMA = 2 - math.sqrt(2)
 """Share of a step that its first half takes: both halves then have the same equations."""

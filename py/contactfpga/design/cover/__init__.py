@@ -5,12 +5,12 @@ The paper is Battaglia et al., "Combining Haptic Sensing with Safe Interaction";
 corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), is cited by name.
 """
 
-from contactfpga.cover.answer import CoverError, NoSolution
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.patch import Ellipse, Part, Rectangle
-from contactfpga.cover.press import MODELS, Cover, Load
-from contactfpga.cover.switch import Switch
-from contactfpga.cover.table import load as load_cover
+from contactfpga.design.cover.answer import CoverError, NoSolution
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
+from contactfpga.design.cover.press import MODELS, Cover, Load
+from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.table import load as load_cover
 
 __all__ = [
     "MODELS",

@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
-from contactfpga.cover.answer import finite, not_negative, positive
-from contactfpga.cover.solve import Floats
+from contactfpga.design.cover.answer import finite, not_negative, positive
+from contactfpga.design.cover.solve import Floats
 
 GRAVITY = 9.81
 """g in m/s2, the paper's."""

@@ -12,13 +12,13 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import elastic, impact, motion, sense
-from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.foams import Foam
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Impact
-from contactfpga.cover.sense import Sense, Sheet
-from contactfpga.cover.task import Task
+from contactfpga.design.cover import elastic, impact, motion, sense
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.foams import Foam
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.impact import Impact
+from contactfpga.design.cover.sense import Sense, Sheet
+from contactfpga.design.cover.task import Task
 from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"

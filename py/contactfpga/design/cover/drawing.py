@@ -13,13 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contactfpga import picture_style as style
-from contactfpga.cover import elastic, impact, line, medium, motion, point
-from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.paper import FIRST_DESIGN, WORST_M
-from contactfpga.cover.solve import Floats
-from contactfpga.cover.switch import Switch
-from contactfpga.cover.task import Task
+from contactfpga.design.cover import elastic, impact, line, medium, motion, point
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.paper import FIRST_DESIGN, WORST_M
+from contactfpga.design.cover.solve import Floats
+from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.task import Task
 from contactfpga.picture_style import save
 
 COLORS = {"halfspace": style.BLUE, "bonded": style.VERMILLION, "frictionless": style.GREEN}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from contactfpga.cover.answer import CoverError, positive
-from contactfpga.cover.hertz import Ball
+from contactfpga.design.cover.answer import CoverError, positive
+from contactfpga.design.cover.hertz import Ball
 
 BETWEEN_SPHERES = 1.1
 CYLINDER_ON_PLANE = 1.5

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from contactfpga.cover.answer import CoverError, positive
+from contactfpga.design.cover.answer import CoverError, positive
 from contactfpga.inputs.values import is_finite, shown
 
 

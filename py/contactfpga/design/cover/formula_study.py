@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.cover import elastic, impact, motion
-from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.arm import Arm, slowness, speed2
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.sense import LADDER, Model, Sheet
-from contactfpga.cover.solve import Floats, gauss, legendre
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import elastic, impact, motion
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.arm import Arm, slowness, speed2
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.sense import LADDER, Model, Sheet
+from contactfpga.design.cover.solve import Floats, gauss, legendre
+from contactfpga.design.cover.switch import Switch
 
 FLOOR = 1e-13
 """Errors below this are those of the reference, and written as less than it."""

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError, positive
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover.answer import CoverError, positive
+from contactfpga.design.cover.switch import Switch
 
 
 @dataclasses.dataclass(frozen=True)

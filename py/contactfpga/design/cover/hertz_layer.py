@@ -13,11 +13,11 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import hertz, medium
-from contactfpga.cover.answer import NoSolution, not_negative, positive
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.solve import Floats, legendre, root
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import hertz, medium
+from contactfpga.design.cover.answer import NoSolution, not_negative, positive
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.solve import Floats, legendre, root
+from contactfpga.design.cover.switch import Switch
 
 WIDEST = 8.0
 """Patch radius over thickness up to which stresses are computed; Hertz stops holding at 1."""
@@ -29,8 +29,8 @@ TRIED = 96
 def stress_pa(force_n: float, patch_m: float, offset_m: float, thickness_m: float, within: str) -> float:
     """Normal stress in Pa at ``offset_m`` from the axis of a Hertz patch of radius ``patch_m``, under ``thickness_m``.
 
-    ``within``: one of :data:`contactfpga.cover.medium.MEDIA`. Right to 1e-8 of F/h^2 up to 8 thicknesses away and for
-    patches up to :data:`WIDEST` thicknesses.
+    ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`. Right to 1e-8 of F/h^2 up to 8 thicknesses away
+    and for patches up to :data:`WIDEST` thicknesses.
     """
     if within == "halfspace":
         return float(hertz.stress_pa(force_n, patch_m, offset_m, thickness_m))

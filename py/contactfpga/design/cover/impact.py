@@ -1,7 +1,7 @@
 """An arm runs into an obstacle: how far the foam is pressed, for how long, and how hard.
 
-Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.cover.arm`: :func:`compression_m` is (5),
-:func:`time_s` is (4).
+Compression ends where v = 0 in the energy balance (3) of :mod:`contactfpga.design.cover.arm`: :func:`compression_m`
+is (5), :func:`time_s` is (4).
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import motion
-from contactfpga.cover.answer import CoverError, NoSolution, not_negative, positive
-from contactfpga.cover.arm import Arm, slowness, speed2
-from contactfpga.cover.solve import integral, root
+from contactfpga.design.cover import motion
+from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
+from contactfpga.design.cover.arm import Arm, slowness, speed2
+from contactfpga.design.cover.solve import integral, root
 
 COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0.9)
 """t_c v0/delta_c without torque and gravity: (2/5) B(2/5, 1/2) = 1.471637592."""

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError
-from contactfpga.cover.solve import Floats
+from contactfpga.design.cover.answer import CoverError
+from contactfpga.design.cover.solve import Floats
 from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import shown
 

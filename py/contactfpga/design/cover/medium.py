@@ -24,7 +24,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from contactfpga.cover.answer import CoverError
+from contactfpga.design.cover.answer import CoverError
 from contactfpga.inputs.values import shown
 
 Floats = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """The impact as motion over time: the equation itself integrated step by step, and its time course by quadrature.
 
-The reference for :mod:`contactfpga.cover.impact`: (2) as corrected,
+The reference for :mod:`contactfpga.design.cover.impact`: (2) as corrected,
 
     J/d^2 d^2 delta/dt^2 = (u - M g l sin(theta0 + delta/d))/d - K_s delta^(3/2),
 
@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.cover.answer import CoverError, not_negative, positive
-from contactfpga.cover.arm import Arm, slowness, speed2
-from contactfpga.cover.solve import Floats, gauss
+from contactfpga.design.cover.answer import CoverError, not_negative, positive
+from contactfpga.design.cover.arm import Arm, slowness, speed2
+from contactfpga.design.cover.solve import Floats, gauss
 
 State = tuple[float, float]
 

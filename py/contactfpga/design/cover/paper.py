@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from contactfpga.cover import elastic, impact, medium, point
-from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.arm import GRAVITY, Arm
-from contactfpga.cover.foams import find
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import Impact
-from contactfpga.cover.switch import Switch
-from contactfpga.cover.task import Task
+from contactfpga.design.cover import elastic, impact, medium, point
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.arm import GRAVITY, Arm
+from contactfpga.design.cover.foams import find
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.impact import Impact
+from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.task import Task
 
 SWITCH = Switch()
 ARM = Arm.link(0.6, 0.038, 0.15, 0.2)

@@ -12,7 +12,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from contactfpga.cover.answer import finite, positive
+from contactfpga.design.cover.answer import finite, positive
 
 Floats = np.ndarray
 

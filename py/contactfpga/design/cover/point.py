@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import medium
-from contactfpga.cover.answer import NoSolution, not_negative, positive
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import medium
+from contactfpga.design.cover.answer import NoSolution, not_negative, positive
+from contactfpga.design.cover.switch import Switch
 
 LEAST: float = 2 * math.pi / 3 * 2.5**2.5 / 1.5**1.5
 """Least force over the thickness, over stress times offset squared: 11.266052."""
@@ -19,8 +19,8 @@ def stress_pa(
 ) -> np.ndarray:
     """Normal stress in Pa at the switches, at horizontal distances ``offset_m`` in m from a point force in N.
 
-    sigma = F/h^2 g(rho/h) (:mod:`contactfpga.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
-    z^2)^(5/2)). ``within``: one of :data:`contactfpga.cover.medium.MEDIA`.
+    sigma = F/h^2 g(rho/h) (:mod:`contactfpga.design.cover.medium`); over a half-space, (9): 3 F z^3 / (2 pi (rho^2 +
+    z^2)^(5/2)). ``within``: one of :data:`contactfpga.design.cover.medium.MEDIA`.
     """
     positive("thickness_m", thickness_m, "m")
     offset = np.asarray(offset_m, float)
@@ -31,8 +31,8 @@ def force_n(switch: Switch, offset_m: float, thickness_m: float, within: str = "
     """The point force in N that closes a switch at the horizontal distance ``offset_m``: (9) solved for F; with
     ``offset_m`` = pitch / sqrt(2) it is (10).
 
-    In a layer no force does beyond :func:`contactfpga.cover.medium.first_zero`: the cover is pulled off the switch
-    there, and where it presses again farther out, it is by less than 0.3 % of the stress on the axis.
+    In a layer no force does beyond :func:`contactfpga.design.cover.medium.first_zero`: the cover is pulled off the
+    switch there, and where it presses again farther out, it is by less than 0.3 % of the stress on the axis.
     """
     not_negative("offset_m", offset_m, "m")
     positive("thickness_m", thickness_m, "m")

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.cover import hertz, medium, point
-from contactfpga.cover.answer import CoverError, not_negative, positive
-from contactfpga.cover.patch import Ellipse, Part
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import hertz, medium, point
+from contactfpga.design.cover.answer import CoverError, not_negative, positive
+from contactfpga.design.cover.patch import Ellipse, Part
+from contactfpga.design.cover.switch import Switch
 from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")

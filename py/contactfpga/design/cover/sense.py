@@ -1,9 +1,9 @@
 """The smallest force that a sheet under a cover detects, and the pitch it needs, by the simplest model that will do.
 
-A model is a medium (:mod:`contactfpga.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz pressure).
-The paper's (9) and (10) are the half-space under a point force. The reference is the bonded layer under the patch:
-foam glued on a rigid bumper, touched by something round. Where nothing is known of what touches, it is the bonded layer
-under a point force.
+A model is a medium (:mod:`contactfpga.design.cover.medium`) and a contact, ``point`` or ``patch`` (a ball's Hertz
+pressure). The paper's (9) and (10) are the half-space under a point force. The reference is the bonded layer under the
+patch: foam glued on a rigid bumper, touched by something round. Where nothing is known of what touches, it is the
+bonded layer under a point force.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from contactfpga.cover import hertz_layer, medium, point
-from contactfpga.cover.answer import CoverError, NoSolution, positive
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import hertz_layer, medium, point
+from contactfpga.design.cover.answer import CoverError, NoSolution, positive
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.switch import Switch
 
 TOLERANCE = 0.05
 """How far the simplest model's answer may be from the reference's, by default."""

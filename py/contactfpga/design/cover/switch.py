@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from contactfpga.cover.answer import positive
+from contactfpga.design.cover.answer import positive
 
 
 @dataclasses.dataclass(frozen=True)

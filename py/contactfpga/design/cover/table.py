@@ -7,9 +7,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from contactfpga.cover.answer import MAX_LENGTH_M, CoverError
-from contactfpga.cover.press import Cover
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError
+from contactfpga.design.cover.press import Cover
+from contactfpga.design.cover.switch import Switch
 from contactfpga.inputs import tomlfile
 
 MIN_LENGTH_M = 1e-6

@@ -6,13 +6,13 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from contactfpga.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
-from contactfpga.cover.arm import Arm
-from contactfpga.cover.elastic import THICKNESS_RULES
-from contactfpga.cover.foams import FOAMS, Foam, find
-from contactfpga.cover.medium import MEDIA
-from contactfpga.cover.sense import CONTACTS, TOLERANCE, Model
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover.answer import LARGEST, MAX_LENGTH_M, SMALLEST, CoverError, not_negative, positive
+from contactfpga.design.cover.arm import Arm
+from contactfpga.design.cover.elastic import THICKNESS_RULES
+from contactfpga.design.cover.foams import FOAMS, Foam, find
+from contactfpga.design.cover.medium import MEDIA
+from contactfpga.design.cover.sense import CONTACTS, TOLERANCE, Model
+from contactfpga.design.cover.switch import Switch
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.skin import Skin
@@ -91,7 +91,7 @@ class Task:
     plates_m: tuple[float, ...] = ()
     """Thicknesses that can be had, in m; none: any."""
     rule: str = "hertz"
-    """One of :data:`contactfpga.cover.elastic.THICKNESS_RULES`."""
+    """One of :data:`contactfpga.design.cover.elastic.THICKNESS_RULES`."""
     strain: float | None = None
     """How far every foam may be pressed in, as a part of its thickness; None: as each foam says."""
     model: Model | None = None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contactfpga.body.state import LinkState
 from contactfpga.errors import ContactFPGAError, NoData
+from contactfpga.robot.body.state import LinkState
 
 
 class BodyError(ContactFPGAError, ValueError):

@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contactfpga.body import plan
-from contactfpga.body import urdf as urdf_file
-from contactfpga.body.answer import BodyError
-from contactfpga.body.joints import Joints
-from contactfpga.body.kinematics import Kinematics
-from contactfpga.body.plan import Plan
 from contactfpga.choices.choice import trusted
 from contactfpga.driver.mcap_part import MAX_LINKS
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
+from contactfpga.robot.body import plan
+from contactfpga.robot.body import urdf as urdf_file
+from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.joints import Joints
+from contactfpga.robot.body.kinematics import Kinematics
+from contactfpga.robot.body.plan import Plan
 
 if TYPE_CHECKING:
-    from contactfpga.body.open_body import OpenBody
+    from contactfpga.robot.body.open_body import OpenBody
 
 KEYS = ("urdf", "links")
 
@@ -71,7 +71,7 @@ class Body:
             timeout: seconds for a board's hello.
             period_s: how often at most a link's newest frame is taken.
         """
-        from contactfpga.body.open_body import OpenBody
+        from contactfpga.robot.body.open_body import OpenBody
 
         if joints is not None and not callable(joints):
             raise TypeError(f"joints is {shown(joints)}; it must be a function of a time, such as a JointHistory")

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga import haptics
-from contactfpga.body.folds import cells_of
-from contactfpga.body.pose import Pose
-from contactfpga.body.state import LinkState
+from contactfpga.robot import haptics
+from contactfpga.robot.body.folds import cells_of
+from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.state import LinkState
 from contactfpga.surfaces.shapes import Floats, Vector, vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
-    from contactfpga.body.plan import Plan
+    from contactfpga.robot.body.plan import Plan
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contactfpga.body.answer import BodyError
 from contactfpga.inputs.files import read_small, write_text
 from contactfpga.inputs.values import is_finite, shown, whole
+from contactfpga.robot.body.answer import BodyError
 from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contactfpga.body.answer import BodyError, NoJoints
-from contactfpga.body.pose import Pose, turn
-from contactfpga.body.urdf import MOVING, Joint, Robot
 from contactfpga.inputs.values import is_finite, shown
+from contactfpga.robot.body.answer import BodyError, NoJoints
+from contactfpga.robot.body.pose import Pose, turn
+from contactfpga.robot.body.urdf import MOVING, Joint, Robot
 from contactfpga.surfaces.shapes import Floats
 
 

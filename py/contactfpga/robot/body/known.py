@@ -6,8 +6,8 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 
-from contactfpga.body.plan import Plan
-from contactfpga.body.state import LinkState
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.state import LinkState
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 

@@ -9,21 +9,21 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from contactfpga.body.joints import Joints
-from contactfpga.body.known import States
-from contactfpga.body.opening import open_board
-from contactfpga.body.plan import Plan
-from contactfpga.body.queue import SnapshotQueue
-from contactfpga.body.reader import RETRY_S, LinkReader, OpenBoard
-from contactfpga.body.snapshot import Snapshot
-from contactfpga.body.together import Together
-from contactfpga.body.totals import BodyStats, SnapshotBatch
 from contactfpga.driver import forks
 from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
+from contactfpga.robot.body.joints import Joints
+from contactfpga.robot.body.known import States
+from contactfpga.robot.body.opening import open_board
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.queue import SnapshotQueue
+from contactfpga.robot.body.reader import RETRY_S, LinkReader, OpenBoard
+from contactfpga.robot.body.snapshot import Snapshot
+from contactfpga.robot.body.together import Together
+from contactfpga.robot.body.totals import BodyStats, SnapshotBatch
 
 if TYPE_CHECKING:
-    from contactfpga.body.body import Body
+    from contactfpga.robot.body.body import Body
 
 
 class OpenBody:

@@ -6,9 +6,9 @@ import contextlib
 import threading
 from collections.abc import Iterator
 
-from contactfpga.body.plan import Plan
 from contactfpga.driver import driver, finding
 from contactfpga.driver.board import Board
+from contactfpga.robot.body.plan import Plan
 
 
 def open_board(plan: Plan, timeout: float = 1.0) -> Board:

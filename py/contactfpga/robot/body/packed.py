@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from contactfpga.body import urdf as urdf_file
-from contactfpga.body.answer import BodyError
-from contactfpga.body.body import Body
 from contactfpga.inputs import tomlfile
+from contactfpga.robot.body import urdf as urdf_file
+from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.body import Body
 
 ROBOT = "robot"
 """Name of the texts in a recording."""

@@ -12,16 +12,16 @@ from urllib.parse import quote
 import numpy as np
 
 from contactfpga import surfaces
-from contactfpga.body.answer import BodyError
-from contactfpga.body.folds import Folds
-from contactfpga.body.pose import Pose
 from contactfpga.choices.choice import trusting
 from contactfpga.driver import sheets, sim_address
 from contactfpga.driver.mcap_part import MAX_NAME
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics.units import LoadCells
 from contactfpga.inputs.values import is_finite, shown
+from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.folds import Folds
+from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.surfaces import Cone, Cylinder, Mesh, Mirrored, Plane, Surface
 from contactfpga.surfaces.shapes import Vector, vector
@@ -59,7 +59,7 @@ class Plan:
     folds: Folds | None = None
     """What the folding cover presses."""
     trust: bool = False
-    """The Skin files of its port may name modules, as those of :meth:`contactfpga.body.Body.load` could."""
+    """The Skin files of its port may name modules, as those of :meth:`contactfpga.robot.body.Body.load` could."""
 
     @property
     def laid(self) -> Surface:

@@ -7,12 +7,12 @@ import collections
 from collections.abc import AsyncIterator, Iterator
 from typing import TYPE_CHECKING
 
-from contactfpga.body.snapshot import Snapshot
 from contactfpga.driver.subscription import checked
 from contactfpga.errors import ReadTimeout
+from contactfpga.robot.body.snapshot import Snapshot
 
 if TYPE_CHECKING:
-    from contactfpga.body.open_body import OpenBody
+    from contactfpga.robot.body.open_body import OpenBody
 
 
 class SnapshotQueue:

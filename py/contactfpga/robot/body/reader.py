@@ -9,10 +9,6 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from contactfpga.body.known import Known, Seen
-from contactfpga.body.plan import Plan
-from contactfpga.body.state import LinkState
-from contactfpga.body.together import Together
 from contactfpga.driver.stats import Stats, total
 from contactfpga.errors import (
     BoardClosed,
@@ -23,6 +19,10 @@ from contactfpga.errors import (
     VersionMismatch,
 )
 from contactfpga.inputs.values import shown
+from contactfpga.robot.body.known import Known, Seen
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.state import LinkState
+from contactfpga.robot.body.together import Together
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 

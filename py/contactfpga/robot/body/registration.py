@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.body.answer import BodyError
-from contactfpga.body.plan import Plan
-from contactfpga.body.pose import Pose
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
+from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.pose import Pose
 from contactfpga.surfaces import Surface
 from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.around import across

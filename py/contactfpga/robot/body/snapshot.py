@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contactfpga import notebook
-from contactfpga.body import contact
-from contactfpga.body.answer import BodyError, NoJoints, NoLinkData
-from contactfpga.body.contact import Contact
-from contactfpga.body.joints import Joints
-from contactfpga.body.kinematics import Kinematics
-from contactfpga.body.state import LinkState
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import shown
+from contactfpga.robot.body import contact
+from contactfpga.robot.body.answer import BodyError, NoJoints, NoLinkData
+from contactfpga.robot.body.contact import Contact
+from contactfpga.robot.body.joints import Joints
+from contactfpga.robot.body.kinematics import Kinematics
+from contactfpga.robot.body.state import LinkState
 from contactfpga.surfaces.shapes import Floats
 
 if TYPE_CHECKING:
-    from contactfpga.body.body import Body
+    from contactfpga.robot.body.body import Body
 
 BASE, LINK = "base", "link"
 LINK_PX = 200

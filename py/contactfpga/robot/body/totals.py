@@ -11,7 +11,7 @@ from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.body.snapshot import Snapshot
+    from contactfpga.robot.body.snapshot import Snapshot
 
 
 @dataclasses.dataclass

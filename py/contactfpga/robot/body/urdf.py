@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga.body.answer import BodyError
-from contactfpga.body.pose import Pose
 from contactfpga.inputs import xmlfile
 from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import number_in, shown
+from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.pose import Pose
 from contactfpga.surfaces.shapes import Floats, Vector
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.contact import Touch
-from contactfpga.haptics.wrench import Motion
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.contact import Touch
+from contactfpga.robot.haptics.wrench import Motion
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
-    from contactfpga.haptics.units import LoadCells
+    from contactfpga.robot.haptics.units import LoadCells
 
 EARLIER_US = 20_000
 """Device time by which a place is older than the zone of the next contact, which presses the units before it closes a
@@ -34,7 +34,7 @@ class _Alone:
 
 class AloneWatch:
     """Takes every frame with its readings, and remembers the place of a contact that was alone, for
-    :func:`~contactfpga.haptics.felt`.
+    :func:`~contactfpga.robot.haptics.felt`.
 
     With two contacts the units say nothing about where each is along the line through both, and the barycenter of one
     to three cells is off by a quarter of the pitch: that is the largest error of the forces. A single contact's center
@@ -53,8 +53,8 @@ class AloneWatch:
         self._kept: dict[Key, _Alone] = {}
 
     def take(self, zones: Zones, motion: Motion | None = None) -> None:
-        """The next frame, with its readings (:class:`~contactfpga.haptics.WithReadings`); ``motion`` as for
-        :meth:`LoadCells.wrench <contactfpga.haptics.LoadCells.wrench>`."""
+        """The next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` as for
+        :meth:`LoadCells.wrench <contactfpga.robot.haptics.LoadCells.wrench>`."""
         if len(zones) == 1:
             self._kept = {}
             self._alone(zones, motion)

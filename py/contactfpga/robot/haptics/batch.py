@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats
-from contactfpga.haptics.surface import Cylinder, Plane, Surface
-from contactfpga.haptics.wrench import Noise
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga.robot.haptics.surface import Cylinder, Plane, Surface
+from contactfpga.robot.haptics.wrench import Noise
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:

@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError
-from contactfpga.haptics.units import COMPONENTS, LoadCells, reduced
+from contactfpga.robot.haptics.answer import Floats, HapticsError
+from contactfpga.robot.haptics.units import COMPONENTS, LoadCells, reduced
 
 SEEN = 1e-6
 """Share of the largest load below which a direction was not loaded."""

@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 
-from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.evidence import Closing
-from contactfpga.haptics.locate import closed
-from contactfpga.haptics.units import LoadCells
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.evidence import Closing
+from contactfpga.robot.haptics.locate import closed
+from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin.sheet import Sheet
 from contactfpga.zones.around import across
 from contactfpga.zones.zone import Zones
@@ -22,7 +22,7 @@ MOST = 3
 
 class ClosingWatch:
     """Takes every frame with its readings, and knows the cells and closings of a single contact, for
-    :meth:`~contactfpga.haptics.Locator.locate`.
+    :meth:`~contactfpga.robot.haptics.Locator.locate`.
 
     A switch closed between the scans of its row in two frames; the push at that moment is halfway between those of the
     two. From exact sums it finds one switch that opened or closed, and two or three that closed where one choice
@@ -54,7 +54,7 @@ class ClosingWatch:
         return [Closing(*cell, push) for cell, push in sorted(self._pushes.items())]
 
     def take(self, zones: Zones) -> None:
-        """The next frame, with its readings (:class:`~contactfpga.haptics.WithReadings`)."""
+        """The next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`)."""
         before, self._before = self._before, zones
         self._push_before, self.push_n = self.push_n, self._push(zones)
         if not zones.pressed:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra
-from contactfpga.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.haptics.contact import Interval, Touch
-from contactfpga.haptics.system import System
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.contact import Interval, Touch
+from contactfpga.robot.haptics.system import System
 
 DETERMINED = 1e-9
 """A push that the null space changes by no more than this share is known."""

@@ -11,10 +11,10 @@ from typing import overload
 import numpy as np
 
 from contactfpga import notebook
-from contactfpga.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.haptics.surface import Center
-from contactfpga.haptics.wrench import ALARM, Wrench
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.surface import Center
+from contactfpga.robot.haptics.wrench import ALARM, Wrench
 
 FULL_WRENCH = "FULL_WRENCH"
 """Force at a place that is not known: the center of pressure."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError
-from contactfpga.haptics.units import LoadCells
+from contactfpga.robot.haptics.answer import Floats, HapticsError
+from contactfpga.robot.haptics.units import LoadCells
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats
-from contactfpga.haptics.reach import Reach
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga.robot.haptics.reach import Reach
 
 if TYPE_CHECKING:
-    from contactfpga.haptics.locate import Place
+    from contactfpga.robot.haptics.locate import Place
 
 
 ROUNDING = 1e-4

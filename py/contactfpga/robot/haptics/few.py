@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, Vector
-from contactfpga.haptics.contact import PURE_FORCE, Interval, Solution, Touch
-from contactfpga.haptics.squeeze import Line, both, least_sideways
-from contactfpga.haptics.system import System
-from contactfpga.haptics.vectors import cross, dot, minus, solve_symmetric
-from contactfpga.haptics.wrench import Wrench
+from contactfpga.robot.haptics.answer import Floats, Vector
+from contactfpga.robot.haptics.contact import PURE_FORCE, Interval, Solution, Touch
+from contactfpga.robot.haptics.squeeze import Line, both, least_sideways
+from contactfpga.robot.haptics.system import System
+from contactfpga.robot.haptics.vectors import cross, dot, minus, solve_symmetric
+from contactfpga.robot.haptics.wrench import Wrench
 
 ROUNDING = 1e-9
 """Share of a force that is rounding."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from contactfpga.haptics.answer import Vector
-from contactfpga.haptics.unit import Unit
-from contactfpga.haptics.units import LoadCells
+from contactfpga.robot.haptics.answer import Vector
+from contactfpga.robot.haptics.unit import Unit
+from contactfpga.robot.haptics.units import LoadCells
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from contactfpga.errors import ReadTimeout, ReplayEnded
-from contactfpga.haptics.alone import AloneWatch
-from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.contact import Contacts
-from contactfpga.haptics.solve import contacts
-from contactfpga.haptics.units import LoadCells
-from contactfpga.haptics.wrench import Motion
+from contactfpga.robot.haptics.alone import AloneWatch
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.contact import Contacts
+from contactfpga.robot.haptics.solve import contacts
+from contactfpga.robot.haptics.units import LoadCells
+from contactfpga.robot.haptics.wrench import Motion
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.haptics import posterior, resolution
-from contactfpga.haptics.answer import Floats, HapticsError
-from contactfpga.haptics.evidence import Closing, Known
-from contactfpga.haptics.posterior import Box, Posterior
-from contactfpga.haptics.reach import Reach
-from contactfpga.haptics.surface import Center
+from contactfpga.robot.haptics import posterior, resolution
+from contactfpga.robot.haptics.answer import Floats, HapticsError
+from contactfpga.robot.haptics.evidence import Closing, Known
+from contactfpga.robot.haptics.posterior import Box, Posterior
+from contactfpga.robot.haptics.reach import Reach
+from contactfpga.robot.haptics.surface import Center
 from contactfpga.skin import sheet as sheets
 from contactfpga.zones.zone import Zones
 

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from contactfpga.errors import MissingExtra
-from contactfpga.haptics import cones
-from contactfpga.haptics.answer import Floats, Vector
-from contactfpga.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution
-from contactfpga.haptics.system import System
-from contactfpga.haptics.wrench import ALARM
+from contactfpga.robot.haptics import cones
+from contactfpga.robot.haptics.answer import Floats, Vector
+from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution
+from contactfpga.robot.haptics.system import System
+from contactfpga.robot.haptics.wrench import ALARM
 from contactfpga.surfaces.shapes import vector
 
 EDGES = 12

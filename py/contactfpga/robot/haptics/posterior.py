@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats
+from contactfpga.robot.haptics.answer import Floats
 
 SIDE = 36
 """Points of the grid along each axis."""

@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError, Vector, number, positive
-from contactfpga.haptics.layouts import Layout, on_cylinder, on_plane
-from contactfpga.haptics.surface import Cylinder, Surface
-from contactfpga.haptics.vectors import cross, turning
-from contactfpga.haptics.wrench import ALARM, Noise, Wrench
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector, number, positive
+from contactfpga.robot.haptics.layouts import Layout, on_cylinder, on_plane
+from contactfpga.robot.haptics.surface import Cylinder, Surface
+from contactfpga.robot.haptics.vectors import cross, turning
+from contactfpga.robot.haptics.wrench import ALARM, Noise, Wrench
 
 TURNS = 24
 """Places around a cylinder."""

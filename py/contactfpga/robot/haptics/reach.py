@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from contactfpga.cover import medium, sense
-from contactfpga.cover.answer import NoSolution
-from contactfpga.haptics.answer import Floats, HapticsError
+from contactfpga.design.cover import medium, sense
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.robot.haptics.answer import Floats, HapticsError
 
 STEPS, PATCH_STEPS = 512, 240
 """Entries of the table, of a point and of a patch, which takes longer; between them it is straight."""
@@ -18,7 +18,7 @@ LARGEST_N = 1e4
 
 class Reach:
     """The force that closes a switch at a distance, and the distance at which a force still does. Both are tables
-    (:mod:`contactfpga.cover` computes them), within 0.01 % of the force.
+    (:mod:`contactfpga.design.cover` computes them), within 0.01 % of the force.
 
     Args:
         cover: foam, switch and, for a patch, what touches.

@@ -11,7 +11,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from contactfpga.haptics.answer import Floats
+from contactfpga.robot.haptics.answer import Floats
 
 FINENESS = 256
 """Places along each side of a cell."""

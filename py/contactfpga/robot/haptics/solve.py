@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from contactfpga.haptics import few, many
-from contactfpga.haptics.alone import AloneWatch
-from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.contact import FULL_WRENCH, Contacts, Seen, Solution, Touch
-from contactfpga.haptics.surface import Surface
-from contactfpga.haptics.system import System, distinct
-from contactfpga.haptics.wrench import Wrench
+from contactfpga.robot.haptics import few, many
+from contactfpga.robot.haptics.alone import AloneWatch
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.contact import FULL_WRENCH, Contacts, Seen, Solution, Touch
+from contactfpga.robot.haptics.surface import Surface
+from contactfpga.robot.haptics.system import System, distinct
+from contactfpga.robot.haptics.wrench import Wrench
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
@@ -86,7 +86,7 @@ def touched(
     zones: Zones, surface: Surface | None, friction: float = 0.5, sheet_m: tuple[float, float] = (0.0, 0.0)
 ) -> list[Touch]:
     """The zones as places on the bumper's outside. A barycenter is taken to be off by no more than chance within a
-    cell, a pitch over the root of 12; :class:`~contactfpga.haptics.Locator` knows better."""
+    cell, a pitch over the root of 12; :class:`~contactfpga.robot.haptics.Locator` knows better."""
     if surface is None:
         raise HapticsError("surface is missing; contacts() needs the bumper's outside to place zones on it")
     pitch_mm = math.hypot(zones.sheet.pitch_x_mm, zones.sheet.pitch_y_mm) / math.sqrt(2)

@@ -6,9 +6,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from contactfpga.haptics.answer import Vector
-from contactfpga.haptics.contact import Interval
-from contactfpga.haptics.vectors import dot
+from contactfpga.robot.haptics.answer import Vector
+from contactfpga.robot.haptics.contact import Interval
+from contactfpga.robot.haptics.vectors import dot
 
 ROUNDING = 1e-9
 """Share of a force that is rounding."""

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError, Vector, number, positive
-from contactfpga.haptics.wrench import Wrench
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector, number, positive
+from contactfpga.robot.haptics.wrench import Wrench
 from contactfpga.surfaces import shapes
 
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.haptics.contact import Touch
-from contactfpga.haptics.vectors import turning
-from contactfpga.haptics.wrench import Wrench
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.contact import Touch
+from contactfpga.robot.haptics.vectors import turning
+from contactfpga.robot.haptics.wrench import Wrench
 
 SAME_M = 1e-9
 """Points nearer to each other than this are one."""

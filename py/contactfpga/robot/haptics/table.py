@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactfpga.haptics import surface
-from contactfpga.haptics.answer import HapticsError, direction, matrix, number, positive, vector
-from contactfpga.haptics.unit import Unit
-from contactfpga.haptics.wrench import Bumper
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics import surface
+from contactfpga.robot.haptics.answer import HapticsError, direction, matrix, number, positive, vector
+from contactfpga.robot.haptics.unit import Unit
+from contactfpga.robot.haptics.wrench import Bumper
 
 if TYPE_CHECKING:
-    from contactfpga.haptics.units import LoadCells
+    from contactfpga.robot.haptics.units import LoadCells
 
 MAX_UNITS = 64
 KEYS = ("frame", "zero_gravity_m_s2", "matrix", "surface", "bumper", "unit")

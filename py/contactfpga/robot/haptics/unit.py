@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from contactfpga.haptics.answer import Vector
+from contactfpga.robot.haptics.answer import Vector
 
 
 @dataclasses.dataclass(frozen=True)

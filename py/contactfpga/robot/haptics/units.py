@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.haptics import table
-from contactfpga.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.haptics.surface import Surface
-from contactfpga.haptics.unit import Unit
-from contactfpga.haptics.vectors import turning
-from contactfpga.haptics.wrench import Bumper, Motion, Noise, Wrench
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics import table
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.surface import Surface
+from contactfpga.robot.haptics.unit import Unit
+from contactfpga.robot.haptics.vectors import turning
+from contactfpga.robot.haptics.wrench import Bumper, Motion, Noise, Wrench
 
 COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, Vector
+from contactfpga.robot.haptics.answer import Floats, Vector
 
 
 def dot(first: Sequence[float], second: Sequence[float]) -> float:

@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
 
 ALARM = (10.828, 13.816, 16.266, 18.467, 20.515, 22.458)
 """Chi-square that chance exceeds once in a thousand times, with 1 to 6 degrees of freedom."""

@@ -9,9 +9,9 @@ import time
 from typing import TYPE_CHECKING
 
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, VersionMismatch
-from contactfpga.net import session
-from contactfpga.net.address import parse
-from contactfpga.net.message import QUIET_S, VERSION, Counters, Stream, refused, token
+from contactfpga.robot.net import session
+from contactfpga.robot.net.address import parse
+from contactfpga.robot.net.message import QUIET_S, VERSION, Counters, Stream, refused, token
 
 if TYPE_CHECKING:
     import zenoh

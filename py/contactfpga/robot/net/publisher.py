@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Counters, Message, Stream, token
-from contactfpga.net.session import LEASE_MS
+from contactfpga.robot.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Counters, Message, Stream, token
+from contactfpga.robot.net.session import LEASE_MS
 from contactfpga.wire.asked import Asked, asked_in
 
 if TYPE_CHECKING:

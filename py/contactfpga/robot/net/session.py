@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.net.address import LOOPBACK, own_endpoint
+from contactfpga.robot.net.address import LOOPBACK, own_endpoint
 
 if TYPE_CHECKING:
     import zenoh

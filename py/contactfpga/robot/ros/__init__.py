@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga.ros.types import PACKAGE, messages
+from contactfpga.robot.ros.types import PACKAGE, messages
 
 __all__ = ["PACKAGE", "messages"]
 

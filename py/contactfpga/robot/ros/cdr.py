@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from contactfpga.ros.types import PRIMITIVES, Field, message_type
+from contactfpga.robot.ros.types import PRIMITIVES, Field, message_type
 
 HEAD = b"\x00\x01\x00\x00"
 """What the bytes are: plain CDR, lowest byte first."""

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactfpga.ros.types import PACKAGE, message_type
+from contactfpga.robot.ros.types import PACKAGE, message_type
 from contactfpga.tracking.tracks import Event, Track, Tracks
 from contactfpga.wire.hello import Hello
 from contactfpga.zones.zone import Zone, Zones
 
 if TYPE_CHECKING:
-    from contactfpga.haptics import Contacts, Wrench
+    from contactfpga.robot.haptics import Contacts, Wrench
 
 Message = dict[str, Any]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from contactfpga.errors import BoardClosed, MissingExtra
 from contactfpga.inputs.values import shown, whole
-from contactfpga.ros import MAX_DOMAIN
-from contactfpga.ros.hashes import type_hash
-from contactfpga.ros.loopback import kept_inside
-from contactfpga.ros.settings import TOPICS, Topic
-from contactfpga.ros.types import Field, message_type
+from contactfpga.robot.ros import MAX_DOMAIN
+from contactfpga.robot.ros.hashes import type_hash
+from contactfpga.robot.ros.loopback import kept_inside
+from contactfpga.robot.ros.settings import TOPICS, Topic
+from contactfpga.robot.ros.types import Field, message_type
 
 LOCALHOST = """<CycloneDDS><Domain Id="any">
 <General><AllowMulticast>false</AllowMulticast>

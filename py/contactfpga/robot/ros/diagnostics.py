@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from contactfpga.ros.convert import Message
+from contactfpga.robot.ros.convert import Message
 from contactfpga.skin.limits import MAX_KEEP_ALIVE_MS
 from contactfpga.zones.zone import Zones
 

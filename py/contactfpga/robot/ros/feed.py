@@ -7,19 +7,19 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from contactfpga.errors import ReadTimeout, ReplayEnded
-from contactfpga.ros import convert
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.diagnostics import Diagnostics
-from contactfpga.ros.markers import markers, outline
-from contactfpga.ros.moments import Moments
-from contactfpga.ros.settings import TOPICS, Settings
+from contactfpga.robot.ros import convert
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.diagnostics import Diagnostics
+from contactfpga.robot.ros.markers import markers, outline
+from contactfpga.robot.ros.moments import Moments
+from contactfpga.robot.ros.settings import TOPICS, Settings
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Event, Tracks
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     from contactfpga.driver.driver import Board
-    from contactfpga.haptics import Contacts
+    from contactfpga.robot.haptics import Contacts
 
 QUEUE = 4096
 """Frames that wait while others are published."""

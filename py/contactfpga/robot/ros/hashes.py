@@ -7,7 +7,7 @@ import hashlib
 import json
 from typing import Any
 
-from contactfpga.ros.types import Field, MessageType, message_type, needed
+from contactfpga.robot.ros.types import Field, MessageType, message_type, needed
 
 _NUMBERS = {
     "int8": 2,

@@ -8,12 +8,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from contactfpga import surfaces
-from contactfpga.ros.convert import Message, forces_of, quaternion, vector
+from contactfpga.robot.ros.convert import Message, forces_of, quaternion, vector
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tracking.tracks import Track
 
 if TYPE_CHECKING:
-    from contactfpga.haptics import Contacts
+    from contactfpga.robot.haptics import Contacts
 
 ARROW, SPHERE, LINE_STRIP, TEXT = 0, 2, 4, 9
 ADD, DELETE_ALL = 0, 3

@@ -7,7 +7,7 @@ import functools
 from importlib.resources import files
 from pathlib import Path
 
-from contactfpga.ros.standard import STANDARD
+from contactfpga.robot.ros.standard import STANDARD
 
 PACKAGE = "contactfpga_msgs"
 """Of our own messages."""
@@ -32,7 +32,7 @@ PRIMITIVES = {
 def messages() -> Path:
     """Folder of our message texts, ``Zones.msg`` and the others."""
     package = Path(str(files("contactfpga"))).resolve()
-    installed = package / "ros" / "msg"
+    installed = package / "robot" / "ros" / "msg"
     return installed if installed.is_dir() else package.parents[1] / "ros2" / PACKAGE / "msg"  # in a source tree
 
 

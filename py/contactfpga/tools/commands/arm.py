@@ -8,14 +8,14 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, numbers, outputs, terminal
-from contactfpga.console.interrupt import Interrupted
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, numbers, outputs, terminal
+from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.studies.arm.case import Case
-    from contactfpga_sim.studies.arm.sweep import Point, Task
+    from contactfpga_sim.lab.arm.case import Case
+    from contactfpga_sim.lab.arm.sweep import Point, Task
 
 HELP = "Run the robot arm into a human arm and see what force results."
 EXTRA = "sim"
@@ -39,7 +39,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.studies.arm.case import Case
+    from contactfpga_sim.lab.arm.case import Case
 
     case = Case.load(args.case)
     if args.charts:
@@ -50,8 +50,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _contact(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga.console import tables
-    from contactfpga_sim.studies.arm import report, run_pictures
+    from contactfpga.tools.console import tables
+    from contactfpga_sim.lab.arm import report, run_pictures
 
     skin = Skin.load(args.skin) if args.skin else None
     folder = None if args.json else outputs.folder(args.output)
@@ -69,8 +69,8 @@ def _contact(args: argparse.Namespace, case: Case) -> int:
 
 
 def _units(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga.console import tables
-    from contactfpga_sim.studies.arm import report
+    from contactfpga.tools.console import tables
+    from contactfpga_sim.lab.arm import report
 
     if args.skin is not None or case.control.behavior == "comply":
         raise ContactFPGAError("--units runs its own Skin, with a case that reverses; leave --skin and such a case out")
@@ -83,8 +83,8 @@ def _units(args: argparse.Namespace, case: Case) -> int:
 
 
 def _pushes(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga.console import tables
-    from contactfpga_sim.studies.arm import comply, report
+    from contactfpga.tools.console import tables
+    from contactfpga_sim.lab.arm import comply, report
 
     fastest, pushes = comply.pushes(case)
     if args.json:
@@ -98,8 +98,8 @@ def _pushes(args: argparse.Namespace, case: Case) -> int:
 
 
 def _charts(args: argparse.Namespace, case: Case) -> int:
-    from contactfpga_sim.studies.arm import latency_charts, sweep
-    from contactfpga_sim.studies.pool import executor, progress
+    from contactfpga_sim.lab.arm import latency_charts, sweep
+    from contactfpga_sim.lab.pool import executor, progress
 
     latency_charts.check(case)
     folder = outputs.folder(args.output)
@@ -118,7 +118,7 @@ def _charts(args: argparse.Namespace, case: Case) -> int:
 
 def _kept(found: dict[Task, Point], of: int, folder: Path) -> str:
     """Where the runs are that were finished, in a file of their own: a whole table from before stays."""
-    from contactfpga_sim.studies.arm import latency_charts
+    from contactfpga_sim.lab.arm import latency_charts
 
     again = "run the same command again to go on from there"
     if not found:

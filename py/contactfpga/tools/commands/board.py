@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.circuit import load_checked
-from contactfpga.console import flags
-from contactfpga.cover import load_cover
+from contactfpga.design.circuit import load_checked
+from contactfpga.design.cover import load_cover
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags
 
 HELP = "Run the virtual board on a pseudo-terminal."
 EXTRA = "sim"
@@ -22,7 +22,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.board.pty_board import PtyBoard
+    from contactfpga_sim.model.board.pty_board import PtyBoard
 
     design = flags.designed(args, Skin())
     cover, circuit = None, None

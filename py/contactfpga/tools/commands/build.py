@@ -10,12 +10,12 @@ from typing import Any
 
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
-from contactfpga.circuit import load_checked
-from contactfpga.console import flags, numbers, outputs
-from contactfpga.console.wiring import Table
+from contactfpga.design.circuit import load_checked
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
+from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console.wiring import Table
 
 HELP = "Build a bitstream for a board; print its wiring."
 EXTRA = "boards"

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.choices import labellers
-from contactfpga.console import flags, numbers, outputs
-from contactfpga.console.interrupt import Interrupted
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.studies.chart.study import Point, Task
+    from contactfpga_sim.lab.chart.study import Point, Task
 
 HELP = "Chart what speed costs in accuracy."
 EXTRA = "chart"
@@ -34,10 +34,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.studies import pool
-    from contactfpga_sim.studies.chart import host, picture
-    from contactfpga_sim.studies.chart import numbers as table
-    from contactfpga_sim.studies.chart.study import study
+    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab.chart import host, picture
+    from contactfpga_sim.lab.chart import numbers as table
+    from contactfpga_sim.lab.chart.study import study
 
     tasks = _tasks(args)
     folder = outputs.folder(args.output)
@@ -57,9 +57,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tasks(args: argparse.Namespace) -> list[Task]:
-    from contactfpga_sim.scenes.families import FAMILIES
-    from contactfpga_sim.studies.chart.methods import METHODS
-    from contactfpga_sim.studies.chart.study import FAMILIES_DRAWN, Task
+    from contactfpga_sim.lab.chart.methods import METHODS
+    from contactfpga_sim.lab.chart.study import FAMILIES_DRAWN, Task
+    from contactfpga_sim.model.scenes.families import FAMILIES
 
     skins = METHODS | _own(args)
     methods = flags.known("--method", args.method, list(skins))
@@ -73,14 +73,14 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
 
 def _own(args: argparse.Namespace) -> dict[str, Skin]:
     """The methods of the labellers that are not built in."""
-    from contactfpga_sim.studies.chart.methods import by
+    from contactfpga_sim.lab.chart.methods import by
 
     return {name: skin for one in args.labeller or () for name, skin in by(labellers.find(one)).items()}
 
 
 def _kept(points: list[Point], of: int, folder: Path) -> str:
     """Where the points are that were finished, in a file of their own: a whole chart from before stays."""
-    from contactfpga_sim.studies.chart import numbers as table
+    from contactfpga_sim.lab.chart import numbers as table
 
     again = "run the same command again to go on from there"
     if not points:

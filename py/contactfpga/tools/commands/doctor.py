@@ -6,12 +6,12 @@ import argparse
 import json
 from collections.abc import Iterable
 
-from contactfpga.console import flags, numbers, self_testing, terminal, watching
 from contactfpga.driver import driver, finding, health, ports, sheets
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, numbers, self_testing, terminal, watching
 
 HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None

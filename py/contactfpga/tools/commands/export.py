@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import outputs, terminal
+from contactfpga.tools.console import outputs, terminal
 
 HELP = "Write a recording as a table: Parquet, NPZ or CSV."
 EXTRA = "analysis"
@@ -18,8 +18,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.recordings.export import export
-    from contactfpga.recordings.recording import Recording
+    from contactfpga.tools.recordings.export import export
+    from contactfpga.tools.recordings.recording import Recording
 
     recording = Recording(args.recording)
     path = outputs.file(args.table, "OUT")

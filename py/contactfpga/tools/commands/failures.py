@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, outputs
-from contactfpga.console.interrupt import Interrupted
 from contactfpga.inputs.files import write_text
+from contactfpga.tools.console import flags, outputs
+from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.studies.failures.knob import Turned
+    from contactfpga_sim.lab.failures.knob import Turned
 
 HELP = "Turn one knob after another until something breaks."
 EXTRA = "sim"
@@ -28,8 +28,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.pages import failures_page, writer
-    from contactfpga_sim.studies.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.pages import failures_page, writer
 
     names = flags.known("--study", args.study, list(STUDIES))
     if args.page and args.study:
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
-    from contactfpga_sim.pages import failures_page
+    from contactfpga_sim.lab.pages import failures_page
 
     both = failures_page.table(turned), failures_page.unnoticed(turned)
     write_text(path, "\n\n".join(both) + "\n")
@@ -69,8 +69,8 @@ def _kept(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> str:
 
 
 def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
-    from contactfpga_sim.studies.failures import knob_pictures
-    from contactfpga_sim.studies.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.failures import knob_pictures
+    from contactfpga_sim.lab.failures.catalogue import STUDIES
 
     for name, methods in turned.items():
         write_text(folder / f"{name}.svg", knob_pictures.svg(STUDIES[name], methods))
@@ -79,8 +79,8 @@ def _draw(turned: Mapping[str, Mapping[str, Turned]], folder: Path) -> None:
 
 def _turn(names: list[str], turned: dict[str, dict[str, Turned]]) -> None:
     """Turn the knobs one after another; each is in ``turned`` as soon as it is done."""
-    from contactfpga_sim.studies.failures.catalogue import STUDIES
-    from contactfpga_sim.studies.pool import progress
+    from contactfpga_sim.lab.failures.catalogue import STUDIES
+    from contactfpga_sim.lab.pool import progress
 
     runs = sum(len(STUDIES[name].runs) for name in names)
     with progress() as step:

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from contactfpga.choices import labellers
 from contactfpga.choices.scans import SCANS
-from contactfpga.console import flags, numbers, outputs
-from contactfpga.console.interrupt import Interrupted
-from contactfpga.cover import load_cover
+from contactfpga.design.cover import load_cover
 from contactfpga.errors import UNSOLVED
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.studies.fit.candidates import Candidate
-    from contactfpga_sim.studies.fit.trial import SoFar, Task
+    from contactfpga_sim.lab.fit.candidates import Candidate
+    from contactfpga_sim.lab.fit.trial import SoFar, Task
 
 HELP = "Find the cheapest Skin that is good enough for given scenes."
 EXTRA = "chart"
@@ -85,9 +85,9 @@ def _candidate_flags(tried: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.studies import pool
-    from contactfpga_sim.studies.fit import show
-    from contactfpga_sim.studies.fit.search import fit
+    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab.fit import show
+    from contactfpga_sim.lab.fit.search import fit
 
     output = outputs.file(args.output) if args.output else None
     task, tried = asked(args)
@@ -111,10 +111,10 @@ def run(args: argparse.Namespace) -> int:
 
 def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
     """The task, and all candidates; raises ValueError for what cannot be."""
-    from contactfpga_sim.studies.fit import candidates
-    from contactfpga_sim.studies.fit.goals import Goals
-    from contactfpga_sim.studies.fit.sources import default_count, source
-    from contactfpga_sim.studies.fit.trial import Task
+    from contactfpga_sim.lab.fit import candidates
+    from contactfpga_sim.lab.fit.goals import Goals
+    from contactfpga_sim.lab.fit.sources import default_count, source
+    from contactfpga_sim.lab.fit.trial import Task
 
     base = Skin.load(args.skin) if args.skin else None
     cover = load_cover(args.skin) if args.skin else None
@@ -142,7 +142,7 @@ def asked(args: argparse.Namespace) -> tuple[Task, list[Candidate]]:
 
 def _methods(names: list[str] | None) -> list[dict[str, Any]]:
     """Those of the labellers named, or of ``cells``: the host labels them."""
-    from contactfpga_sim.studies.fit.candidates import METHODS, by
+    from contactfpga_sim.lab.fit.candidates import METHODS, by
 
     if not names:
         return list(METHODS)
@@ -159,7 +159,7 @@ def _share(percent: float | None) -> float | None:
 
 def _kept(so_far: SoFar, of: int, as_json: bool) -> str:
     """Print what is known of the candidates; what is to be said of that."""
-    from contactfpga_sim.studies.fit import show
+    from contactfpga_sim.lab.fit import show
 
     again = "run the same command again to go on from there"
     if not so_far:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from contactfpga.boards import find
 from contactfpga.boards.spec import bitstream_path
-from contactfpga.commands.build import BOARD, default_folder
 from contactfpga.errors import ContactFPGAError, MissingTool
+from contactfpga.tools.commands.build import BOARD, default_folder
 
 HELP = "Write a bitstream to a board."
 EXTRA = None

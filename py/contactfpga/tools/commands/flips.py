@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import functools
 
-from contactfpga.console import flags, numbers, outputs
-from contactfpga.console.interrupt import Interrupted
+from contactfpga.tools.console import flags, numbers, outputs
+from contactfpga.tools.console.interrupt import Interrupted
 
 HELP = "Flip bits of the running gateware one by one and see what the host notices."
 EXTRA = "chart"
@@ -32,10 +32,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.pages import flips_page, writer
-    from contactfpga_sim.studies import pool
-    from contactfpga_sim.studies.flips import campaign, picture, summary
-    from contactfpga_sim.studies.flips.designs import DESIGNS
+    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab.flips import campaign, picture, summary
+    from contactfpga_sim.lab.flips.designs import DESIGNS
+    from contactfpga_sim.lab.pages import flips_page, writer
 
     names = flags.known("--design", args.design, list(DESIGNS))
     if args.page and args.design:

@@ -7,8 +7,8 @@ import dataclasses
 import json
 import re
 
-from contactfpga.console import numbers, terminal
 from contactfpga.skin import Skin
+from contactfpga.tools.console import numbers, terminal
 
 HELP = "Measure the time from a touch to the last byte that reports it, on the simulated gateware."
 EXTRA = "sim"
@@ -28,7 +28,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.studies import latency, pool
+    from contactfpga_sim.lab import latency, pool
 
     skin = Skin.load(args.skin) if args.skin else Skin()
     with pool.progress() as step:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from contactfpga.console import outputs, reading, terminal
+from contactfpga.tools.console import outputs, reading, terminal
 
 HELP = "Draw a recording: where, when and how large it was touched."
 EXTRA = "view"
@@ -25,7 +25,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.view import plot, replayed
+    from contactfpga.tools.view import plot, replayed
 
     with reading.told(args.recording) as tell:
         recording = replayed.load(args.recording, args.link, reading=tell)

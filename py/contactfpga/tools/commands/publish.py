@@ -12,15 +12,15 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NoReturn
 
-from contactfpga.console import flags, interrupt, numbers, terminal
 from contactfpga.driver import driver, sheets
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
-from contactfpga.net import address
+from contactfpga.robot.net import address
+from contactfpga.tools.console import flags, interrupt, numbers, terminal
 
 if TYPE_CHECKING:
     from contactfpga.driver.transport import Transport
-    from contactfpga.net.publisher import Publisher
+    from contactfpga.robot.net.publisher import Publisher
 
 HELP = "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one."
 EXTRA = "net"
@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
         raise ContactFPGAError("give --listen or --connect, not both")
     if args.key is not None and len(args.ports) > 1:
         raise ContactFPGAError(f"--key {args.key} names one board, and there are {len(args.ports)}; leave it out")
-    from contactfpga.net import session
-    from contactfpga.net.publisher import Publisher
+    from contactfpga.robot.net import session
+    from contactfpga.robot.net.publisher import Publisher
 
     key = None if args.key is None else address.checked_key(args.key)
     boards = _look(args, key)

@@ -8,17 +8,17 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, interrupt, numbers, terminal
-from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
+from contactfpga.tools.console import flags, interrupt, numbers, terminal
+from contactfpga.tools.console.forces import Forces
 
 if TYPE_CHECKING:
-    from contactfpga.body import Body
-    from contactfpga.body.plan import Plan
-    from contactfpga.recordings.session import Session
-    from contactfpga.ros.feed import Felt
+    from contactfpga.robot.body import Body
+    from contactfpga.robot.body.plan import Plan
+    from contactfpga.robot.ros.feed import Felt
+    from contactfpga.tools.recordings.session import Session
 
 HELP = "Record a board, or all boards of a robot, into an MCAP file."
 EXTRA = "record"
@@ -43,9 +43,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.body import packed
-    from contactfpga.recordings.recorder import Split
-    from contactfpga.recordings.session import Session
+    from contactfpga.robot.body import packed
+    from contactfpga.tools.recordings.recorder import Split
+    from contactfpga.tools.recordings.session import Session
 
     flags.check_forces(args)
     body = _body(args)
@@ -72,7 +72,7 @@ def _body(args: argparse.Namespace) -> Body | None:
     """The robot that is to be recorded; None: a board."""
     if not names_robot(args.port):
         return None
-    from contactfpga.body import Body
+    from contactfpga.robot.body import Body
 
     for name in ("skin", "baud", "units", "friction"):
         if getattr(args, name) is not None:
@@ -81,7 +81,7 @@ def _body(args: argparse.Namespace) -> Body | None:
 
 
 def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
-    from contactfpga.recordings.mount import Mount
+    from contactfpga.tools.recordings.mount import Mount
 
     if body is None:
 
@@ -99,7 +99,7 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
     """What says the forces at contacts of a link with pressure units."""
-    from contactfpga.body.contact import forces_of
+    from contactfpga.robot.body.contact import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
 

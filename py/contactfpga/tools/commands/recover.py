@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import terminal
+from contactfpga.tools.console import terminal
 
 HELP = "Repair a recording whose program was killed or whose disk was full."
 EXTRA = "record"
@@ -19,7 +19,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.recordings.recover import recover
+    from contactfpga.tools.recordings.recover import recover
 
     found = recover(args.file, args.into)
     terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")

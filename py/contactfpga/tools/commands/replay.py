@@ -6,8 +6,8 @@ import argparse
 import json
 import time
 
-from contactfpga.console import numbers, terminal
 from contactfpga.skin import limits
+from contactfpga.tools.console import numbers, terminal
 
 HELP = "Send recorded frames through the compiled gateware."
 EXTRA = "sim"
@@ -32,7 +32,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.board import replay
+    from contactfpga_sim.model.board import replay
 
     frames, skin = replay.load(
         args.frames, args.threshold, args.connectivity, args.pitch_mm, args.barycenter_bits, args.closed

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import flags, interrupt, numbers, terminal
-from contactfpga.console.forces import Forces
-from contactfpga.haptics import WithReadings
+from contactfpga.robot.haptics import WithReadings
+from contactfpga.tools.console import flags, interrupt, numbers, terminal
+from contactfpga.tools.console.forces import Forces
 
 HELP = "Publish contacts as ROS 2 topics, with no ROS installed."
 EXTRA = "ros"
@@ -48,9 +48,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.ros.dds import Publisher
-    from contactfpga.ros.feed import Feed
-    from contactfpga.ros.settings import Settings
+    from contactfpga.robot.ros.dds import Publisher
+    from contactfpga.robot.ros.feed import Feed
+    from contactfpga.robot.ros.settings import Settings
 
     flags.check_forces(args)
     settings = Settings(

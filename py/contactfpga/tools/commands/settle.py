@@ -7,14 +7,14 @@ import dataclasses
 import json
 from typing import Any
 
-from contactfpga import circuit as sheet
-from contactfpga.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
-from contactfpga.circuit.static import NOISE_V
-from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.circuit.values import DIODE_LIMITS, LIMITS
-from contactfpga.console import numbers, terminal
+from contactfpga.design import circuit as sheet
+from contactfpga.design.circuit import DIODES, Circuit, CircuitError, Diode, Needs, Problem
+from contactfpga.design.circuit.static import NOISE_V
+from contactfpga.design.circuit.times import MARGIN, Time
+from contactfpga.design.circuit.values import DIODE_LIMITS, LIMITS
 from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
+from contactfpga.tools.console import numbers, terminal
 
 HELP = "Compute the times that the circuit of a sheet needs."
 EXTRA = None

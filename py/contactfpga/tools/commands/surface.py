@@ -6,10 +6,10 @@ import argparse
 
 import numpy as np
 
-from contactfpga.body.pose import Pose
-from contactfpga.console import numbers, outputs, terminal
+from contactfpga.robot.body.pose import Pose
 from contactfpga.skin import Skin
 from contactfpga.surfaces.laying import Laid, Triangles
+from contactfpga.tools.console import numbers, outputs, terminal
 
 HELP = "Lay a sheet on a mesh: a table of point and normal per cell."
 EXTRA = "surface"

@@ -7,7 +7,7 @@ import contextlib
 import os
 import sys
 
-from contactfpga.console import flags, interrupt, numbers, reading, terminal
+from contactfpga.tools.console import flags, interrupt, numbers, reading, terminal
 
 HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
@@ -39,8 +39,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga.view import opening
-    from contactfpga.view.player import Player
+    from contactfpga.tools.view import opening
+    from contactfpga.tools.view.player import Player
 
     with contextlib.ExitStack() as stack:
         with reading.told(args.port or "") as tell:

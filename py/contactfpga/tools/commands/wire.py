@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import bouncing, flags, numbers, settling
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
+from contactfpga.tools.console import bouncing, flags, numbers, settling
 
 HELP = "Show the pressed cells live, to check wiring, bounce and settle times."
 EXTRA = None
@@ -47,7 +47,7 @@ def _measure(args: argparse.Namespace) -> int:
 
 
 def _show(args: argparse.Namespace) -> int:
-    from contactfpga.console import live, views
+    from contactfpga.tools.console import live, views
 
     with flags.opened(args) as board:
         _check_cells(board)

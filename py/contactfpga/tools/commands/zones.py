@@ -7,17 +7,17 @@ import contextlib
 import json
 from typing import TYPE_CHECKING
 
-from contactfpga.console import flags, interrupt
-from contactfpga.console.forces import Forces
 from contactfpga.driver.board import Board
 from contactfpga.errors import ReplayEnded
-from contactfpga.haptics import WithReadings
+from contactfpga.robot.haptics import WithReadings
+from contactfpga.tools.console import flags, interrupt
+from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.console.live import Frames  # which needs rich
+    from contactfpga.tools.console.live import Frames  # which needs rich
 
 HELP = "Show the contact zones live."
 EXTRA = None
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     flags.check_forces(args)
     if args.json:
         return _json(args)
-    from contactfpga.console import live, views  # rich, which scripts do without
+    from contactfpga.tools.console import live, views  # rich, which scripts do without
 
     with flags.opened(args, args.record) as board:
         follow = _Follow(args, Forces.of(board, args.units, args.friction))

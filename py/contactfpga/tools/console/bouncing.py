@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from contactfpga.choices import debounces
-from contactfpga.console import terminal
-from contactfpga.console.following import follow, known_skin
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
+from contactfpga.tools.console import terminal
+from contactfpga.tools.console.following import follow, known_skin
 from contactfpga.zones.bounce import QUIET_US, Bounce
 from contactfpga.zones.zone import Zones
 
@@ -37,7 +37,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
         terminal.say(f"Press and release every switch of {board.port} some times. Ctrl-C ends the measurement.")
 
     def render(zones: Zones, room: Any) -> Any:
-        from contactfpga.console import views  # rich, which scripts do without
+        from contactfpga.tools.console import views  # rich, which scripts do without
 
         return views.cells_view(board, zones, room)
 

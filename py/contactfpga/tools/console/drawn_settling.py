@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
+from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
 from contactfpga.zones.settling import Settling
 
 STEPS = 10

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.console import numbers
 from contactfpga.driver import driver
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
+from contactfpga.tools.console import numbers
 
 PORT = (
     "Device path, name:NAME, usb:SERIAL or zenoh://KEY of a board (PORT#1: sheet 1 of several at one board), sim:// or "

@@ -7,15 +7,15 @@ import contextlib
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from contactfpga.console import interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, PortLost, ReadTimeout, ReplayEnded
 from contactfpga.skin import Skin
+from contactfpga.tools.console import interrupt, terminal
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.console.live import Render
+    from contactfpga.tools.console.live import Render
 
 
 def follow(
@@ -62,7 +62,7 @@ def shown(render: Render | None) -> Iterator[Callable[[Zones], None]]:
         return
     from rich.live import Live  # which scripts do without
 
-    from contactfpga.console import live
+    from contactfpga.tools.console import live
 
     console = terminal.console()
     with Live(console=console, auto_refresh=False) as shown:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics import AloneWatch, Contacts, Drift, DriftWatch, HapticsError, LoadCells, felt
+from contactfpga.robot.haptics import AloneWatch, Contacts, Drift, DriftWatch, HapticsError, LoadCells, felt
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
 

@@ -14,11 +14,11 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 
-from contactfpga.console import signals, terminal
-from contactfpga.console.signals import SIGNALS
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import told
 from contactfpga.inputs.values import shortened, visible_lines
+from contactfpga.tools.console import signals, terminal
+from contactfpga.tools.console.signals import SIGNALS
 
 AGAIN_S = 0.01
 """After which a signal comes again that Python dropped where nothing can be raised, as in the end of an object."""

@@ -13,10 +13,10 @@ from typing import Protocol
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from contactfpga.console import interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.silence import Silence, longest_pause_s
 from contactfpga.errors import ReadTimeout, ReplayEnded
+from contactfpga.tools.console import interrupt, terminal
 from contactfpga.zones.zone import Zones
 
 REFRESH_US = 66_667

@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import TypeVar
 
-from contactfpga.cover.answer import MAX_LENGTH_M
-from contactfpga.ros import MAX_DOMAIN
+from contactfpga.design.cover.answer import MAX_LENGTH_M
+from contactfpga.robot.ros import MAX_DOMAIN
 from contactfpga.skin import limits
 
 _Number = TypeVar("_Number", int, float)

@@ -6,9 +6,9 @@ import argparse
 import json
 from collections.abc import Iterator
 
-from contactfpga.console import flags, interrupt, terminal
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
+from contactfpga.tools.console import flags, interrupt, terminal
 from contactfpga.zones.self_test import LineFinding, SelfTest, untried
 
 

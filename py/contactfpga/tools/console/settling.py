@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import drawn_settling, interrupt, terminal
-from contactfpga.console.bouncing import NAMED, bare_skin
-from contactfpga.console.following import shown
+from contactfpga.design.circuit.times import MARGIN, Time
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import drawn_settling, interrupt, terminal
+from contactfpga.tools.console.bouncing import NAMED, bare_skin
+from contactfpga.tools.console.following import shown
 from contactfpga.zones.settling import Settling
 from contactfpga.zones.zone import Zones
 
@@ -32,7 +32,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
         )
 
     def render(_: Zones, room: Any) -> Any:
-        from contactfpga.console import views  # rich, which scripts do without
+        from contactfpga.tools.console import views  # rich, which scripts do without
 
         return views.settling_view(found, skin, room)
 

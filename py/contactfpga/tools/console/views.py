@@ -9,14 +9,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from contactfpga.console import drawn_settling, drawn_sheet, terminal
-from contactfpga.console.forces import Forces
-from contactfpga.console.live import Room
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, MissingExtra
-from contactfpga.haptics import Contact, Contacts
+from contactfpga.robot.haptics import Contact, Contacts
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import drawn_settling, drawn_sheet, terminal
+from contactfpga.tools.console.forces import Forces
+from contactfpga.tools.console.live import Room
 from contactfpga.tracking.tracks import Track, Tracks
 from contactfpga.zones.settling import Settling
 from contactfpga.zones.watch import Watch

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.console import flags, terminal
-from contactfpga.console.following import follow, known_skin
 from contactfpga.driver.health import Finding
 from contactfpga.skin import Skin
+from contactfpga.tools.console import flags, terminal
+from contactfpga.tools.console.following import follow, known_skin
 from contactfpga.zones.suspicion import Cell, Suspicion, named
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
                     terminal.say(_line(_judged(suspicion)), hang=6)
 
         def render(zones: Zones, room: Any) -> Any:
-            from contactfpga.console import views  # rich, which scripts do without
+            from contactfpga.tools.console import views  # rich, which scripts do without
 
             return views.watch_view(board, watch, [_line(_judged(one)) for one in found], zones, room)
 

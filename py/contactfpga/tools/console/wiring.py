@@ -9,10 +9,10 @@ from typing import Any
 from contactfpga.boards import wiring
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.boards.wiring import Line, Output, Wire
-from contactfpga.circuit import Circuit
-from contactfpga.console import terminal
+from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
+from contactfpga.tools.console import terminal
 
 DIODES = {
     "col2row": "each diode's cathode toward the row",
@@ -102,7 +102,7 @@ class Table:
 
 def _show(rows: Sequence[Sequence[str]]) -> None:
     """Print the columns that have something in them, where there are lines."""
-    from contactfpga.console import tables  # JSON needs no display
+    from contactfpga.tools.console import tables  # JSON needs no display
 
     if len(rows) > 1:
         filled = [column for column in zip(*rows, strict=True) if any(column[1:])]

@@ -1,6 +1,6 @@
 """What happened, in a file: MCAP with every byte of each board, and with messages of ROS 2 (docs/recordings.md)."""
 
-from contactfpga.recordings.recording import Recording
-from contactfpga.recordings.session import Session
+from contactfpga.tools.recordings.recording import Recording
+from contactfpga.tools.recordings.session import Session
 
 __all__ = ["Recording", "Session"]

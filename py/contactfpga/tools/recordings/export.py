@@ -11,9 +11,9 @@ import numpy as np
 
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.inputs.files import replaced, told
-from contactfpga.recordings import table
-from contactfpga.recordings.recording import Recording
-from contactfpga.recordings.table import COLUMNS, Piece
+from contactfpga.tools.recordings import table
+from contactfpga.tools.recordings.recording import Recording
+from contactfpga.tools.recordings.table import COLUMNS, Piece
 
 KEY = "contactfpga"
 """Under which the facts stand in Parquet and NPZ."""

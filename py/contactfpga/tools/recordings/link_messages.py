@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.told import Told
-from contactfpga.recordings import messages
-from contactfpga.recordings.mount import Mount
-from contactfpga.recordings.recorder import LinkFile
-from contactfpga.ros import convert
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.feed import Felt
-from contactfpga.ros.markers import markers, outline
+from contactfpga.robot.ros import convert
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.feed import Felt
+from contactfpga.robot.ros.markers import markers, outline
+from contactfpga.tools.recordings import messages
+from contactfpga.tools.recordings.mount import Mount
+from contactfpga.tools.recordings.recorder import LinkFile
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.faults import Faults
 from contactfpga.zones.units import UnitSamples

@@ -12,10 +12,10 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.silence import Silence
 from contactfpga.driver.subscription import Events
 from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinMismatch, VersionMismatch
-from contactfpga.haptics import WithReadings
-from contactfpga.recordings.link_messages import LinkMessages
-from contactfpga.recordings.recorder import LinkFile
-from contactfpga.recordings.whole_file import RecordingFailed
+from contactfpga.robot.haptics import WithReadings
+from contactfpga.tools.recordings.link_messages import LinkMessages
+from contactfpga.tools.recordings.recorder import LinkFile
+from contactfpga.tools.recordings.whole_file import RecordingFailed
 from contactfpga.zones.zone import Zones
 
 QUEUE = 1 << 16

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga.errors import MissingExtra
-from contactfpga.recordings.whole_file import RecordingFailed, WholeFile
-from contactfpga.ros.types import schema
+from contactfpga.robot.ros.types import schema
+from contactfpga.tools.recordings.whole_file import RecordingFailed, WholeFile
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema

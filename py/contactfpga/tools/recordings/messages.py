@@ -1,11 +1,11 @@
-"""What a recording holds of a board, beyond what :mod:`contactfpga.ros` has messages for: its bytes, and all that it
-says between frames."""
+"""What a recording holds of a board, beyond what :mod:`contactfpga.robot.ros` has messages for: its bytes, and all that
+it says between frames."""
 
 from __future__ import annotations
 
-from contactfpga.ros.cdr import encode
-from contactfpga.ros.convert import header
-from contactfpga.ros.types import PACKAGE
+from contactfpga.robot.ros.cdr import encode
+from contactfpga.robot.ros.convert import header
+from contactfpga.robot.ros.types import PACKAGE
 from contactfpga.zones.units import UnitSamples
 
 BYTES, FAULTS, UNITS = (f"{PACKAGE}/{name}" for name in ("Bytes", "Faults", "Units"))

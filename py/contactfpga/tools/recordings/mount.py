@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from contactfpga.ros.markers import Place
+from contactfpga.robot.ros.markers import Place
 from contactfpga.surfaces.shapes import Vector
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zone

@@ -13,8 +13,8 @@ from pathlib import Path
 from contactfpga.driver.board import Board
 from contactfpga.driver.mcap_part import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
-from contactfpga.recordings import messages
-from contactfpga.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings import messages
+from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.hellos import Cutter
 

@@ -14,8 +14,8 @@ from contactfpga.driver.mcap_part import Summary
 from contactfpga.driver.mcap_records import MAGIC, Cut, RecordingError, Unreadable
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, replaced, told
-from contactfpga.recordings.mcap_file import McapFile
-from contactfpga.recordings.whole_file import RecordingFailed
+from contactfpga.tools.recordings.mcap_file import McapFile
+from contactfpga.tools.recordings.whole_file import RecordingFailed
 
 
 @dataclasses.dataclass

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from contactfpga.recordings.recording import Recording
-from contactfpga.ros.convert import flag_bits
+from contactfpga.robot.ros.convert import flag_bits
+from contactfpga.tools.recordings.recording import Recording
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from contactfpga.view.fingers import Hand
-from contactfpga.view.panel import Panel
-from contactfpga.view.sources import Moment, Source
-from contactfpga.view.stage import Stage
-from contactfpga.view.tiles import Tiles
+from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.panel import Panel
+from contactfpga.tools.view.sources import Moment, Source
+from contactfpga.tools.view.stage import Stage
+from contactfpga.tools.view.tiles import Tiles
 
 if TYPE_CHECKING:
     import viser

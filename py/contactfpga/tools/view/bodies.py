@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from contactfpga.body import Body, Contact
-from contactfpga.body.contact import on_link
-from contactfpga.body.open_body import OpenBody
-from contactfpga.body.opening import open_board
-from contactfpga.body.plan import Plan
-from contactfpga.body.state import LinkState
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
+from contactfpga.robot.body import Body, Contact
+from contactfpga.robot.body.contact import on_link
+from contactfpga.robot.body.open_body import OpenBody
+from contactfpga.robot.body.opening import open_board
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.state import LinkState
+from contactfpga.tools.view import picture
+from contactfpga.tools.view.fingers import Hand, Touchable
+from contactfpga.tools.view.panel import Timeline, as_markdown, shortened
+from contactfpga.tools.view.playback import Playback
+from contactfpga.tools.view.robot import RobotStage
+from contactfpga.tools.view.sources import Moment
+from contactfpga.tools.view.tiles import MM
 from contactfpga.tracking.tracker import Tracker
-from contactfpga.view import picture
-from contactfpga.view.fingers import Hand, Touchable
-from contactfpga.view.panel import Timeline, as_markdown, shortened
-from contactfpga.view.playback import Playback
-from contactfpga.view.robot import RobotStage
-from contactfpga.view.sources import Moment
-from contactfpga.view.tiles import MM
 
 if TYPE_CHECKING:
     import viser

@@ -34,7 +34,7 @@ class Finger:
 
 
 class Touchable(Protocol):
-    """A virtual board; :class:`contactfpga_sim.board.virtual.VirtualBoard` is one."""
+    """A virtual board; :class:`contactfpga_sim.model.board.virtual.VirtualBoard` is one."""
 
     def touch(self, fingers: Sequence[Finger]) -> None:
         """From now on these touch the sheet, besides its scene, until the next call; from any thread."""

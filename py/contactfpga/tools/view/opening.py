@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, Any
 
 from contactfpga.driver import driver, sheets, sim_address, transport
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics import LoadCells
 from contactfpga.inputs.files import names_robot
+from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
-from contactfpga.view import server
-from contactfpga.view.app import View
-from contactfpga.view.bodies import BodySource, BodyView
-from contactfpga.view.fingers import Hand
-from contactfpga.view.guard import Guard
-from contactfpga.view.player import Player
-from contactfpga.view.recorded_body import BodyPlayer, holds_robot
-from contactfpga.view.replayed import LinkRecording, Reading, is_recording, load, silent
-from contactfpga.view.sources import BoardSource, Source
+from contactfpga.tools.view import server
+from contactfpga.tools.view.app import View
+from contactfpga.tools.view.bodies import BodySource, BodyView
+from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.guard import Guard
+from contactfpga.tools.view.player import Player
+from contactfpga.tools.view.recorded_body import BodyPlayer, holds_robot
+from contactfpga.tools.view.replayed import LinkRecording, Reading, is_recording, load, silent
+from contactfpga.tools.view.sources import BoardSource, Source
 
 if TYPE_CHECKING:
     import viser
@@ -132,7 +132,7 @@ def _is_virtual(port: str) -> bool:
 
 
 def _cells(named: Named) -> LoadCells | None:
-    """Raises :class:`~contactfpga.haptics.HapticsError`."""
+    """Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
     path = named.units
     if path is None and named.port is not None and _is_virtual(named.port):
         path = sim_address.parse(named.port).units

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.view import picture
-from contactfpga.view.fingers import Hand
-from contactfpga.view.playback import SPEEDS, Playback
-from contactfpga.view.sources import Moment, Source
+from contactfpga.tools.view import picture
+from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.playback import SPEEDS, Playback
+from contactfpga.tools.view.sources import Moment, Source
 
 if TYPE_CHECKING:
     import viser

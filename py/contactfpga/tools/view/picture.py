@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.haptics import Contacts, LoadCells
+from contactfpga.robot.haptics import Contacts, LoadCells
 from contactfpga.surfaces import Surface
+from contactfpga.tools.view.tiles import MM
 from contactfpga.tracking.tracks import Tracks
-from contactfpga.view.tiles import MM
 from contactfpga.zones.zone import Zone, Zones
 
 SIDES = 48

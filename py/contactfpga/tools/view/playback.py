@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
-from contactfpga.view.sources import TURN_S
+from contactfpga.tools.view.sources import TURN_S
 
 Item = TypeVar("Item")
 

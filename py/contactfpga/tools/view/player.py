@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable, Iterator
 
 from contactfpga.driver.stats import Stats
-from contactfpga.haptics import LoadCells
+from contactfpga.robot.haptics import LoadCells
+from contactfpga.tools.view.meter import Meter
+from contactfpga.tools.view.playback import Playback
+from contactfpga.tools.view.replayed import Recorded
+from contactfpga.tools.view.sources import Moment
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
-from contactfpga.view.meter import Meter
-from contactfpga.view.playback import Playback
-from contactfpga.view.replayed import Recorded
-from contactfpga.view.sources import Moment
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 

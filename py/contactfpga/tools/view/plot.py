@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from contactfpga import picture_style as style
-from contactfpga.view.replayed import Recorded
-from contactfpga.view.touches import Touches
+from contactfpga.tools.view.replayed import Recorded
+from contactfpga.tools.view.touches import Touches
 
 HEIGHT_IN = 9.2
 COLORS = "cividis"

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga.body import LinkState, packed
-from contactfpga.body.plan import Plan
-from contactfpga.view.fingers import Touchable
-from contactfpga.view.playback import Playback
+from contactfpga.robot.body import LinkState, packed
+from contactfpga.robot.body.plan import Plan
+from contactfpga.tools.view.fingers import Touchable
+from contactfpga.tools.view.playback import Playback
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.recordings import Recording
+    from contactfpga.tools.recordings import Recording
 
 
 class BodyPlayer(Playback[tuple[str, Zones]]):

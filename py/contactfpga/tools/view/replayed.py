@@ -19,7 +19,7 @@ from contactfpga.zones.run import Run
 from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
-    from contactfpga.recordings import Recording
+    from contactfpga.tools.recordings import Recording
 
 
 class Recorded(Protocol):
@@ -67,7 +67,7 @@ def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Read
         if link is not None:
             raise ContactFPGAError(f"{asked.path} holds one board; --link is for files of `contactfpga record`")
         return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout, reading)
-    from contactfpga.recordings import Recording
+    from contactfpga.tools.recordings import Recording
 
     return LinkRecording(Recording(asked.path), link)
 

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactfpga import picture_style
-from contactfpga.body import Body, BodyError
-from contactfpga.body import urdf as urdf_file
-from contactfpga.body.plan import Plan
-from contactfpga.body.pose import Pose
 from contactfpga.inputs.values import shown
+from contactfpga.robot.body import Body, BodyError
+from contactfpga.robot.body import urdf as urdf_file
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.pose import Pose
 from contactfpga.surfaces import SurfaceError, mesh_file
-from contactfpga.view.picture import rgb
-from contactfpga.view.stage import Stage, light
-from contactfpga.view.tiles import MM, Tiles, quaternions
+from contactfpga.tools.view.picture import rgb
+from contactfpga.tools.view.stage import Stage, light
+from contactfpga.tools.view.tiles import MM, Tiles, quaternions
 
 if TYPE_CHECKING:
     from xml.etree import ElementTree

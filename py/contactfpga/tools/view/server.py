@@ -11,7 +11,7 @@ from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortNotFound
-from contactfpga.view.guard import Answer, Guard
+from contactfpga.tools.view.guard import Answer, Guard
 
 if TYPE_CHECKING:
     import viser

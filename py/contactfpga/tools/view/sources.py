@@ -11,13 +11,13 @@ import numpy as np
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ReadTimeout
-from contactfpga.haptics import Contacts, LoadCells, felt
+from contactfpga.robot.haptics import Contacts, LoadCells, felt
 from contactfpga.skin.sheet import Sheet
+from contactfpga.tools.view.fingers import Touchable
+from contactfpga.tools.view.meter import Meter
+from contactfpga.tools.view.pace import Pace
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
-from contactfpga.view.fingers import Touchable
-from contactfpga.view.meter import Meter
-from contactfpga.view.pace import Pace
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactfpga.haptics import LoadCells
+from contactfpga.robot.haptics import LoadCells
+from contactfpga.tools.view import picture
+from contactfpga.tools.view.fingers import Hand
+from contactfpga.tools.view.sources import Moment
+from contactfpga.tools.view.tiles import MM, Tiles
 from contactfpga.tracking.tracks import Tracks
-from contactfpga.view import picture
-from contactfpga.view.fingers import Hand
-from contactfpga.view.sources import Moment
-from contactfpga.view.tiles import MM, Tiles
 
 if TYPE_CHECKING:
     import viser

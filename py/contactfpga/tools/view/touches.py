@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
-from contactfpga.view.replayed import Recorded
+from contactfpga.tools.view.replayed import Recorded
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 

@@ -7,11 +7,11 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from contactfpga.cover import Cover
+from contactfpga.design.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga_sim.studies.arm.parts import BEHAVIORS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
+from contactfpga_sim.lab.arm.parts import BEHAVIORS, Contacts, Control, Foam, Link, Motor, Run, Touch, Usb
 
 _CASES = Path(__file__).parent / "cases"
 MODELS = ("point", "hertz")
@@ -38,7 +38,7 @@ class Case:
     usb: Usb = dataclasses.field(default_factory=Usb)
     run: Run = dataclasses.field(default_factory=Run)
     model: str = "point"
-    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.cover.press`)."""
+    """How the force spreads below the cover, one of :data:`MODELS` (:mod:`contactfpga.design.cover.press`)."""
 
     def __post_init__(self) -> None:
         _one_of("behavior", self.control.behavior, BEHAVIORS)

@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.run import Result, run
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.run import Result, run
 
 BACK_M = 1e-3
 """So near to where it was the arm counts as back."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 from typing import NamedTuple
 
-from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.lab.arm.case import Case
 
 
 class Sensed(NamedTuple):

@@ -16,9 +16,9 @@ from matplotlib.ticker import NullLocator
 from contactfpga import picture_style as style
 from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm import sweep
-from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm import sweep
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.sweep import Point, Task
 
 PAPER_S = 6e-3
 LATENCIES_S = tuple(1e-3 * ms for ms in (0.1, 0.2, 0.35, 0.5, 0.75, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20))

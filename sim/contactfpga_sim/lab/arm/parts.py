@@ -6,8 +6,8 @@ import dataclasses
 import functools
 import math
 
-from contactfpga.cover import Ball, Switch, elastic
-from contactfpga.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
+from contactfpga.design.cover import Ball, Switch, elastic
+from contactfpga.design.cover.answer import LARGEST, SMALLEST, CoverError, not_negative, positive
 
 BEHAVIORS = ("reverse", "comply")
 

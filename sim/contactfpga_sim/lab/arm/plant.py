@@ -11,7 +11,7 @@ import itertools
 import math
 from typing import NamedTuple
 
-from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.lab.arm.case import Case
 
 State = tuple[float, ...]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.studies.arm.world import World
+from contactfpga_sim.lab.arm.world import World
 
 
 class PlantTransport:

@@ -6,9 +6,9 @@ import dataclasses
 from typing import Any, NamedTuple
 
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.comply import Push
-from contactfpga_sim.studies.arm.run import Outcome, Result, run
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.comply import Push
+from contactfpga_sim.lab.arm.run import Outcome, Result, run
 
 UNLIMITED = {"torque_limit_nm": 1e6, "sensor_nm": 1e6}
 
@@ -18,7 +18,7 @@ class Row(NamedTuple):
 
     name: str
     field: str
-    """Of :class:`contactfpga_sim.studies.arm.run.Outcome`."""
+    """Of :class:`contactfpga_sim.lab.arm.run.Outcome`."""
     unit: str
     scale: float
     """From SI to the unit."""

@@ -9,9 +9,9 @@ import numpy as np
 from contactfpga.driver import driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm.case import Case, CaseError
-from contactfpga_sim.studies.arm.plant_transport import PlantTransport
-from contactfpga_sim.studies.arm.world import PINS, UNITS, WAYS, Faults, Moment, World
+from contactfpga_sim.lab.arm.case import Case, CaseError
+from contactfpga_sim.lab.arm.plant_transport import PlantTransport
+from contactfpga_sim.lab.arm.world import PINS, UNITS, WAYS, Faults, Moment, World
 
 AFTER_S = 0.25e-3
 """So long after the reaction the torque is looked at again."""
@@ -67,7 +67,7 @@ class Result:
 
     outcome: Outcome
     course: np.ndarray
-    """Structured, a :class:`contactfpga_sim.studies.arm.world.Moment` a step."""
+    """Structured, a :class:`contactfpga_sim.lab.arm.world.Moment` a step."""
     events: tuple[tuple[float, str, str], ...]
     """The controller's: (time in s, new state, reason)."""
     heard: tuple[tuple[float, int], ...]
@@ -79,7 +79,7 @@ def run(
 ) -> Result:
     """Let the arm run into what it touches.
 
-    ``way``: one of :data:`contactfpga_sim.studies.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
+    ``way``: one of :data:`contactfpga_sim.lab.arm.world.WAYS`; ``latency_s``: for the way ``latency``; ``skin``: of
     the sheet, by default the reference Skin, with units where the way needs them. The first run of a Skin by ``pin``,
     ``uart``, ``force`` or ``both`` compiles its gateware.
     """

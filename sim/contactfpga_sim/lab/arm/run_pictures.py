@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from contactfpga import picture_style as style
-from contactfpga_sim.studies.arm.run import Result
+from contactfpga_sim.lab.arm.run import Result
 
 LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.BLACK, "linestyle": style.DASHES[0], "linewidth": 1.5},

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.cover.point import force_n
+from contactfpga.design.cover.point import force_n
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.latency import AROUND_S, latency_s
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.report import UNLIMITED
-from contactfpga_sim.studies.arm.run import run
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.report import UNLIMITED
+from contactfpga_sim.lab.arm.run import run
 
 STEP_S = 25e-6
 """Of the integrator where no gateware runs along; half of it changes no result by more than a hundredth."""

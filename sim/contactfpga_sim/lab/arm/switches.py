@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.cover import Ball, Ellipse, Load, elastic
+from contactfpga.design.cover import Ball, Ellipse, Load, elastic
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.lab.arm.case import Case
 
 _MM = 1e-3
 _PATCH_M = 1e-3

@@ -10,7 +10,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, zero_value
-from contactfpga_sim.studies.arm.case import Case
+from contactfpga_sim.lab.arm.case import Case
 
 THRESHOLD_N = 2.0
 """Of the whole push; noise of the sum is 0.09 N."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import math
 
-from contactfpga_sim.studies.arm.parts import Usb
+from contactfpga_sim.lab.arm.parts import Usb
 
 
 class Chip:

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.control import Controller, Sensed
-from contactfpga_sim.studies.arm.plant import Plant, finite
-from contactfpga_sim.studies.arm.switches import Switches
-from contactfpga_sim.studies.arm.under import Under
-from contactfpga_sim.studies.arm.usb import Chip
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.control import Controller, Sensed
+from contactfpga_sim.lab.arm.plant import Plant, finite
+from contactfpga_sim.lab.arm.switches import Switches
+from contactfpga_sim.lab.arm.under import Under
+from contactfpga_sim.lab.arm.usb import Chip
+from contactfpga_sim.model.board.compiled import CompiledBoard
 
 WAYS = ("latency", "pin", "uart", "torque", "force", "both")
 """How a contact comes to the controller: a fixed time after a switch closes (no gateware); the board's ``contact`` pin;

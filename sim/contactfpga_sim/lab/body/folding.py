@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga.body.folds import STEP_RAD, Folds, cells_of, learn
+from contactfpga.robot.body.folds import STEP_RAD, Folds, cells_of, learn
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame, no_records
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.scene import Contact, Scene
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.scene import Contact, Scene
 
 SKIN = Skin(report="cells")
 BEGINS_RAD, RANGE_RAD = 0.6, 2.0

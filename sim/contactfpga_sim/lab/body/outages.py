@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import contactfpga
-from contactfpga.body.plan import Plan, read
-from contactfpga.body.reader import LinkReader
+from contactfpga.robot.body.plan import Plan, read
+from contactfpga.robot.body.reader import LinkReader
 from contactfpga.skin import Skin
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKIN = Skin()
 OTHER = Skin(connectivity=4)

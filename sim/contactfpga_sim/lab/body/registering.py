@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.body import BodyError, registration
-from contactfpga.body.plan import Plan, read
-from contactfpga.body.pose import Pose
-from contactfpga.body.registration import Press
+from contactfpga.robot.body import BodyError, registration
+from contactfpga.robot.body.plan import Plan, read
+from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.registration import Press
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.scene import Contact, Scene
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.scene import Contact, Scene
 
 FINGER_MM = 9.0
 MARGIN_MM = 15.0

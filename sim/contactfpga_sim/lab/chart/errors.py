@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from contactfpga.skin import Skin
-from contactfpga_sim.golden import label, zones
-from contactfpga_sim.golden.divide import barycenter
-from contactfpga_sim.scenes.truth import Truth
+from contactfpga_sim.model.golden import label, zones
+from contactfpga_sim.model.golden.divide import barycenter
+from contactfpga_sim.model.scenes.truth import Truth
 
 Z95 = 1.959963984540054
 """Half width of the 95 % interval in standard deviations."""

@@ -11,11 +11,11 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden import Timeline, Trace, predict
-from contactfpga_sim.studies.chart import steady
+from contactfpga_sim.lab.chart import steady
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline, Trace, predict
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
 
 STEADY = 12
 """This many scenes are also looked at while they stay as they are."""
@@ -62,7 +62,7 @@ def touch(skin: Skin, cells: np.ndarray, share: float, check: bool = False) -> t
     """Clocks from the touch to the end of the frame's last byte, and the frame's bytes.
 
     With ``check`` the compiled gateware goes through the same; raises
-    :class:`contactfpga_sim.cosim.compare.Mismatch` where it does anything else.
+    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it does anything else.
     """
     start = touch_cycle(skin, share)
     timeline = Timeline([(start, cells, None)])
@@ -81,7 +81,7 @@ def measure(skin: Skin, frames: Sequence[np.ndarray], checked: int) -> Speed:
     """The touches that (R, C) bool frames show, each at another instant of the scan.
 
     The first ``checked`` of them go through the compiled gateware as well; raises
-    :class:`contactfpga_sim.cosim.compare.Mismatch` where it differs from the golden model.
+    :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where it differs from the golden model.
     """
     derived = Derived(skin)
     us = skin.clock_hz / 1e6

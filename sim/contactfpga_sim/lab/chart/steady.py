@@ -8,8 +8,8 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.received import Received, frames_in
-from contactfpga_sim.golden import Timeline, beginnings, predict, requests
+from contactfpga_sim.model.board.received import Received, frames_in
+from contactfpga_sim.model.golden import Timeline, beginnings, predict, requests
 
 FRAMES = 12
 """Frames between which the rate is taken."""

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.cover import Cover
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.scenes.families import placements
-from contactfpga_sim.scenes.scene import Scene
-from contactfpga_sim.studies import kept, size
-from contactfpga_sim.studies.chart import errors, speed
-from contactfpga_sim.studies.chart.errors import METRICS, Interval
-from contactfpga_sim.studies.chart.speed import Speed
+from contactfpga_sim.lab import kept, size
+from contactfpga_sim.lab.chart import errors, speed
+from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.lab.chart.speed import Speed
+from contactfpga_sim.model.scenes.families import placements
+from contactfpga_sim.model.scenes.scene import Scene
 
 FAMILIES_DRAWN = ("bumper", "fingers", "pair", "palm", "edge")
 """Those of the chart unless others are asked for."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contactfpga_sim.studies.failures import electric, electric_reversal, line, lines, shapes, touch
+from contactfpga_sim.lab.failures import electric, electric_reversal, line, lines, shapes, touch
 
 STUDIES = {
     study.name: study

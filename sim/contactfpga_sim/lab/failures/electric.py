@@ -6,15 +6,11 @@ import functools
 
 import numpy as np
 
-from contactfpga.circuit import Circuit
+from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.sheet import guards
-from contactfpga_sim.sheet.levels import at_rest
-from contactfpga_sim.sheet.line import lines_of
-from contactfpga_sim.sheet.wiring import Wiring
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import (
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
     Rig,
@@ -26,6 +22,10 @@ from contactfpga_sim.studies.failures.rig import (
     reported,
     still,
 )
+from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet.levels import at_rest
+from contactfpga_sim.model.sheet.line import lines_of
+from contactfpga_sim.model.sheet.wiring import Wiring
 
 
 def finger(skin: Skin, *spots: tuple[int, int]) -> np.ndarray:

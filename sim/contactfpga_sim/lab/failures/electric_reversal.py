@@ -7,12 +7,12 @@ import functools
 
 import numpy as np
 
-from contactfpga.circuit import Circuit
+from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
-from contactfpga_sim.sheet.line import lines_of
-from contactfpga_sim.studies.failures.electric import DIODES, bare, finger, judged
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import REVERSAL, REVERSAL_GUARDED, Rig, hello_clocks
+from contactfpga_sim.lab.failures.electric import DIODES, bare, finger, judged
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import REVERSAL, REVERSAL_GUARDED, Rig, hello_clocks
+from contactfpga_sim.model.sheet.line import lines_of
 
 SPOTS = [(3, 4), (9, 10)]
 PULLED = Circuit(column_pull_ohm=4700.0)

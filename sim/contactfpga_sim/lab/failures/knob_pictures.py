@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga_sim.studies.failures.axes import Span, placed, rounded_up, shown
-from contactfpga_sim.studies.failures.knob import Outcome, Study, Turned
-from contactfpga_sim.studies.failures.rig import plural
+from contactfpga_sim.lab.failures.axes import Span, placed, rounded_up, shown
+from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
+from contactfpga_sim.lab.failures.rig import plural
 
 COLORS = {"right": style.GREEN, "warned": "#7fcfb9", "told": style.ORANGE, "silent": style.VERMILLION}
 TALL = {"right": 4, "warned": 7, "told": 10, "silent": 14}

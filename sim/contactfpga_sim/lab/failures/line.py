@@ -12,10 +12,10 @@ from contactfpga.driver.board import Board as Driver
 from contactfpga.errors import ReadTimeout
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import REFERENCE, Rig, hello_clocks
-from contactfpga_sim.studies.failures.uart import Heard, Line, heard
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, hello_clocks
+from contactfpga_sim.lab.failures.uart import Heard, Line, heard
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 FRAMES = 60
 SKIN = REFERENCE

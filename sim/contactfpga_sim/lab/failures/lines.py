@@ -9,11 +9,9 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.sheet import guards
-from contactfpga_sim.sheet.wiring import Wiring
-from contactfpga_sim.studies.failures.electric import finger, judged
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import (
+from contactfpga_sim.lab.failures.electric import finger, judged
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import (
     GUARDED,
     REFERENCE,
     REVERSAL,
@@ -22,6 +20,8 @@ from contactfpga_sim.studies.failures.rig import (
     hello_clocks,
     still,
 )
+from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet.wiring import Wiring
 
 
 def _broken(skin: Skin, line: str, count: float) -> Outcome:

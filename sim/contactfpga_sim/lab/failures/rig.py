@@ -11,9 +11,9 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.sheet.guards import Cuts
-from contactfpga_sim.studies.failures.knob import Place
+from contactfpga_sim.lab.failures.knob import Place
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet.guards import Cuts
 
 REFERENCE = Skin()
 GUARDED = REFERENCE.replace(guard=True, alive=True, fail_safe=True)

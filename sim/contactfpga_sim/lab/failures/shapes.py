@@ -9,10 +9,10 @@ import numpy as np
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.scene import FINGER_MM, Scene
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import REFERENCE, faults, moments, places, plural, reported, still
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import REFERENCE, faults, moments, places, plural, reported, still
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
 
 CAPACITY = 8
 

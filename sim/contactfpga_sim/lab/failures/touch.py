@@ -10,12 +10,12 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.contacts import Contact, Track
-from contactfpga_sim.scenes.scene import FINGER_MM, Scene
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.failures.rig import REFERENCE, Rig, faults, hello_clocks, places, plural, seen
-from contactfpga_sim.studies.sheets import adaptive_skin
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.failures.rig import REFERENCE, Rig, faults, hello_clocks, places, plural, seen
+from contactfpga_sim.lab.sheets import adaptive_skin
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.contacts import Contact, Track
+from contactfpga_sim.model.scenes.scene import FINGER_MM, Scene
 
 PLACES = 24
 """Places of a pair within a pitch, and angles; the worst one counts."""

@@ -12,7 +12,7 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.failures.rig import Rig, hello_clocks
+from contactfpga_sim.lab.failures.rig import Rig, hello_clocks
 
 OVERSAMPLING = 16
 """Samples per bit, as most UARTs take; the middle one of a bit counts."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 
-from contactfpga.circuit import Circuit
+from contactfpga.design.circuit import Circuit
 from contactfpga.skin import Skin
-from contactfpga_sim.sheet.line import Line
-from contactfpga_sim.studies.faults.hurt import Hurt
+from contactfpga_sim.lab.faults.hurt import Hurt
+from contactfpga_sim.model.sheet.line import Line
 
 Places = Callable[[Skin], Mapping[str, Hurt]]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.sheet import guards
-from contactfpga_sim.sheet.line import Line
-from contactfpga_sim.sheet.wiring import Wiring
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet import guards
+from contactfpga_sim.model.sheet.line import Line
+from contactfpga_sim.model.sheet.wiring import Wiring
 
 Cell = tuple[int, int]
 

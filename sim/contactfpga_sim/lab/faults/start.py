@@ -9,16 +9,16 @@ import numpy as np
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.sheet.shorts import Shorts
-from contactfpga_sim.studies.faults import study
-from contactfpga_sim.studies.faults.catalogue import FAULTS
-from contactfpga_sim.studies.faults.hurt import Hurt
+from contactfpga_sim.lab.faults import study
+from contactfpga_sim.lab.faults.catalogue import FAULTS
+from contactfpga_sim.lab.faults.hurt import Hurt
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.sheet.shorts import Shorts
 
 TESTED = Skin.load(examples() / "fast.toml").replace(guard=True, self_test=True, fail_safe=True, alive=True)
 
 HOST = "self_test"
-"""What :attr:`~contactfpga_sim.studies.faults.catalogue.Fault.host` says of these faults."""
+"""What :attr:`~contactfpga_sim.lab.faults.catalogue.Fault.host` says of these faults."""
 
 
 def clocks(skin: Skin) -> int:

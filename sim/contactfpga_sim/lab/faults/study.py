@@ -7,11 +7,11 @@ import functools
 from collections.abc import Iterator, Mapping
 
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.studies.faults import trial
-from contactfpga_sim.studies.faults.catalogue import FAULTS
-from contactfpga_sim.studies.faults.hurt import Hurt
-from contactfpga_sim.studies.faults.trial import Told
+from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
+from contactfpga_sim.lab.faults import trial
+from contactfpga_sim.lab.faults.catalogue import FAULTS
+from contactfpga_sim.lab.faults.hurt import Hurt
+from contactfpga_sim.lab.faults.trial import Told
 
 SKINS = {"plain": REFERENCE, "guarded": GUARDED}
 

@@ -10,8 +10,8 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.failures.rig import Rig, faults, hello_clocks, moments, reported
-from contactfpga_sim.studies.faults.hurt import Hurt
+from contactfpga_sim.lab.failures.rig import Rig, faults, hello_clocks, moments, reported
+from contactfpga_sim.lab.faults.hurt import Hurt
 
 LONGEST_US = 5000
 """A fault that is not told until then is not told."""

@@ -11,7 +11,7 @@ from typing import Any
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.choices.scans import SCANS
 from contactfpga.skin import Skin, SkinError
-from contactfpga_sim.studies.fit.sources import Recorded, Size, Source
+from contactfpga_sim.lab.fit.sources import Recorded, Size, Source
 
 
 def by(labeller: Labeller) -> list[dict[str, Any]]:

@@ -6,8 +6,8 @@ import dataclasses
 import math
 from collections.abc import Iterator
 
-from contactfpga_sim.studies.chart.errors import Z95, Interval
-from contactfpga_sim.studies.chart.speed import Speed
+from contactfpga_sim.lab.chart.errors import Z95, Interval
+from contactfpga_sim.lab.chart.speed import Speed
 
 
 @dataclasses.dataclass(frozen=True)

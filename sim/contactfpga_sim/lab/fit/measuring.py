@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from contactfpga.skin import Skin
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.chart import speed
-from contactfpga_sim.studies.chart.errors import Interval
-from contactfpga_sim.studies.chart.speed import Speed
-from contactfpga_sim.studies.chart.study import Found, compared, intervals
-from contactfpga_sim.studies.fit.sources import Source
-from contactfpga_sim.studies.fit.trial import Task
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.chart import speed
+from contactfpga_sim.lab.chart.errors import Interval
+from contactfpga_sim.lab.chart.speed import Speed
+from contactfpga_sim.lab.chart.study import Found, compared, intervals
+from contactfpga_sim.lab.fit.sources import Source
+from contactfpga_sim.lab.fit.trial import Task
 
 
 def errors_of(task: Task, source: Source, skins: Sequence[Skin], others: bool) -> list[dict[str, Interval]]:

@@ -6,13 +6,13 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from contactfpga.console import tables, terminal
-from contactfpga.cover import table
-from contactfpga_sim.studies.chart.errors import METRICS, Interval
-from contactfpga_sim.studies.fit.cost import DEVICE
-from contactfpga_sim.studies.fit.goals import Measured
-from contactfpga_sim.studies.fit.sources import Recorded
-from contactfpga_sim.studies.fit.trial import Fit, Trial
+from contactfpga.design.cover import table
+from contactfpga.tools.console import tables, terminal
+from contactfpga_sim.lab.chart.errors import METRICS, Interval
+from contactfpga_sim.lab.fit.cost import DEVICE
+from contactfpga_sim.lab.fit.goals import Measured
+from contactfpga_sim.lab.fit.sources import Recorded
+from contactfpga_sim.lab.fit.trial import Fit, Trial
 
 HEADS = ("zones by", "scan", "sheet", "pitch mm", "baud", "LUT4", "wires", "bytes", "latency us", "verdict")
 """Baud is left out where all have the same."""

@@ -14,17 +14,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.cover import Cover
+from contactfpga.design.cover import Cover
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.contacts import Contact, Value
-from contactfpga_sim.scenes.families import FAMILIES, placements
-from contactfpga_sim.scenes.file import SceneFile
-from contactfpga_sim.scenes.placing import scene_of
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import CONTACTS, Scene
-from contactfpga_sim.studies.chart import errors
-from contactfpga_sim.studies.chart.study import Look, look
+from contactfpga_sim.lab.chart import errors
+from contactfpga_sim.lab.chart.study import Look, look
+from contactfpga_sim.model.scenes.contacts import Contact, Value
+from contactfpga_sim.model.scenes.families import FAMILIES, placements
+from contactfpga_sim.model.scenes.file import SceneFile
+from contactfpga_sim.model.scenes.placing import scene_of
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.scene import CONTACTS, Scene
 
 SHIFT_MM = 10.0
 """A built-in scene lies in one place: it is moved at random by up to this much along x and y."""
@@ -81,7 +81,7 @@ class Placed(Source):
 
 @dataclasses.dataclass(frozen=True)
 class Family(Placed):
-    """One of :data:`contactfpga_sim.scenes.families.FAMILIES`."""
+    """One of :data:`contactfpga_sim.model.scenes.families.FAMILIES`."""
 
     family: str
     seed: int = 0
@@ -92,7 +92,7 @@ class Family(Placed):
 
 @dataclasses.dataclass(frozen=True)
 class BuiltIn(Placed):
-    """One of :data:`contactfpga_sim.scenes.scene.CONTACTS`, made for the Skin asked for."""
+    """One of :data:`contactfpga_sim.model.scenes.scene.CONTACTS`, made for the Skin asked for."""
 
     scene: str
     seed: int = 0

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future, as_completed
 from typing import Any
 
-from contactfpga.cover import Cover
+from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga_sim.studies.fit.candidates import Candidate
-from contactfpga_sim.studies.fit.goals import Goals, Measured
-from contactfpga_sim.studies.fit.sources import Source
+from contactfpga_sim.lab.fit.candidates import Candidate
+from contactfpga_sim.lab.fit.goals import Goals, Measured
+from contactfpga_sim.lab.fit.sources import Source
 
 SoFar = dict[Candidate, "Trial"]
 """What is known of each candidate while the search goes on; all of them but those that Skin refuses."""
@@ -55,7 +55,7 @@ class Trial:
     excess: float = math.inf
     """How many times the limit that is missed most is exceeded."""
     luts: int | None = None
-    """On the :data:`contactfpga_sim.studies.fit.cost.DEVICE`; None where it was not worked out."""
+    """On the :data:`contactfpga_sim.lab.fit.cost.DEVICE`; None where it was not worked out."""
 
     @property
     def skin(self) -> Skin:

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.studies import kept
-from contactfpga_sim.studies.flips import designs, flip
-from contactfpga_sim.studies.flips.flip import Found
-from contactfpga_sim.studies.flips.reference import Reference
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.flips import designs, flip
+from contactfpga_sim.lab.flips.flip import Found
+from contactfpga_sim.lab.flips.reference import Reference
 
 BLOCK = 25
 """Flips that one process follows before it is asked again."""

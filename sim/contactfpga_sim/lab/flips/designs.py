@@ -7,8 +7,8 @@ from typing import Any
 from contactfpga.skin import Skin
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.studies import size
-from contactfpga_sim.studies.flips.reference import BAUD, CLOCK_HZ
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.flips.reference import BAUD, CLOCK_HZ
 
 DESIGNS: dict[str, dict[str, Any]] = {
     "run": {},

@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from contactfpga_sim.board.state import Bit, Place
-from contactfpga_sim.studies.flips import touches
-from contactfpga_sim.studies.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
+from contactfpga_sim.lab.flips import touches
+from contactfpga_sim.lab.flips.reference import AFTER_S, FIRST_S, LAST_S, Heard, Listener, Reference
+from contactfpga_sim.model.board.state import Bit, Place
 
 SETTLED_STEPS = 4
 """The driver hears this many more once the board is what it was."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga_sim.studies.flips import summary
-from contactfpga_sim.studies.flips.campaign import Row
-from contactfpga_sim.studies.flips.summary import Design
+from contactfpga_sim.lab.flips import summary
+from contactfpga_sim.lab.flips.campaign import Row
+from contactfpga_sim.lab.flips.summary import Design
 
 GOAL = 1.0
 """Per cent."""

@@ -14,8 +14,8 @@ from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.wire import framing
-from contactfpga_sim.board.state import Moment, StateBoard
-from contactfpga_sim.studies.flips import touches
+from contactfpga_sim.lab.flips import touches
+from contactfpga_sim.model.board.state import Moment, StateBoard
 
 CLOCK_HZ, BAUD = 5_000_000, 1_250_000
 """Five twelfths of the reference Skin's: as many frames are scanned per second, in fewer clocks."""

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from contactfpga.inputs.files import replaced
-from contactfpga_sim.board.state import StateBoard
-from contactfpga_sim.studies.flips import designs
-from contactfpga_sim.studies.flips.campaign import Row, wilson
-from contactfpga_sim.studies.flips.flip import module
+from contactfpga_sim.lab.flips import designs
+from contactfpga_sim.lab.flips.campaign import Row, wilson
+from contactfpga_sim.lab.flips.flip import module
+from contactfpga_sim.model.board.state import StateBoard
 
 
 class Design(NamedTuple):

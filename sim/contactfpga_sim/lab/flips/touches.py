@@ -9,7 +9,7 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.zones.zone import Zones
-from contactfpga_sim import golden
+from contactfpga_sim.model import golden
 
 STEP_S = 0.005
 """Another sheet comes this often."""

@@ -13,14 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.cover.hertz import Ball
-from contactfpga.haptics import Contacts, Cylinder, LoadCells, Touch, contacts
-from contactfpga.haptics.answer import Floats
-from contactfpga.haptics.layouts import hexapod
-from contactfpga.haptics.posterior import radius_95
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.haptics import coverage
-from contactfpga_sim.studies.haptics.coverage import PATCH, Case
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.robot.haptics import Contacts, Cylinder, LoadCells, Touch, contacts
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga.robot.haptics.layouts import hexapod
+from contactfpga.robot.haptics.posterior import radius_95
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.haptics import coverage
+from contactfpga_sim.lab.haptics.coverage import PATCH, Case
 
 CONTACTS = 300
 """At each value."""

@@ -9,13 +9,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.sense import Model
-from contactfpga.cover.sense import Sheet as Foam
-from contactfpga.cover.switch import Switch
-from contactfpga.haptics import Closing, LoadCells, Locator, Place, Plane, Reach
-from contactfpga.haptics.layouts import tripod
-from contactfpga.haptics.posterior import radius_95
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.sense import Model
+from contactfpga.design.cover.sense import Sheet as Foam
+from contactfpga.design.cover.switch import Switch
+from contactfpga.robot.haptics import Closing, LoadCells, Locator, Place, Plane, Reach
+from contactfpga.robot.haptics.layouts import tripod
+from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.skin.sheet import Sheet
 
 LINES = 16

@@ -14,16 +14,16 @@ from collections.abc import Sequence
 import numpy as np
 
 import contactfpga
-from contactfpga.haptics import AloneWatch, ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
-from contactfpga.haptics.answer import Floats
-from contactfpga.haptics.layouts import tripod
+from contactfpga.robot.haptics import AloneWatch, ClosingWatch, LoadCells, Locator, Plane, WithReadings, felt
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga.robot.haptics.layouts import tripod
 from contactfpga.skin import Skin
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.scenes.contacts import Contact, Track, disc
-from contactfpga_sim.scenes.felt import Felt
-from contactfpga_sim.scenes.scene import Scene
-from contactfpga_sim.studies.haptics.coverage import MIDDLE, POINT, reach_of
+from contactfpga_sim.lab.haptics.coverage import MIDDLE, POINT, reach_of
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
+from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.scene import Scene
 
 RATE_N_S = 1600.0
 MOST_N = 30.0

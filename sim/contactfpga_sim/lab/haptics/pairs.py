@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.haptics.answer import Floats
-from contactfpga_sim.studies.haptics.felt import FINGER_MM, SETTINGS, pair
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga_sim.lab.haptics.felt import FINGER_MM, SETTINGS, pair
 
 METHODS = ("barycenters", "mean of all places that fit", "one place known")
 PUSH_N = 12.0

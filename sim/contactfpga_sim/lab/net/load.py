@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import contactfpga
-from contactfpga.net import session
-from contactfpga.net.publisher import Publisher
-from contactfpga_sim.studies.net import source
+from contactfpga.robot.net import session
+from contactfpga.robot.net.publisher import Publisher
+from contactfpga_sim.lab.net import source
 
 SECONDS = 5.0
 FULL_HZ = 10_000.0

@@ -9,11 +9,11 @@ import time
 from contactfpga.skin.derived import EPOCH_BITS
 from contactfpga.skin.widths import HEARD_BITS
 from contactfpga.wire.hello import EPOCH_DIGITS, HEARD_DIGITS, SENT_DIGITS
-from contactfpga_sim.board.driver_speed import FRAMES, STEP_US, frame
-from contactfpga_sim.board.driver_speed import SKIN as SKIN
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.hello import hello
-from contactfpga_sim.golden.request import heard
+from contactfpga_sim.model.board.driver_speed import FRAMES, STEP_US, frame
+from contactfpga_sim.model.board.driver_speed import SKIN as SKIN
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.hello import hello
+from contactfpga_sim.model.golden.request import heard
 
 HELLO_S = 0.5
 GREETED_HZ = 20.0

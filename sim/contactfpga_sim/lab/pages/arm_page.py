@@ -1,4 +1,7 @@
-"""Writes docs/arm.md's tables and pictures: ``python -m contactfpga_sim.pages.arm_page docs/arm.md docs/images``."""
+"""Writes docs/arm.md's tables and pictures.
+
+``python -m contactfpga_sim.lab.pages.arm_page docs/arm.md docs/images`` does so.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.arm import comply, latency_charts, report, run_pictures, sweep
-from contactfpga_sim.studies.arm.case import Case
-from contactfpga_sim.studies.arm.run import Result, run
-from contactfpga_sim.studies.arm.sweep import Point, Task
-from contactfpga_sim.studies.arm.world import Faults
-from contactfpga_sim.studies.pool import executor, progress
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.arm import comply, latency_charts, report, run_pictures, sweep
+from contactfpga_sim.lab.arm.case import Case
+from contactfpga_sim.lab.arm.run import Result, run
+from contactfpga_sim.lab.arm.sweep import Point, Task
+from contactfpga_sim.lab.arm.world import Faults
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab.pool import executor, progress
 
 STEPS_US = (25.0, 12.5, 6.25)
 """Of the integrator; each is half of the one before."""

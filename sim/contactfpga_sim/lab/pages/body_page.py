@@ -1,6 +1,6 @@
 """The tables and pictures of docs/body.md.
 
-python -m contactfpga_sim.pages.body_page docs/body.md docs/images
+python -m contactfpga_sim.lab.pages.body_page docs/body.md docs/images
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ import numpy as np
 
 from contactfpga import examples
 from contactfpga import picture_style as style
-from contactfpga.body import Body, LinkState
-from contactfpga.body.contact import on_link
-from contactfpga.body.plan import Plan
-from contactfpga.body.pose import Pose
-from contactfpga.console import interrupt
 from contactfpga.driver import sim_address
-from contactfpga_sim.pages import writer
-from contactfpga_sim.scenes.scene import scene
-from contactfpga_sim.studies.body import folding, outages, registering
+from contactfpga.robot.body import Body, LinkState
+from contactfpga.robot.body.contact import on_link
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.pose import Pose
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.body import folding, outages, registering
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.model.scenes.scene import scene
 
 POINTS = (3, 4, 6, 10)
 SWEEPS = (1, 2, 5, 10)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra, MissingTool
-from contactfpga.view.app import View
-from contactfpga.view.opening import Shown
-from contactfpga.view.tiles import MM
+from contactfpga.tools.view.app import View
+from contactfpga.tools.view.opening import Shown
+from contactfpga.tools.view.tiles import MM
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # Without a graphics card all is drawn by the processor.

@@ -12,11 +12,11 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from contactfpga.console import interrupt
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
-from contactfpga_sim.pages import writer
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import writer
 
 COMPILER = "arm-none-eabi-gcc"
 CORES = {"Cortex-M0+": ["-mcpu=cortex-m0plus"], "Cortex-M4": ["-mcpu=cortex-m4"], "Cortex-M7": ["-mcpu=cortex-m7"]}

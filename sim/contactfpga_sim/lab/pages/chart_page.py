@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.chart import host, numbers, speed, steady
-from contactfpga_sim.studies.chart.study import Point, front
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.chart import host, numbers, speed, steady
+from contactfpga_sim.lab.chart.study import Point, front
+from contactfpga_sim.lab.pages import writer
 
 NUMBERS = Path("docs/chart/chart.csv")
 """Of the chart that the page shows."""

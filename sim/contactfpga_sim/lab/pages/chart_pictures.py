@@ -1,4 +1,4 @@
-"""The chart's pictures, drawn from its numbers: ``python -m contactfpga_sim.pages.chart_pictures``.
+"""The chart's pictures, drawn from its numbers: ``python -m contactfpga_sim.lab.pages.chart_pictures``.
 
 Nothing is measured: `docs/chart/chart.csv` gives `docs/chart/chart.svg` and the README's `docs/images/front.svg`.
 """
@@ -9,8 +9,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from contactfpga.console import interrupt
-from contactfpga_sim.studies.chart import front_picture, numbers, picture
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.chart import front_picture, numbers, picture
 
 NUMBERS = Path("docs/chart/chart.csv")
 FRONT = Path("docs/images/front.svg")

@@ -1,13 +1,13 @@
-"""The table of docs/clock.md: `python -m contactfpga_sim.pages.clock_page docs/clock.md`."""
+"""The table of docs/clock.md: `python -m contactfpga_sim.lab.pages.clock_page docs/clock.md`."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
 
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.clock import PATHS, accuracy
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.clock import PATHS, accuracy
+from contactfpga_sim.lab.pages import writer
 
 HEAD = (
     "way to the host",

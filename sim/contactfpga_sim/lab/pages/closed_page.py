@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from contactfpga.choices.labellers import LABELLERS, Labeller
-from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import sizes
-from contactfpga_sim.golden import volume
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies import size
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.model.golden import volume
 
 CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
 COLUMNS = 8

@@ -1,6 +1,6 @@
 """The tables and pictures of docs/cover.md.
 
-python -m contactfpga_sim.pages.cover_page docs/cover.md docs/images
+python -m contactfpga_sim.lab.pages.cover_page docs/cover.md docs/images
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import sys
 
 import numpy as np
 
-from contactfpga.console import interrupt
-from contactfpga.cover import drawing, formula_study, paper, study_drawing
-from contactfpga.cover.design import thinning
-from contactfpga.cover.foams import FOAMS
-from contactfpga_sim.pages import writer
+from contactfpga.design.cover import drawing, formula_study, paper, study_drawing
+from contactfpga.design.cover.design import thinning
+from contactfpga.design.cover.foams import FOAMS
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import writer
 
 
 def _cell(error: float) -> str:

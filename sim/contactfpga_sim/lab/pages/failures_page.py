@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.failures.catalogue import STUDIES
-from contactfpga_sim.studies.failures.knob import Study, Turned
+from contactfpga_sim.lab.failures.catalogue import STUDIES
+from contactfpga_sim.lab.failures.knob import Study, Turned
+from contactfpga_sim.lab.pages import writer
 
 HEAD = ("knob", "method", "holds until", "breaks at", "what breaks", "what the system says", "what helps")
 

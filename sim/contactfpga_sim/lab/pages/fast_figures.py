@@ -7,9 +7,9 @@ import numpy as np
 from contactfpga.shipped import examples
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.pages import writer
-from contactfpga_sim.scenes.families import FAMILIES, placements
-from contactfpga_sim.studies import latency
+from contactfpga_sim.lab import latency
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.model.scenes.families import FAMILIES, placements
 
 FAST, FAST_64 = Skin.load(examples() / "fast.toml"), Skin.load(examples() / "fast-64x64.toml")
 

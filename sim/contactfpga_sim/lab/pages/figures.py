@@ -12,21 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.received import frames_in
-from contactfpga_sim.golden import Timeline
-from contactfpga_sim.golden.adaptive import Scanner
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.pages import writer
-from contactfpga_sim.pages.fast_figures import latency_table, sides_table
-from contactfpga_sim.pages.label_figures import labeller_table, recorded_table
-from contactfpga_sim.pages.units_figures import units_table
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import CONTACTS
-from contactfpga_sim.studies.sheets import adaptive_skin
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab.pages.fast_figures import latency_table, sides_table
+from contactfpga_sim.lab.pages.label_figures import labeller_table, recorded_table
+from contactfpga_sim.lab.pages.units_figures import units_table
+from contactfpga_sim.lab.sheets import adaptive_skin
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline
+from contactfpga_sim.model.golden.adaptive import Scanner
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.scene import CONTACTS
 
 INSTANTS = 96
 """Touch instants, spread evenly over a scan."""

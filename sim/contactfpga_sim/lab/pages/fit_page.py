@@ -7,12 +7,12 @@ import shlex
 import sys
 from collections.abc import Callable
 
-from contactfpga.commands.fit import add_flags, asked
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies import pool
-from contactfpga_sim.studies.fit import show
-from contactfpga_sim.studies.fit.search import fit
+from contactfpga.tools.commands.fit import add_flags, asked
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import pool
+from contactfpga_sim.lab.fit import show
+from contactfpga_sim.lab.fit.search import fit
+from contactfpga_sim.lab.pages import writer
 
 EXAMPLES = {
     "bumper": "examples/scenes-bumper.toml --barycenter-mm 3 --latency-us 500",

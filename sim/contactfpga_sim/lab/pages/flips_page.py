@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.flips import summary
-from contactfpga_sim.studies.flips.campaign import Row
-from contactfpga_sim.studies.flips.summary import Design
+from contactfpga_sim.lab.flips import summary
+from contactfpga_sim.lab.flips.campaign import Row
+from contactfpga_sim.lab.flips.summary import Design
+from contactfpga_sim.lab.pages import writer
 
 DESIGNS = (
     "design",

@@ -11,11 +11,11 @@ import numpy as np
 
 from contactfpga import picture_style as style
 from contactfpga.inputs.files import write_text
-from contactfpga_sim.pages import failures_page, writer
-from contactfpga_sim.studies.failures import knob_pictures
-from contactfpga_sim.studies.failures.knob import Turned
-from contactfpga_sim.studies.haptics import breaks, felt, pairs
-from contactfpga_sim.studies.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
+from contactfpga_sim.lab.failures import knob_pictures
+from contactfpga_sim.lab.failures.knob import Turned
+from contactfpga_sim.lab.haptics import breaks, felt, pairs
+from contactfpga_sim.lab.haptics.felt import METHODS, SETTINGS, TIMES_S, Setting
+from contactfpga_sim.lab.pages import failures_page, writer
 
 CONTACTS = 100
 """Of each line; `make campaign` presses 1,000 in all."""

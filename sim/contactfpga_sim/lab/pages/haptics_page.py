@@ -1,6 +1,6 @@
 """The tables and pictures of docs/haptics.md.
 
-python -m contactfpga_sim.pages.haptics_page docs/haptics.md docs/images
+python -m contactfpga_sim.lab.pages.haptics_page docs/haptics.md docs/images
 """
 
 from __future__ import annotations
@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 import sys
 
-from contactfpga.console import interrupt
-from contactfpga.haptics import Cylinder, drawing
-from contactfpga.haptics.rate import Rating, Task, compared
-from contactfpga_sim.pages import haptics_felt, writer
-from contactfpga_sim.studies.haptics import coverage
-from contactfpga_sim.studies.haptics.coverage import Case
+from contactfpga.robot.haptics import Cylinder, drawing
+from contactfpga.robot.haptics.rate import Rating, Task, compared
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.haptics import coverage
+from contactfpga_sim.lab.haptics.coverage import Case
+from contactfpga_sim.lab.pages import haptics_felt, writer
 
 LINK = Task(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03

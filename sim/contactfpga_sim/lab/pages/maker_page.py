@@ -1,6 +1,6 @@
 """The tables and the schematic of docs/maker.md.
 
-python -m contactfpga_sim.pages.maker_page docs/maker.md docs/images
+python -m contactfpga_sim.lab.pages.maker_page docs/maker.md docs/images
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 
-from contactfpga.circuit import SCHOTTKY, SILICON, Circuit, needed, static
-from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import schematic, writer
+from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, needed, static
+from contactfpga.design.circuit.times import MARGIN, Time
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import schematic, writer
 
 SIZE = 16
 PULLED = Circuit(series_ohm=33.0, column_pull_ohm=22_000.0, row_pull_ohm=5600.0)

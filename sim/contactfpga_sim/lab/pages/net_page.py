@@ -1,6 +1,6 @@
 """The tables and the picture of docs/net.md.
 
-python -m contactfpga_sim.pages.net_page docs/net.md docs/images
+python -m contactfpga_sim.lab.pages.net_page docs/net.md docs/images
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga.console import interrupt
-from contactfpga.net.message import HEAD_BYTES
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.net import load, source
+from contactfpga.robot.net.message import HEAD_BYTES
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.net import load, source
+from contactfpga_sim.lab.pages import writer
 
 BATCHES_MS = (0.0, 2.0, 10.0)
 LINKS = (1, 4, 16, 64)

@@ -1,6 +1,6 @@
 """The figures of docs/recordings.md.
 
-python -m contactfpga_sim.pages.record_page docs/recordings.md
+python -m contactfpga_sim.lab.pages.record_page docs/recordings.md
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies import recording
+from contactfpga_sim.lab import recording
+from contactfpga_sim.lab.pages import writer
 
 SECONDS = {10_000: 3.0, 1_000: 5.0}
 """Of device time, by frames per second."""

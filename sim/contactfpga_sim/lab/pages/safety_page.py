@@ -1,17 +1,17 @@
 """The tables of docs/safety.md.
 
-python -m contactfpga_sim.pages.safety_page docs/safety.md
+python -m contactfpga_sim.lab.pages.safety_page docs/safety.md
 """
 
 from __future__ import annotations
 
 import sys
 
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies.faults import start, study, trial
-from contactfpga_sim.studies.faults.catalogue import FAULTS
-from contactfpga_sim.studies.faults.study import Place
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.faults import start, study, trial
+from contactfpga_sim.lab.faults.catalogue import FAULTS
+from contactfpga_sim.lab.faults.study import Place
+from contactfpga_sim.lab.pages import writer
 
 OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "none": ("plain", ("flags",)),

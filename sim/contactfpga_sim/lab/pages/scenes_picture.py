@@ -1,4 +1,4 @@
-"""The picture in docs/scenes.md: ``python -m contactfpga_sim.pages.scenes_picture docs/images/scenes.svg``.
+"""The picture in docs/scenes.md: ``python -m contactfpga_sim.lab.pages.scenes_picture docs/images/scenes.svg``.
 
 Written by hand rather than by a plotting library, so that the same scenes always make the same file.
 """
@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga.console import interrupt
-from contactfpga.cover import Cover, Ellipse, Part
+from contactfpga.design.cover import Cover, Ellipse, Part
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.families import placements
-from contactfpga_sim.scenes.scene import Scene, sheet
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.families import placements
+from contactfpga_sim.model.scenes.scene import Scene, sheet
 
 ACROSS = 4
 PANEL, MARGIN, LINE, FOOT = 160, 16, 16, 24

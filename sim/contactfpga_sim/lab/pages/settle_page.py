@@ -1,6 +1,6 @@
 """The tables and pictures of docs/settle.md.
 
-python -m contactfpga_sim.pages.settle_page docs/settle.md docs/images
+python -m contactfpga_sim.lab.pages.settle_page docs/settle.md docs/images
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 import functools
 import sys
 
-from contactfpga.circuit import SILICON, Circuit, needed, patterns, problems
-from contactfpga.circuit.times import MARGIN, Time
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import writer
-from contactfpga_sim.sheet import agreement, spice
-from contactfpga_sim.sheet.agreement import Compared
-from contactfpga_sim.studies.settle import breaks, pictures, shorted
+from contactfpga.design.circuit import SILICON, Circuit, needed, patterns, problems
+from contactfpga.design.circuit.times import MARGIN, Time
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab.settle import breaks, pictures, shorted
+from contactfpga_sim.model.sheet import agreement, spice
+from contactfpga_sim.model.sheet.agreement import Compared
 
 SHEETS = {
     "nominal": (16, Circuit()),

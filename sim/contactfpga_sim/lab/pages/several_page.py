@@ -11,18 +11,18 @@ import sys
 
 import numpy as np
 
-from contactfpga.console import interrupt
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
+from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
-from contactfpga_sim.golden import Timeline, predict
-from contactfpga_sim.golden.predict import predict_several
-from contactfpga_sim.golden.trace import Trace
-from contactfpga_sim.pages import writer
-from contactfpga_sim.scenes.scene import scene
-from contactfpga_sim.studies import size
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.predict import predict_several
+from contactfpga_sim.model.golden.trace import Trace
+from contactfpga_sim.model.scenes.scene import scene
 
 SKIN = Skin(row_drive="74hc595", column_read="74hc165")
 COUNTS = (1, 2, 3, 4, 8)

@@ -14,12 +14,12 @@ from typing import Any
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.console import interrupt
 from contactfpga.skin import Skin
+from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import build, sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies import size
+from contactfpga_sim.lab import size
+from contactfpga_sim.lab.pages import writer
 
 EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
 """Sheets that the boards page shows beside the default ones."""

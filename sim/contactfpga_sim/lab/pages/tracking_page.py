@@ -1,6 +1,6 @@
 """The tables and the picture of docs/tracking.md.
 
-python -m contactfpga_sim.pages.tracking_page docs/tracking.md docs/images
+python -m contactfpga_sim.lab.pages.tracking_page docs/tracking.md docs/images
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga.console import interrupt
-from contactfpga_sim.pages import failures_page, writer
-from contactfpga_sim.pages.figures import RECORDINGS
-from contactfpga_sim.studies.tracking import breaks, reflex, scenes, scores, speed
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab.pages import failures_page, writer
+from contactfpga_sim.lab.pages.figures import RECORDINGS
+from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores, speed
 
 HEAD = ("tracker", "MOTA, %", "IDF1, %", "id switches per 1,000 frames")
 LOOKS = {"`Tracker`": (style.BLUE, "solid"), "nearest zone": (style.VERMILLION, style.DASHES[1])}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import CHECK_BYTES, Derived
 from contactfpga.wire.units import plain_bytes
-from contactfpga_sim.pages import writer
+from contactfpga_sim.lab.pages import writer
 
 COUNTS = 1, 3, 6, 8
 

@@ -1,6 +1,6 @@
 """The figures of docs/view.md and the picture of the view, from a browser without a window.
 
-python -m contactfpga_sim.pages.view_page docs/view.md docs/images
+python -m contactfpga_sim.lab.pages.view_page docs/view.md docs/images
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from contactfpga.console import interrupt, outputs
 from contactfpga.driver import driver
 from contactfpga.driver.link import Link
 from contactfpga.skin.sheet import Sheet
-from contactfpga.view import opening, plot, replayed
-from contactfpga.view.app import View
-from contactfpga.view.opening import Shown
+from contactfpga.tools.console import interrupt, outputs
+from contactfpga.tools.view import opening, plot, replayed
+from contactfpga.tools.view.app import View
+from contactfpga.tools.view.opening import Shown
 from contactfpga.zones.batch import Batch
-from contactfpga_sim.pages import browser, writer
+from contactfpga_sim.lab.pages import browser, writer
 
 CLICKS = 20
 PACED_S = 4.0

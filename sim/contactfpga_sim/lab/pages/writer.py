@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from contactfpga.console import outputs
 from contactfpga.inputs.files import write_text
+from contactfpga.tools.console import outputs
 
 Tables = Mapping[str, Callable[[], str]]
 """What makes each table, by its name."""
@@ -50,7 +50,7 @@ def write(path: Path, tables: Tables) -> None:
 
 def page(path: str | Path, option: str = "page") -> Path:
     """The page, which is there and can be written; looked at before anything is measured for it. Raises
-    :class:`~contactfpga.console.outputs.OutputError`."""
+    :class:`~contactfpga.tools.console.outputs.OutputError`."""
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")
     return outputs.file(path, option)
@@ -58,7 +58,7 @@ def page(path: str | Path, option: str = "page") -> Path:
 
 def page_and_folder(description: str) -> tuple[Path, Path]:
     """The page and the folder of its pictures that the command line names; ``description``: of the command. Both can be
-    written. Raises :class:`~contactfpga.console.outputs.OutputError`."""
+    written. Raises :class:`~contactfpga.tools.console.outputs.OutputError`."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("page", type=Path, help="Page to write tables into.")
     parser.add_argument("folder", type=Path, help="Folder to draw pictures in.")

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from contactfpga.circuit import Circuit, patterns, phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels
+from contactfpga.design.circuit import Circuit, patterns, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
 
 SETTLE_US, PRECHARGE_US = 0.5, 0.25
 """Times of a fast scan."""

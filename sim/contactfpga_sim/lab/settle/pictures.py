@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from contactfpga import picture_style as style
-from contactfpga.circuit import Circuit, patterns
-from contactfpga.circuit.network import Network
-from contactfpga_sim.studies.settle import breaks, shorted
-from contactfpga_sim.studies.settle.breaks import KNOBS, SIZE, US
-from contactfpga_sim.studies.settle.shorted import NAMES, RowTime
+from contactfpga.design.circuit import Circuit, patterns
+from contactfpga.design.circuit.network import Network
+from contactfpga_sim.lab.settle import breaks, shorted
+from contactfpga_sim.lab.settle.breaks import KNOBS, SIZE, US
+from contactfpga_sim.lab.settle.shorted import NAMES, RowTime
 
 COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
 

@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga.circuit import Circuit, patterns, transient
-from contactfpga.circuit.network import OFF, Drive, Network
-from contactfpga_sim.studies.settle.breaks import PRECHARGE_US, SETTLE_US, SIZE, US
+from contactfpga.design.circuit import Circuit, patterns, transient
+from contactfpga.design.circuit.network import OFF, Drive, Network
+from contactfpga_sim.lab.settle.breaks import PRECHARGE_US, SETTLE_US, SIZE, US
 
 GAP_US = 1 / 24
 """A clock of 24 MHz."""

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.scenes.contacts import Contact, Track, disc
-from contactfpga_sim.studies.failures.knob import Outcome, Study
-from contactfpga_sim.studies.tracking.frames import zones_of
-from contactfpga_sim.studies.tracking.judge import Update, ours
-from contactfpga_sim.studies.tracking.nearest import Nearest
-from contactfpga_sim.studies.tracking.scenes import FINGER_MM, SKIN, Finger
+from contactfpga_sim.lab.failures.knob import Outcome, Study
+from contactfpga_sim.lab.tracking.frames import zones_of
+from contactfpga_sim.lab.tracking.judge import Update, ours
+from contactfpga_sim.lab.tracking.nearest import Nearest
+from contactfpga_sim.lab.tracking.scenes import FINGER_MM, SKIN, Finger
+from contactfpga_sim.model.scenes.contacts import Contact, Track, disc
 
 WIDE = SKIN.replace(columns=60, settle_us=20.0)
 """For slides that a smaller sheet has no room for."""

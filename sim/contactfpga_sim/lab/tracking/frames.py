@@ -10,8 +10,8 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.golden.zones import flood, moments
-from contactfpga_sim.studies.tracking.scenes import SECONDS, SKIN, Played
+from contactfpga_sim.lab.tracking.scenes import SECONDS, SKIN, Played
+from contactfpga_sim.model.golden.zones import flood, moments
 
 Place = tuple[float, float]
 """x and y in mm."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from contactfpga.errors import MissingExtra
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.studies.tracking.frames import Place, Shown
-from contactfpga_sim.studies.tracking.nearest import Nearest
+from contactfpga_sim.lab.tracking.frames import Place, Shown
+from contactfpga_sim.lab.tracking.nearest import Nearest
 
 NEAR_MM = 15.0
 """How far from a contact an id may lie to be its own."""

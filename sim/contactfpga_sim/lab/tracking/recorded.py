@@ -12,8 +12,8 @@ import numpy as np
 
 from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.studies.tracking.frames import Place, Shown, zones_of
+from contactfpga_sim.lab.tracking.frames import Place, Shown, zones_of
+from contactfpga_sim.model.scenes.recordings import Recording
 
 MOST = 1500
 """Frames of a recording that are taken."""

@@ -1,5 +1,5 @@
 """How soon the control loop of ``examples/reflex.py`` stops on this machine: `python -m
-contactfpga_sim.studies.tracking.reflex`.
+contactfpga_sim.lab.tracking.reflex`.
 
 A process of its own plays a board on a pseudo-terminal, with a touch every 5 ms. Times are this machine's, with
 whatever else it does.
@@ -15,8 +15,8 @@ from types import ModuleType
 from typing import NamedTuple
 
 import contactfpga
-from contactfpga.console import interrupt
-from contactfpga_sim.board.driver_speed import FRAMES, STEP_US, stream
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.model.board.driver_speed import FRAMES, STEP_US, stream
 
 PACED = 3
 """Frames written at once: 12,000 per second, some more than the reference Skin's."""

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.contacts import Contact, Swing, Track, disc
-from contactfpga_sim.scenes.scene import Scene
+from contactfpga_sim.model.scenes.contacts import Contact, Swing, Track, disc
+from contactfpga_sim.model.scenes.scene import Scene
 
 SKIN = Skin()
 FINGER_MM = 8.0

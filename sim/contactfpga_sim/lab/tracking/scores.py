@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga_sim.studies.tracking import frames, judge, recorded, scenes
-from contactfpga_sim.studies.tracking.judge import Score
+from contactfpga_sim.lab.tracking import frames, judge, recorded, scenes
+from contactfpga_sim.lab.tracking.judge import Score
 
 RATES_HZ = (25.0, 50.0, 100.0, 200.0, 1000.0)
 """Frames per second of a scene."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board import driver_speed
+from contactfpga_sim.model.board import driver_speed
 
 FRAMES = 8192
 

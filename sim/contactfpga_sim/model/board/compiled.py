@@ -10,13 +10,13 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board import native
-from contactfpga_sim.board.running import Running
-from contactfpga_sim.scenes.cells import to_words
-from contactfpga_sim.sheet.converter import check_simulated
-from contactfpga_sim.sheet.line import Line, RowLine
-from contactfpga_sim.sheet.matrix import Contention
-from contactfpga_sim.sheet.shorts import Shorts
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.running import Running
+from contactfpga_sim.model.scenes.cells import to_words
+from contactfpga_sim.model.sheet.converter import check_simulated
+from contactfpga_sim.model.sheet.line import Line, RowLine
+from contactfpga_sim.model.sheet.matrix import Contention
+from contactfpga_sim.model.sheet.shorts import Shorts
 
 CAPTURABLE = ("rows", "records", "items", "bytes", "line", "contact", "alive", "driven", "charged", "received")
 """What a board notes: transfers of rows, zone records, what these become where they are divided, and bytes, changes of
@@ -29,7 +29,7 @@ class CompiledBoard(Running):
 
     ``capture`` names the :data:`CAPTURABLE` to note, besides ``received``. ``model`` is the gateware, by default what
     :func:`model_of` says. The first board of a Skin takes some seconds to build
-    (:mod:`contactfpga_sim.board.native`, also for what can go wrong).
+    (:mod:`contactfpga_sim.model.board.native`, also for what can go wrong).
     """
 
     def __init__(self, skin: Skin, capture: Iterable[str] = (), model: native.Model | None = None):
@@ -50,7 +50,7 @@ class CompiledBoard(Running):
         self.hold(cells[None], 0)
 
     def restart(self, mutant: int = 0) -> None:
-        """Power up again, as this mutant of the model's (:mod:`contactfpga_sim.mutants`); 0 is the gateware itself."""
+        """Power up again, as this mutant (:mod:`contactfpga_sim.verify.mutants`); 0 is the gateware itself."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def stick(self, columns: np.ndarray | None) -> None:

@@ -1,4 +1,4 @@
-"""How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.board.driver_speed`.
+"""How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.model.board.driver_speed`.
 
 A process of its own plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this
 process's processor time, all its threads together, so they do not depend on what else the machine does; the latencies
@@ -23,11 +23,11 @@ from contactfpga.driver.conversation import Arrival, Conversation, Event
 from contactfpga.skin import Skin
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.frame import join
-from contactfpga_sim.golden.hello import hello
-from contactfpga_sim.golden.packet import Packet
-from contactfpga_sim.golden.request import heard
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.frame import join
+from contactfpga_sim.model.golden.hello import hello
+from contactfpga_sim.model.golden.packet import Packet
+from contactfpga_sim.model.golden.request import heard
 
 SKIN = Skin(clock_hz=24_000_000, baud=12_000_000, settle_us=2.5)
 FRAMES = 1 << 14

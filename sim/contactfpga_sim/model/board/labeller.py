@@ -10,8 +10,8 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.board import native
-from contactfpga_sim.scenes.cells import to_words
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.scenes.cells import to_words
 
 _RECORD = np.dtype([("frame", "<u8"), ("cycle", "<u8"), ("zone", "<u8")])
 _TIMING = np.dtype([("first_row", "<u8"), ("last_row", "<u8"), ("end", "<u8")])
@@ -51,7 +51,7 @@ class Labelled:
 class LabelBench:
     """The Skin's labeller, compiled, for sheets of its size and connectivity.
 
-    Building it takes some seconds the first time (:mod:`contactfpga_sim.board.native`).
+    Building it takes some seconds the first time (:mod:`contactfpga_sim.model.board.native`).
     """
 
     def __init__(self, skin: Skin):

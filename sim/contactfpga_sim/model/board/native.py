@@ -30,10 +30,10 @@ from typing import Any
 import numpy as np
 
 from contactfpga.choices.choice import own_files
-from contactfpga.console import terminal
 from contactfpga.errors import ContactFPGAError, MissingExtra, MissingTool
 from contactfpga.skin import Skin
-from contactfpga_sim.board import cache, sources
+from contactfpga.tools.console import terminal
+from contactfpga_sim.model.board import cache, sources
 
 _USER = "the virtual board"
 _COMPILERS = {
@@ -110,7 +110,7 @@ def load(model: Model) -> ctypes.CDLL:
     """The library of a model, from the cache or built now (some seconds, with a line of progress on stderr).
 
     Raises :class:`MissingTool` without a compiler, :class:`MissingExtra` without the extra ``sim``,
-    :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.board.cache.CacheError`.
+    :class:`CompileFailed` when a tool refuses, and :class:`~contactfpga_sim.model.board.cache.CacheError`.
     """
     compiler = find_compiler()
     library = cache.ready(cache.cache_folder()) / f"{_cache_key(model, compiler)}.so"

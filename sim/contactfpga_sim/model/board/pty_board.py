@@ -17,14 +17,14 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
-from contactfpga.circuit import Circuit
-from contactfpga.cover import Cover
+from contactfpga.design.circuit import Circuit
+from contactfpga.design.cover import Cover
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga_sim.board.several import VirtualSheets
-from contactfpga_sim.board.virtual import VirtualBoard
-from contactfpga_sim.scenes.scene import Source
+from contactfpga_sim.model.board.several import VirtualSheets
+from contactfpga_sim.model.board.virtual import VirtualBoard
+from contactfpga_sim.model.scenes.scene import Source
 
 CHUNK_S = 0.5e-3
 """Simulated time between two looks at the port."""
@@ -47,8 +47,8 @@ class PtyBoard:
     The port exists, and the gateware is compiled, when the constructor returns; the board runs inside
     ``with PtyBoard(...) as board:`` (or from :meth:`start` to :meth:`stop`) in a thread, or in :meth:`serve`.
     skin: of the board's sheet, or of several, which the scene touches alike; scene, cover and circuit: as for
-    :class:`~contactfpga_sim.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. What no client
-    reads is dropped, the oldest first, and counted.
+    :class:`~contactfpga_sim.model.board.virtual.VirtualBoard`; link: path of a symbolic link to the port. What no
+    client reads is dropped, the oldest first, and counted.
     """
 
     def __init__(

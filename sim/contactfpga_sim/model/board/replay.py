@@ -17,10 +17,10 @@ from contactfpga.skin.derived import Derived
 from contactfpga.wire import protocol
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import CompiledBoard, model_of
-from contactfpga_sim.board.received import Receiver
-from contactfpga_sim.scenes.recordings import Recording
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.model.board.received import Receiver
+from contactfpga_sim.model.scenes.recordings import Recording
 
 CHUNK = 256
 """Frames that are simulated while those before are decoded."""

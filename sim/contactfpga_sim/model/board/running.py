@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from contactfpga.errors import BoardClosed
-from contactfpga_sim.board import native
+from contactfpga_sim.model.board import native
 
 EVENT = np.dtype([("cycle", "<u8"), ("data", "<u8"), ("mark", "<u8")])
 """An event: cycle (of a received byte: the first one after its stop bit); the row's cells, the record as on the

@@ -13,12 +13,12 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import initializer
-from contactfpga_sim.board.running import Running
-from contactfpga_sim.scenes.cells import to_words
-from contactfpga_sim.scenes.scene import Source
-from contactfpga_sim.scenes.scene import scene as make_scene
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import initializer
+from contactfpga_sim.model.board.running import Running
+from contactfpga_sim.model.scenes.cells import to_words
+from contactfpga_sim.model.scenes.scene import Source
+from contactfpga_sim.model.scenes.scene import scene as make_scene
 
 LOOK_S = 0.2e-3
 """Simulated time between two looks at the scenes and at the line."""
@@ -38,7 +38,7 @@ class CompiledSheets(Running):
         super().__init__(model or model_of(several), CAPTURED)
 
     def restart(self, mutant: int = 0) -> None:
-        """As :meth:`contactfpga_sim.board.compiled.CompiledBoard.restart`."""
+        """As :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.restart`."""
         self._call("restart", ctypes.c_uint(mutant))
 
     def press(self, number: int, cells: np.ndarray) -> None:
@@ -53,7 +53,7 @@ class CompiledSheets(Running):
 class VirtualSheets:
     """A board of several sheets in simulated time, which passes only in :meth:`read`.
 
-    several: the sheets; scenes: what touches each of them, as :func:`contactfpga_sim.scenes.scene.scene` takes it.
+    several: the sheets; scenes: what touches each of them, for :func:`contactfpga_sim.model.scenes.scene.scene`.
     """
 
     def __init__(self, several: Several, scenes: Sequence[Source]):

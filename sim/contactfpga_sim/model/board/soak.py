@@ -17,9 +17,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import contactfpga
-from contactfpga.console import interrupt, numbers
 from contactfpga.driver.driver import Board
-from contactfpga_sim.board.pty_board import PtyBoard
+from contactfpga.tools.console import interrupt, numbers
+from contactfpga_sim.model.board.pty_board import PtyBoard
 
 SKIN = contactfpga.Skin(clock_hz=3_000_000, baud=750_000, settle_us=25.0)
 """A clock that a busy machine holds."""

@@ -1,4 +1,4 @@
-"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.board.speed`.
+"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.model.board.speed`.
 
 A core of its own is assumed: processor time is counted, of the best of some runs. No figure that a test could hold.
 """
@@ -9,7 +9,7 @@ import sys
 import time
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board.virtual import VirtualBoard
+from contactfpga_sim.model.board.virtual import VirtualBoard
 
 SKINS = {
     "reference": Skin(),

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board.compiled import CompiledBoard, model_of
-from contactfpga_sim.board.native import Model
+from contactfpga_sim.model.board.compiled import CompiledBoard, model_of
+from contactfpga_sim.model.board.native import Model
 
 _WIRE = re.compile(r"^\t(?:/\*output\*/ )?wire<\d+> (\w+);", re.MULTILINE)
 _MEMORY = re.compile(r"^\tmemory<\d+> (\w+) \{ (\d+)u };", re.MULTILINE)

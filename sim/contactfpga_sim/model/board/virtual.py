@@ -8,19 +8,19 @@ from typing import Protocol
 import numpy as np
 
 from contactfpga.choices import converters
-from contactfpga.circuit import Circuit
-from contactfpga.cover import Cover
-from contactfpga.haptics import LoadCells
+from contactfpga.design.circuit import Circuit
+from contactfpga.design.cover import Cover
+from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.several import VirtualSheets
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.felt import Felt
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
-from contactfpga_sim.scenes.scene import scene as make_scene
-from contactfpga_sim.sheet.line import lines_of
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.several import VirtualSheets
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.felt import Felt
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.scene import CONTACTS, CellsAt, Scene, Source, contacts_of
+from contactfpga_sim.model.scenes.scene import scene as make_scene
+from contactfpga_sim.model.sheet.line import lines_of
 
 CHUNK_S = 0.2e-3
 """Simulated time between two looks at the scene and at the line."""
@@ -59,9 +59,9 @@ def _at_rest(skin: Skin) -> UnitSource:
 class VirtualBoard:
     """A board in simulated time, behind the interface of a serial port: time passes only in :meth:`read`.
 
-    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.scenes.scene.scene` takes, among it a
-    function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which its
-    contacts press, by default none; circuit: the sheet's, by which its lines take time to settle, by default none;
+    skin: the reference Skin by default; scene: whatever :func:`contactfpga_sim.model.scenes.scene.scene` takes, among
+    it a function of the simulated time in s that returns the pressed cells, (rows, columns) bool; cover: through which
+    its contacts press, by default none; circuit: the sheet's, by which its lines take time to settle, by default none;
     slow_rows, slow_columns: by line the factor by which it then takes longer; units: a function
     of the simulated time in s that returns what each pressure unit reads, by default half of full scale; or the
     LoadCells that the scene's contacts press on, if it has contacts; look_s: simulated time between two looks at the

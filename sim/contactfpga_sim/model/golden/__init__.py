@@ -4,11 +4,11 @@ It shares no code with the gateware or with the host's protocol, never imports A
 declared fields of a Skin.
 """
 
-from contactfpga_sim.golden.predict import beginnings, driven, predict
-from contactfpga_sim.golden.request import request, requests
-from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
-from contactfpga_sim.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
-from contactfpga_sim.golden.zones import zones
+from contactfpga_sim.model.golden.predict import beginnings, driven, predict
+from contactfpga_sim.model.golden.request import request, requests
+from contactfpga_sim.model.golden.trace import BOUNDARIES, Timeline, Trace, boundaries
+from contactfpga_sim.model.golden.volume import Departures, all_departures, last_record_clocks, row_clocks
+from contactfpga_sim.model.golden.zones import zones
 
 __all__ = [
     "BOUNDARIES",

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from contactfpga_sim.golden import debounce, seek
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.scan import Play, Scan, Scanned, ScanRule, last_number
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden import debounce, seek
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.request import Request
+from contactfpga_sim.model.golden.scan import Play, Scan, Scanned, ScanRule, last_number
+from contactfpga_sim.model.golden.trace import Timeline
 
 
 @dataclasses.dataclass(frozen=True)

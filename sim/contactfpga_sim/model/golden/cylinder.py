@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.zones import CORNERS, EDGES
+from contactfpga_sim.model.golden.zones import CORNERS, EDGES
 
 
 def flood(cells: np.ndarray, connectivity: int) -> tuple[np.ndarray, list[int]]:

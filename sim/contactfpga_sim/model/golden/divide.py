@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.frame import Queue, join
-from contactfpga_sim.golden.trace import Trace
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.frame import Queue, join
+from contactfpga_sim.model.golden.trace import Trace
 
 
 def barycenter(total: int, area: int, fraction_bits: int) -> int:

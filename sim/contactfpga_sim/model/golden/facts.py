@@ -19,7 +19,7 @@ from contactfpga.choices import scans
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin
-    from contactfpga_sim.golden.scan import ScanRule
+    from contactfpga_sim.model.golden.scan import ScanRule
 
 
 def exact(value: float) -> Fraction:

@@ -6,8 +6,8 @@ import bisect
 import math
 from collections.abc import Sequence
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.packet import Packet
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.packet import Packet
 
 KIND, SLOT = 9, 1
 

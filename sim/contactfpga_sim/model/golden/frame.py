@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.packet import Packet
-from contactfpga_sim.golden.scan import Scan
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.packet import Packet
+from contactfpga_sim.model.golden.scan import Scan
 
 ZONES, CELLS, BARYCENTERS = 5, 6, 7
 OVERFLOW, FAULT, MOTION = 1, 4, 8

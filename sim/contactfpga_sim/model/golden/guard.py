@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.trace import Timeline
 
 RETRY_US = 2**16
 """The first whole round of checks after the clock passes a multiple of this renews what is told."""

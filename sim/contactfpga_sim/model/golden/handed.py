@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.scan import Rows
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.scan import Rows
 
 
 class Handed:

@@ -7,9 +7,9 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.golden import guard
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden import guard
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.trace import Timeline
 
 LOOKS = 4
 """Of a window, each ``apart`` cycles after the one before or later."""

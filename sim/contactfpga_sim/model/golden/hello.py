@@ -8,10 +8,10 @@ import zlib
 from collections.abc import Sequence
 
 from contactfpga.choices import converters
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.packet import Packet
-from contactfpga_sim.golden.request import Heard
-from contactfpga_sim.golden.scan import Scan
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.packet import Packet
+from contactfpga_sim.model.golden.request import Heard
+from contactfpga_sim.model.golden.scan import Scan
 
 KIND = 4
 SHEET, STATE, PITCH, RADIUS, FINGERPRINT, RATES, NAME, COMMANDS, UNITS, PLACE, CHECK = *range(1, 11), 255

@@ -11,9 +11,9 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.golden import cylinder, label_serial, volume
-from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
-from contactfpga_sim.golden.zones import flood, moments
+from contactfpga_sim.model.golden import cylinder, label_serial, volume
+from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
+from contactfpga_sim.model.golden.zones import flood, moments
 
 StripClocks = Callable[[np.ndarray, int], tuple[np.ndarray, int, int]]
 

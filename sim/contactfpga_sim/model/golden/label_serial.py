@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.zones import flood
+from contactfpga_sim.model.golden.zones import flood
 
 
 def cluster_clocks(strip: np.ndarray, connectivity: int) -> tuple[np.ndarray, int, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden.work import Departure, LabellerRule, Labelling
+from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
 
 
 def projection(cells: np.ndarray, connectivity: int = 8) -> Labelling:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.faults import Reports, Told, report, slot
-from contactfpga_sim.golden.hello import DIGITS, State, hello
-from contactfpga_sim.golden.turns import Line
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.faults import Reports, Told, report, slot
+from contactfpga_sim.model.golden.hello import DIGITS, State, hello
+from contactfpga_sim.model.golden.turns import Line
 
 
 class Link:

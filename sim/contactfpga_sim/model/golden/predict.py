@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactfpga_sim.golden import divide, label, request, safe, scan, uart, units
-from contactfpga_sim.golden.facts import Facts, facts
-from contactfpga_sim.golden.faults import Told
-from contactfpga_sim.golden.frame import Items, Packer, Queue, join
-from contactfpga_sim.golden.hello import State
-from contactfpga_sim.golden.link import Link
-from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.golden.turns import Line
-from contactfpga_sim.golden.work import Departure
+from contactfpga_sim.model.golden import divide, label, request, safe, scan, uart, units
+from contactfpga_sim.model.golden.facts import Facts, facts
+from contactfpga_sim.model.golden.faults import Told
+from contactfpga_sim.model.golden.frame import Items, Packer, Queue, join
+from contactfpga_sim.model.golden.hello import State
+from contactfpga_sim.model.golden.link import Link
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.model.golden.turns import Line
+from contactfpga_sim.model.golden.work import Departure
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

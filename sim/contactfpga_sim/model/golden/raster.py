@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from contactfpga_sim.golden import guard
-from contactfpga_sim.golden.debounce import debounced
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.guard import Told, closed, stuck
-from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.scan import Changes, Play, Scan, Scanned, ScanRule, early_clocks, last_number
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden import guard
+from contactfpga_sim.model.golden.debounce import debounced
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.guard import Told, closed, stuck
+from contactfpga_sim.model.golden.request import Request
+from contactfpga_sim.model.golden.scan import Changes, Play, Scan, Scanned, ScanRule, early_clocks, last_number
+from contactfpga_sim.model.golden.trace import Timeline
 
 
 class Raster(ScanRule):

@@ -7,8 +7,8 @@ import bisect
 import dataclasses
 from collections.abc import Iterable
 
-from contactfpga_sim.golden import uart
-from contactfpga_sim.golden.packet import Packet, check
+from contactfpga_sim.model.golden import uart
+from contactfpga_sim.model.golden.packet import Packet, check
 
 KIND, COMMAND_KIND = 5, 10
 _CHECK_BYTES = 3

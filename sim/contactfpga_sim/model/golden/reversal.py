@@ -6,15 +6,15 @@ import dataclasses
 
 import numpy as np
 
-from contactfpga_sim.golden import debounce, reversal_guard
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.guard import closed, stuck
-from contactfpga_sim.golden.handed import Handed
-from contactfpga_sim.golden.held import Held
-from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.reversal_guard import Checks
-from contactfpga_sim.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
-from contactfpga_sim.golden.self_test import SelfTest
+from contactfpga_sim.model.golden import debounce, reversal_guard
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.guard import closed, stuck
+from contactfpga_sim.model.golden.handed import Handed
+from contactfpga_sim.model.golden.held import Held
+from contactfpga_sim.model.golden.request import Request
+from contactfpga_sim.model.golden.reversal_guard import Checks
+from contactfpga_sim.model.golden.scan import Changes, Play, Rows, Scan, Scanned, ScanRule, early_clocks, last_number
+from contactfpga_sim.model.golden.self_test import SelfTest
 
 
 @dataclasses.dataclass(frozen=True)

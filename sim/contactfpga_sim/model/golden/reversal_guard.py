@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga_sim.golden import guard
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.guard import Told, closed, stuck
-from contactfpga_sim.golden.held import Held
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden import guard
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.guard import Told, closed, stuck
+from contactfpga_sim.model.golden.held import Held
+from contactfpga_sim.model.golden.trace import Timeline
 
 CHECK_US = 2**8
 """A sheet at rest is checked when the clock passes a multiple of this."""

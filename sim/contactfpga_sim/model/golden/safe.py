@@ -5,8 +5,8 @@ from __future__ import annotations
 import bisect
 from collections.abc import Iterable, Sequence
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.scan import Changes, Scan
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.scan import Changes, Scan
 
 TICK_US = 1000
 

@@ -10,9 +10,9 @@ from typing import Protocol
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.request import Request
+from contactfpga_sim.model.golden.trace import Timeline
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Scan:
     alone: frozenset[int]
     """Rows that were driven alone."""
     faults: int = 0
-    """What was told of faulty lines when it ended, as :attr:`contactfpga_sim.golden.guard.Told.word` has it."""
+    """What was told of faulty lines when it ended, as :attr:`contactfpga_sim.model.golden.guard.Told.word` has it."""
 
     motion: bool = False
     """A row read touched as the frame began, and empty when it was driven."""

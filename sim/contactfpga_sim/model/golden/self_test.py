@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.guard import closed, stuck
-from contactfpga_sim.golden.request import Request
-from contactfpga_sim.golden.scan import Stages
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.guard import closed, stuck
+from contactfpga_sim.model.golden.request import Request
+from contactfpga_sim.model.golden.scan import Stages
+from contactfpga_sim.model.golden.trace import Timeline
 
 COMMAND = 1
 

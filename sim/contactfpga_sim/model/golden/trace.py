@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactfpga_sim.golden.facts import facts
+from contactfpga_sim.model.golden.facts import facts
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

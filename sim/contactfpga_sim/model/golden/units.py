@@ -9,13 +9,13 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 from contactfpga.choices import converters
-from contactfpga_sim.golden.facts import Facts
-from contactfpga_sim.golden.packet import Packet
-from contactfpga_sim.golden.request import Request
+from contactfpga_sim.model.golden.facts import Facts
+from contactfpga_sim.model.golden.packet import Packet
+from contactfpga_sim.model.golden.request import Request
 
 if TYPE_CHECKING:
-    from contactfpga_sim.golden.scan import Changes
-    from contactfpga_sim.golden.trace import Timeline
+    from contactfpga_sim.model.golden.scan import Changes
+    from contactfpga_sim.model.golden.trace import Timeline
 
 KIND, OVER, ARMED = 8, 1, 2
 SET_ZERO, SET_THRESHOLD, SET_SUM_THRESHOLD = 3, 4, 5

@@ -11,8 +11,8 @@ import numpy as np
 
 from contactfpga.choices import labellers
 from contactfpga.choices.labellers import Labeller, LabellerName
-from contactfpga_sim.golden import cylinder_volume
-from contactfpga_sim.golden.work import LabellerRule
+from contactfpga_sim.model.golden import cylinder_volume
+from contactfpga_sim.model.golden.work import LabellerRule
 
 _AT_ONCE = 1 << 21  # cells worked at a time: bounds the memory
 
@@ -29,7 +29,7 @@ class Departures:
     """(n,) int64: in which clock after the one in which that row was handed over it leaves."""
     moments: np.ndarray
     """(n, 3) int64: area, sum x, sum y in cells. Within a frame in the order the zones leave. Where the sheet's ends
-    meet (n, 4), with :func:`contactfpga_sim.golden.cylinder.turned`."""
+    meet (n, 4), with :func:`contactfpga_sim.model.golden.cylinder.turned`."""
 
     def sorted_moments(self) -> np.ndarray:
         """The moments, sorted by area, sum x, sum y within each frame instead."""
@@ -163,7 +163,7 @@ def _strips(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarr
 
 
 def run_clocks(frames: np.ndarray, connectivity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of ``run``, for every row of (N, R, C) bool frames: :attr:`contactfpga_sim.golden.work.LabellerRule.strips`."""
+    """``LabellerRule.strips`` of ``run``, for every row of (N, R, C) bool frames."""
     last_step, steps = _strips(frames, connectivity)
     return last_step + 2, steps + 1, steps + 3
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactfpga.cover import Ball, Ellipse, Load, Part, Rectangle
+from contactfpga.design.cover import Ball, Ellipse, Load, Part, Rectangle
 
 Value = float | Callable[[float], float]
 """A number, or a function of the time in s."""

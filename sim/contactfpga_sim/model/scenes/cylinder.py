@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from contactfpga.cover import Load, Part
-from contactfpga_sim.scenes.truth import TOUCH_M, Box, Truth, distance_m, in_order, lies_in, measured, widths
+from contactfpga.design.cover import Load, Part
+from contactfpga_sim.model.scenes.truth import TOUCH_M, Box, Truth, distance_m, in_order, lies_in, measured, widths
 
 
 def all_loads(loads: Sequence[Load], left_m: float, around_m: float) -> list[Load]:

@@ -14,8 +14,8 @@ from contactfpga import picture_style as style
 from contactfpga.skin import Skin
 from contactfpga.wire.protocol import Frame
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.golden import cylinder
-from contactfpga_sim.golden.zones import flood
+from contactfpga_sim.model.golden import cylinder
+from contactfpga_sim.model.golden.zones import flood
 
 COLORS = style.PALETTE[:6]
 """Of the zones: those that show on dark terminals, too."""

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.contacts import Contact, M, Shape, Swing
-from contactfpga_sim.scenes.scene import Scene, sheet
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Swing
+from contactfpga_sim.model.scenes.scene import Scene, sheet
 
 FINGER_MM = 6.0
 """Radius of the fingers of a pair."""

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactfpga.choices import converters
-from contactfpga.haptics import Cylinder, LoadCells
-from contactfpga.haptics.answer import Floats
+from contactfpga.robot.haptics import Cylinder, LoadCells
+from contactfpga.robot.haptics.answer import Floats
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.contacts import Contact, at
-from contactfpga_sim.scenes.scene import Scene
+from contactfpga_sim.model.scenes.contacts import Contact, at
+from contactfpga_sim.model.scenes.scene import Scene
 
 
 class Felt:

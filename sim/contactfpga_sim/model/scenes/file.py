@@ -15,8 +15,8 @@ import numpy as np
 
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga_sim.scenes import contacts
-from contactfpga_sim.scenes.contacts import Shape, Track
+from contactfpga_sim.model.scenes import contacts
+from contactfpga_sim.model.scenes.contacts import Shape, Track
 
 MAX_MM = 100_000.0
 MAX_NUMBER = 64

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes.contacts import Contact, M, Shape, Track, Value
-from contactfpga_sim.scenes.cylinder import on_all_turns
-from contactfpga_sim.scenes.families import TRIES, Random, place
-from contactfpga_sim.scenes.file import Kind, Range, SceneFile, SceneFileError
-from contactfpga_sim.scenes.scene import Scene, around_m, sheet
-from contactfpga_sim.scenes.truth import Box, widths
+from contactfpga_sim.model.scenes.contacts import Contact, M, Shape, Track, Value
+from contactfpga_sim.model.scenes.cylinder import on_all_turns
+from contactfpga_sim.model.scenes.families import TRIES, Random, place
+from contactfpga_sim.model.scenes.file import Kind, Range, SceneFile, SceneFileError
+from contactfpga_sim.model.scenes.scene import Scene, around_m, sheet
+from contactfpga_sim.model.scenes.truth import Box, widths
 
 DIRECTIONS = 128
 """In which the distance of two shapes is looked for; it comes out short by at most 0.03 % of their size."""

@@ -12,7 +12,7 @@ import numpy as np
 from contactfpga.inputs import array_file
 from contactfpga.skin import Skin
 from contactfpga.skin.limits import MAX_LINES, MAX_PITCH_MM, MIN_PITCH_MM
-from contactfpga_sim.scenes import cells
+from contactfpga_sim.model.scenes import cells
 
 DEFAULT_HZ = 100.0
 """Rate at which a recording is played that does not come with one."""

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.cover import Cover, Load
+from contactfpga.design.cover import Cover, Load
 from contactfpga.skin import Skin
-from contactfpga_sim.scenes import cells, contacts
-from contactfpga_sim.scenes.contacts import Contact, Round, Swing
-from contactfpga_sim.scenes.cylinder import all_loads, truth_around
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.shapes import SHAPES
-from contactfpga_sim.scenes.truth import Box, Truth, truth_of
+from contactfpga_sim.model.scenes import cells, contacts
+from contactfpga_sim.model.scenes.contacts import Contact, Round, Swing
+from contactfpga_sim.model.scenes.cylinder import all_loads, truth_around
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.shapes import SHAPES
+from contactfpga_sim.model.scenes.truth import Box, Truth, truth_of
 
 CellsAt = Callable[[float], np.ndarray]
 """Time in s to the (rows, columns) bool cells that are pressed then."""
@@ -181,7 +181,7 @@ def scene(skin: Skin, source: Source = None, cover: Cover | None = None) -> Cell
 
     ``source``: one of :data:`NAMES` (none given: fingertip); a Scene; a Recording, or a .npy or .npz file of one, or
     an array (rows, columns) or (frames, rows, columns), played in a loop
-    (:mod:`contactfpga_sim.scenes.recordings`); or a function of time. ``cover``: through which contacts
+    (:mod:`contactfpga_sim.model.scenes.recordings`); or a function of time. ``cover``: through which contacts
     press; recordings and functions give cells. Raises ValueError for anything else.
     """
     if source is None:

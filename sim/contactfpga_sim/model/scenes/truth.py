@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.cover import Part
+from contactfpga.design.cover import Part
 
 TOUCH_M = 1e-9
 """Parts that are no farther apart count as one contact, so that rounding does not part two that touch."""

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from contactfpga.circuit import patterns, phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels, Phase
-from contactfpga.circuit.values import SCHOTTKY, SILICON, Circuit
-from contactfpga_sim.sheet import spice
+from contactfpga.design.circuit import patterns, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels, Phase
+from contactfpga.design.circuit.values import SCHOTTKY, SILICON, Circuit
+from contactfpga_sim.model.sheet import spice
 
 SIZES = ((8, 8), (16, 16), (8, 24), (32, 32), (40, 16), (64, 64))
 PHASES: dict[str, tuple[Callable[[Network, Levels], Phase], tuple[str, ...]]] = {

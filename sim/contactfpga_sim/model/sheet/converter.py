@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.choices import converters
 from contactfpga.errors import SkinError
-from contactfpga_sim.sheet.ads131m08 import Ads131m08
+from contactfpga_sim.model.sheet.ads131m08 import Ads131m08
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

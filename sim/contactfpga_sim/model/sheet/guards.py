@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Cuts(NamedTuple):
-    """As :meth:`contactfpga_sim.board.compiled.CompiledBoard.cut` takes them."""
+    """As :meth:`contactfpga_sim.model.board.compiled.CompiledBoard.cut` takes them."""
 
     rows: dict[int, int]
     columns: dict[int, int]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.circuit import Circuit, phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels
+from contactfpga.design.circuit import Circuit, phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
 
 
 def at_rest(circuit: Circuit, cells: np.ndarray, bare: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

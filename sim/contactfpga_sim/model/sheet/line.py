@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from contactfpga.circuit import phases
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Levels
-from contactfpga.circuit.values import Circuit
+from contactfpga.design.circuit import phases
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Levels
+from contactfpga.design.circuit.values import Circuit
 from contactfpga.skin import Skin
 
 

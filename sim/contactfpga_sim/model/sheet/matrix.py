@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.sheet.shorts import Lines, Shorts, bits, followers
+from contactfpga_sim.model.sheet.shorts import Lines, Shorts, bits, followers
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from contactfpga_sim.sheet.matrix import Matrix
+from contactfpga_sim.model.sheet.matrix import Matrix
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

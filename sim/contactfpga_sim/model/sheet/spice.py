@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.circuit.network import Network
-from contactfpga.circuit.phases import Phase
+from contactfpga.design.circuit.network import Network
+from contactfpga.design.circuit.phases import Phase
 from contactfpga.errors import MissingTool
 
 EDGE_S = 1e-12

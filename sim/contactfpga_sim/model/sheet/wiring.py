@@ -1,7 +1,7 @@
 """What a faulty sheet reads: which lines pressed switches join, where diodes, wires and switches have faults.
 
-Levels, currents and times are :mod:`contactfpga.circuit`'s; this is what they come to where switches and pins have no
-resistance beside the pulls.
+Levels, currents and times are :mod:`contactfpga.design.circuit`'s; this is what they come to where switches and pins
+have no resistance beside the pulls.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ from amaranth.hdl import Cat, Const
 from amaranth.sim import Simulator
 
 from contactfpga_hdl.top import Top
-from contactfpga_sim.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
-from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

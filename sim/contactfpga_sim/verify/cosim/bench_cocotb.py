@@ -13,8 +13,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from contactfpga_sim.cosim.record import OutOfTime
-from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.verify.cosim.record import OutOfTime
 
 if TYPE_CHECKING:
     from amaranth.lib import wiring
@@ -62,7 +62,7 @@ def _supervise(job: Path, limit_s: float) -> None:
     log = job.with_name("log")
     with log.open("w") as output:
         process = subprocess.Popen(
-            [sys.executable, "-m", "contactfpga_sim.cosim.bench_cocotb"],
+            [sys.executable, "-m", "contactfpga_sim.verify.cosim.bench_cocotb"],
             env=environment,
             cwd=job.parent,
             stdout=output,
@@ -112,7 +112,7 @@ def _build_and_simulate(job: Path) -> None:
     )
     runner.test(
         hdl_toplevel="contactfpga_top",
-        test_module="contactfpga_sim.cosim.inside_cocotb",
+        test_module="contactfpga_sim.verify.cosim.inside_cocotb",
         build_dir=job.with_name("build"),
         test_dir=job.parent,
     )

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.golden.trace import BOUNDARIES, Timeline, Trace
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.golden.trace import BOUNDARIES, Timeline, Trace
 
 
 def run(skin: Skin, timeline: Timeline, cycles: int, model: native.Model | None = None) -> Trace:

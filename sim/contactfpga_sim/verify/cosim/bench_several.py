@@ -11,8 +11,8 @@ from amaranth.sim import Simulator
 
 from contactfpga.skin.several import Several
 from contactfpga_hdl.several import SeveralTop
-from contactfpga_sim.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
-from contactfpga_sim.golden.trace import Timeline, Trace
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, OutOfTime, Stimulus, TraceRecorder, ports
 
 _SHARED = ("tx", "rx", "contact")
 

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contactfpga_hdl.board.synthesis import NO_COLLISIONS
-from contactfpga_sim.board import native
-from contactfpga_sim.cosim.bench_cocotb import SimulatorFailed
-from contactfpga_sim.cosim.record import OutOfTime, Stimulus
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.sheet.matrix import Contention, Matrix
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.model.sheet.matrix import Contention, Matrix
+from contactfpga_sim.verify.cosim.bench_cocotb import SimulatorFailed
+from contactfpga_sim.verify.cosim.record import OutOfTime, Stimulus
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

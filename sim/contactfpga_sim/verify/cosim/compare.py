@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from contactfpga_sim.golden.trace import BOUNDARIES, Trace
+from contactfpga_sim.model.golden.trace import BOUNDARIES, Trace
 
 Event = tuple[Any, ...]
 

@@ -17,9 +17,9 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.limits import MIN_AROUND
 from contactfpga.skin.sheet import max_zones
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import KIND, command, request
-from contactfpga_sim.golden.trace import Timeline
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import KIND, command, request
+from contactfpga_sim.model.golden.trace import Timeline
 
 Pair = tuple[int, int, int, int]
 """Two choices, each with one of its values, as indices."""

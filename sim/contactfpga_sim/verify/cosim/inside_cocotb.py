@@ -12,7 +12,7 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import FallingEdge, Timer
 
-from contactfpga_sim.cosim.record import LEVELS, PAYLOADS, Stimulus, TraceRecorder, ports
+from contactfpga_sim.verify.cosim.record import LEVELS, PAYLOADS, Stimulus, TraceRecorder, ports
 
 
 @cocotb.test()

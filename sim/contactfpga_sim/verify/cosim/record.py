@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.trace import Timeline, Trace
-from contactfpga_sim.sheet import converter
-from contactfpga_sim.sheet.shift import Sheet
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.trace import Timeline, Trace
+from contactfpga_sim.model.sheet import converter
+from contactfpga_sim.model.sheet.shift import Sheet
 
 if TYPE_CHECKING:
     from contactfpga.skin import Skin

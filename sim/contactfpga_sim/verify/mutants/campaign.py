@@ -16,14 +16,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from contactfpga.console import interrupt, numbers
 from contactfpga.skin.several import Several
-from contactfpga_sim.mutants import netlist, proof, sheets, stimuli, trial
-from contactfpga_sim.mutants.netlist import STAGES, Design, Mutant
-from contactfpga_sim.mutants.skins import OPTIONS, SEVERAL, SKINS
-from contactfpga_sim.mutants.stimuli import Stimulus
-from contactfpga_sim.pages import writer
-from contactfpga_sim.studies import kept
+from contactfpga.tools.console import interrupt, numbers
+from contactfpga_sim.lab import kept
+from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.verify.mutants import netlist, proof, sheets, stimuli, trial
+from contactfpga_sim.verify.mutants.netlist import STAGES, Design, Mutant
+from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS
+from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 BATCH = 500
 """Mutants in one board: with more of them it runs slower."""
@@ -71,7 +71,7 @@ def examine(
 ) -> list[Result]:
     """The fates of ``count`` mutants of what is :func:`chosen`; ``long_s`` are the seconds of a longer proof.
 
-    Raises :class:`contactfpga_sim.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
+    Raises :class:`contactfpga_sim.verify.mutants.proof.ProofFailed` when a mutant that was killed is proved equivalent.
     """
     design, stages = chosen(name)
     given = sheets if isinstance(design, Several) else stimuli
@@ -178,7 +178,7 @@ def _kept(name: str, each: int, seed: int, long_s: int, say: Callable[[str], Non
     """As :func:`examine`, or what it found before with the same code."""
     design = chosen(name)[0]
     skins = design.skins if isinstance(design, Several) else (design,)
-    code = kept.made_by("contactfpga_sim.mutants.campaign", *skins)  # this module, which may have been run
+    code = kept.made_by("contactfpga_sim.verify.mutants.campaign", *skins)  # this module, which may have been run
     key = f"{name}, {each} of {seed}, {long_s} s, {code}"
     found = kept.kept(
         "mutants", key, lambda: [dataclasses.asdict(one) for one in examine(name, each, seed, long_s, say)]

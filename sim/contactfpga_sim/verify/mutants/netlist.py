@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga_sim.board import compiled, native, several
+from contactfpga_sim.model.board import compiled, native, several
 
 Design = Skin | Several
 

@@ -10,10 +10,10 @@ import numpy as np
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SELF_TEST, Derived
 from contactfpga.skin.units import NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import command
-from contactfpga_sim.golden.trace import Cuts, Timeline
-from contactfpga_sim.sheet.shorts import Shorts
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import command
+from contactfpga_sim.model.golden.trace import Cuts, Timeline
+from contactfpga_sim.model.sheet.shorts import Shorts
 
 
 def least_cycles(skin: Skin) -> int:

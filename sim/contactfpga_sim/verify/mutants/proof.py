@@ -20,10 +20,10 @@ from pathlib import Path
 from types import TracebackType
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga_sim.board import native
-from contactfpga_sim.mutants import aig
-from contactfpga_sim.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
-from contactfpga_sim.mutants.solve import reached
+from contactfpga_sim.model.board import native
+from contactfpga_sim.verify.mutants import aig
+from contactfpga_sim.verify.mutants.netlist import PREPARE, STAGES, Design, Mutant, in_sheet, module_of, plain, switches
+from contactfpga_sim.verify.mutants.solve import reached
 
 QUICK_S, LONG_S = 4, 45
 """How long may be asked with the same registers cut."""

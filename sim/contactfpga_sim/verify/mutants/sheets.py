@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from contactfpga.skin.several import Several
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.request import request
-from contactfpga_sim.golden.trace import Timeline
-from contactfpga_sim.mutants.stimuli import Stimulus
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.request import request
+from contactfpga_sim.model.golden.trace import Timeline
+from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 
 def quick(several: Several) -> Iterator[Stimulus]:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from contactfpga_sim.mutants import aig
+from contactfpga_sim.verify.mutants import aig
 
 # Yosys calls ABC only for a netlist with a gate, and wants one back.
 _SOME_GATE = """

@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from contactfpga.skin import Skin
-from contactfpga_sim.cosim import covering
-from contactfpga_sim.golden import uart
-from contactfpga_sim.golden.facts import facts
-from contactfpga_sim.golden.hello import hello
-from contactfpga_sim.golden.request import requests
-from contactfpga_sim.golden.trace import Timeline
-from contactfpga_sim.mutants import options
-from contactfpga_sim.scenes import shapes
-from contactfpga_sim.sheet.shorts import Shorts
+from contactfpga_sim.model.golden import uart
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.golden.hello import hello
+from contactfpga_sim.model.golden.request import requests
+from contactfpga_sim.model.golden.trace import Timeline
+from contactfpga_sim.model.scenes import shapes
+from contactfpga_sim.model.sheet.shorts import Shorts
+from contactfpga_sim.verify.cosim import covering
+from contactfpga_sim.verify.mutants import options
 
 _TIME_WRAPS_US = 1 << 24
 _AT_REST = 400_000

@@ -7,16 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from contactfpga.skin.several import Several
-from contactfpga_sim import golden
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import CompiledBoard
-from contactfpga_sim.board.several import CompiledSheets
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import compare
-from contactfpga_sim.golden.predict import predict_several
-from contactfpga_sim.mutants.netlist import Design
-from contactfpga_sim.mutants.stimuli import Stimulus
-from contactfpga_sim.sheet.matrix import Contention
+from contactfpga_sim.model import golden
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.several import CompiledSheets
+from contactfpga_sim.model.golden.predict import predict_several
+from contactfpga_sim.model.sheet.matrix import Contention
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import compare
+from contactfpga_sim.verify.mutants.netlist import Design
+from contactfpga_sim.verify.mutants.stimuli import Stimulus
 
 OBSERVED = (*golden.BOUNDARIES, "driven", "charged")
 """Where a mutant can be told from the gateware as it should be."""
@@ -43,7 +43,7 @@ def expected(board: CompiledBoard | CompiledSheets, stimulus: Stimulus) -> Event
     """What the board without a mutant does, after it was compared with the golden model in every clock, unless lines
     are joined.
 
-    Raises :class:`contactfpga_sim.cosim.compare.Mismatch` where they differ.
+    Raises :class:`contactfpga_sim.verify.cosim.compare.Mismatch` where they differ.
     """
     board.restart()
     _play(board, stimulus, stimulus.cycles)

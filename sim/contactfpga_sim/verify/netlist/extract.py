@@ -16,9 +16,9 @@ from contactfpga.skin import Skin, SkinError
 from contactfpga_hdl.board import build, synthesis, tools
 from contactfpga_hdl.board.board_top import platform_for
 from contactfpga_hdl.scan.pins import column_pins, row_pins
-from contactfpga_sim.board import native
-from contactfpga_sim.board.native import Netlist
-from contactfpga_sim.netlist import both_ways, ecp5_cells
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.native import Netlist
+from contactfpga_sim.verify.netlist import both_ways, ecp5_cells
 
 
 class WrongBitstream(ContactFPGAError):

@@ -18,20 +18,20 @@ import numpy as np
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import BoardSpec
-from contactfpga.console import interrupt, numbers
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt, numbers
 from contactfpga_hdl.board import build
-from contactfpga_sim.board import native
-from contactfpga_sim.board.compiled import model_of
-from contactfpga_sim.board.replay import skin_for
-from contactfpga_sim.cosim import bench_native
-from contactfpga_sim.cosim.compare import Mismatch, compare
-from contactfpga_sim.golden import Timeline, predict, requests
-from contactfpga_sim.netlist import extract
-from contactfpga_sim.scenes.recordings import Recording
-from contactfpga_sim.scenes.shapes import variants
+from contactfpga_sim.model.board import native
+from contactfpga_sim.model.board.compiled import model_of
+from contactfpga_sim.model.board.replay import skin_for
+from contactfpga_sim.model.golden import Timeline, predict, requests
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.shapes import variants
+from contactfpga_sim.verify.cosim import bench_native
+from contactfpga_sim.verify.cosim.compare import Mismatch, compare
+from contactfpga_sim.verify.netlist import extract
 
 FOLDER = Path("build/replay")
 

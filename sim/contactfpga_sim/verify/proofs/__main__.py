@@ -1,11 +1,11 @@
-"""All proofs with their planted bugs, as a table: ``make formal``, or ``python -m contactfpga_sim.proofs [words]``."""
+"""All proofs with their planted bugs, as a table: ``make formal``."""
 
 import argparse
 import sys
 import time
 
-from contactfpga.console import interrupt
-from contactfpga_sim.proofs import (
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.verify.proofs import (
     adaptive,
     divide,
     dual,
@@ -35,7 +35,7 @@ from contactfpga_sim.proofs import (
     units,
     upset,
 )
-from contactfpga_sim.proofs.case import Case
+from contactfpga_sim.verify.proofs.case import Case
 
 CASES: tuple[Case, ...] = (
     *scan.CASES,
@@ -72,7 +72,7 @@ _WIDTHS = (34, 32, 16, 8, 16, 10)
 
 def main(arguments: list[str] | None = None) -> int:
     """Run them and print a line each; returns 1 if one does not hold or does not find its bugs."""
-    parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.proofs", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m contactfpga_sim.verify.proofs", description=__doc__)
     parser.add_argument("words", nargs="*", help="only proofs whose claim or size holds one of these")
     parser.add_argument("--quick", action="store_true", help="leave out what takes more than a minute")
     options = parser.parse_args(arguments)

@@ -5,11 +5,11 @@ from amaranth.hdl import Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.util.popcount import popcount
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.seek import PICK, SEARCH, START, WAIT
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.seek import PICK, SEARCH, START, WAIT
 
 ROWS = 2
 ALL = (1 << ROWS) - 1

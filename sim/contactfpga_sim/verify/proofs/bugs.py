@@ -11,7 +11,7 @@ from amaranth.hdl import Fragment, Signal, Value
 from amaranth.hdl._ast import Part
 from amaranth.hdl._xfrm import StatementTransformer, ValueTransformer
 
-from contactfpga_sim.proofs.inside import Inside, fields_of, fragments
+from contactfpga_sim.verify.proofs.inside import Inside, fields_of, fragments
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,9 +3,9 @@
 import dataclasses
 from collections.abc import Callable
 
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.solve import Verdict, prove, search
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.solve import Verdict, prove, search
 
 
 @dataclasses.dataclass(frozen=True)

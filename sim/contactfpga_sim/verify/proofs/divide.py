@@ -7,11 +7,11 @@ from amaranth.hdl import Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga_hdl.payloads import barycenter_layout, moments_layout
 from contactfpga_hdl.report.divide import Divider
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.streams import drain, feed
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.streams import drain, feed
 
 
 def zones_are_divided(proof: Proof, rows: int, columns: int, bits: int) -> None:

@@ -9,9 +9,9 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.dual import PAUSE_BITS, Dual
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 class _Core(wiring.Component):

@@ -7,9 +7,9 @@ from amaranth.hdl import Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.link.link import Link
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def first_is_sent(proof: Proof, **changes: Any) -> None:

@@ -11,10 +11,10 @@ from contactfpga_hdl.label.steps import place_of, waiting
 from contactfpga_hdl.label.sum import Sum
 from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.util.stack import Stack
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def skin_of(rows: int, columns: int, connectivity: int, closed: bool = False) -> Skin:

@@ -8,13 +8,13 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.label.serial import SerialLabeller
 from contactfpga_hdl.label.steps import nesting, place_of
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.label import rows_into, skin_of
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.turned import TurnedRow, empty_row, next_row, turned_rows_agree, turns_are_known
-from contactfpga_sim.proofs.zones import OpenRow, open_rows_agree
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.label import rows_into, skin_of
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.turned import TurnedRow, empty_row, next_row, turned_rows_agree, turns_are_known
+from contactfpga_sim.verify.proofs.zones import OpenRow, open_rows_agree
 
 
 def _skin(rows: int, columns: int, connectivity: int, closed: bool) -> Skin:

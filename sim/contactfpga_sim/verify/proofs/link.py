@@ -12,11 +12,11 @@ from contactfpga.wire import protocol
 from contactfpga_hdl.link.link import HELLO_REGION, Link, hello_words, offset_bits, stored_hello
 from contactfpga_hdl.link.odometer import LIVE_DIGITS
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.streams import drain, feed
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.streams import drain, feed
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
 _STATES = ("IDLE", "FETCH", "BYTE", "TAIL")

@@ -6,9 +6,9 @@ from amaranth.hdl import Cat, Const, Signal
 
 from contactfpga.wire.protocol import DIGIT_BITS, EPOCH_DIGITS, SENT_DIGITS
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 _REST, _READ, _WRITE, _CLEAR = range(4)
 

@@ -6,9 +6,9 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.units.ads131m08 import BITS, CLOCKS, LEVELS, Ads131m08
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 _SLOW = Skin(units=2, converter="ads131m08", clock_hz=1_000_000, baud=250_000, settle_us=100)
 _FAST = Skin(units=3, converter="ads131m08", clock_hz=48_000_000, baud=12_000_000)

@@ -10,11 +10,11 @@ from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.precharge import LOOKS, RETRY_BIT, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.settled import at_settle_time
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.settled import at_settle_time
 
 Diodes = Literal["col2row", "row2col"]
 _RETRY = 1 << RETRY_BIT

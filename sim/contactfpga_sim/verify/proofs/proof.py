@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Assert, Assume, ClockDomain, Fragment, Module, Signal, Value
 
-from contactfpga_sim.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.inside import Inside
 
 
 class Proof:

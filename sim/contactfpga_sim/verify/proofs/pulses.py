@@ -5,9 +5,9 @@ from functools import partial
 from amaranth.hdl import Cat, Mux, Signal
 
 from contactfpga_hdl.link.pulses import PulseReceiver
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def read_by_length(proof: Proof, bit_clocks: int) -> None:

@@ -11,12 +11,12 @@ from contactfpga_hdl.label.steps import place_of
 from contactfpga_hdl.label.unwrap import Unwrap
 from contactfpga_hdl.label.walk import Walk
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.label import mask_of_first_cluster, rows_into, skin_of
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.turned import (
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.label import mask_of_first_cluster, rows_into, skin_of
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.turned import (
     TurnedRow,
     empty_row,
     flood_around,
@@ -24,7 +24,7 @@ from contactfpga_sim.proofs.turned import (
     turned_rows_agree,
     turns_are_known,
 )
-from contactfpga_sim.proofs.zones import OpenRow, RowStep, flood_fill, open_rows_agree
+from contactfpga_sim.verify.proofs.zones import OpenRow, RowStep, flood_fill, open_rows_agree
 
 
 def records_are_the_zones(proof: Proof, columns: int, connectivity: int, rows: int = 4, closed: bool = False) -> None:

@@ -10,11 +10,11 @@ from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.precharge import apart
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.settled import at_settle_time
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.precharge import apart
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.settled import at_settle_time
 
 LISTEN, CHARGE, GAP, SELECT = range(4)  # in the order in which the source names them
 SHORT: dict[str, Any] = {"settle_us": 1, "release_us": 1, "precharge_us": 1, "project_us": 1}

@@ -8,11 +8,11 @@ from amaranth.hdl import Const, Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.stuck import present
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
-from contactfpga_sim.proofs.streams import offers_stay
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.reversal import GAP, LISTEN, SELECT, Sheet, pin_lemmas, skin_of, synchronizer_lemmas
+from contactfpga_sim.verify.proofs.streams import offers_stay
 
 Say = Callable[[Value], None]
 

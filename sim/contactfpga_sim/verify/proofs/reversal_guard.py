@@ -6,11 +6,11 @@ from typing import Any
 from amaranth.hdl import Const, Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.precharge import apart
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.precharge import apart
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
 
 LISTEN, ANSWER, GAP, CHARGE, SELECT = range(5)  # in the order in which the source names them with guard lines
 

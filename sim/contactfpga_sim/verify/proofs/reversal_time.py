@@ -7,13 +7,13 @@ from amaranth.hdl import Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.util.popcount import popcount
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of
-from contactfpga_sim.proofs.reversal_frames import Frames, keep_frames
-from contactfpga_sim.proofs.reversal_reach import Report, Switch, closed_lemmas
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.reversal import CHARGE, GAP, LISTEN, LONG, SELECT, SHORT, Sheet, skin_of
+from contactfpga_sim.verify.proofs.reversal_frames import Frames, keep_frames
+from contactfpga_sim.verify.proofs.reversal_reach import Report, Switch, closed_lemmas
 
 PACKED = 6
 """Clocks from when a frame's last row is taken until it is packed, at most."""

@@ -7,10 +7,10 @@ from amaranth.hdl import Const, Mux, Signal
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.util.popcount import popcount
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
 
 WAIT, PICK, SEARCH, START = range(4)  # in the order in which the source names them
 

@@ -7,11 +7,11 @@ from amaranth.hdl import Cat, Const, Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_hdl.scan.self_test import SEEN, SelfTest
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.precharge import apart
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.precharge import apart
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.reversal import SHORT, Sheet, skin_of, synchronizer_lemmas
 
 LISTEN, TEST, CHARGE, GAP, SELECT = range(5)  # in the order in which the source names them
 REST, IN_GAP, DISCHARGE, LET_GO, DRIVE, SEE = range(6)

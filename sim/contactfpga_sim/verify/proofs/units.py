@@ -9,9 +9,9 @@ from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.mcp3208 import Mcp3208
 from contactfpga_hdl.units.settings import Settings
 from contactfpga_hdl.units.watch import Watch
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 _FAST = Skin(units=3, converter_v=5.0)
 _SLOWEST = Skin(units=2, clock_hz=1_000_000, baud=250_000, settle_us=100)

@@ -8,9 +8,9 @@ from contactfpga_hdl.scan.adaptive import AdaptiveScanner
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_sim.proofs.bugs import Bug
-from contactfpga_sim.proofs.case import Case
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.bugs import Bug
+from contactfpga_sim.verify.proofs.case import Case
+from contactfpga_sim.verify.proofs.proof import Proof
 
 SKINS = {
     "raster": Skin(rows=4, columns=2, settle_us=1, zone_capacity=1),

@@ -10,7 +10,7 @@ from amaranth.lib import data
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import moments_layout
-from contactfpga_sim.proofs.proof import Proof
+from contactfpga_sim.verify.proofs.proof import Proof
 
 FIELDS = ("area", "sum_x", "sum_y")
 

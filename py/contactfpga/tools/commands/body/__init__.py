@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.body import learn, register, show
+from contactfpga.tools.commands.body import learn, register, show
 
 HELP = "Show the contacts on all links of a robot in one coordinate frame."
 EXTRA = None

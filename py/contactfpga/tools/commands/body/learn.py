@@ -10,12 +10,12 @@ from typing import TextIO
 
 import numpy as np
 
-from contactfpga.body import Body, folds
-from contactfpga.body.open_body import OpenBody
-from contactfpga.body.plan import Plan
-from contactfpga.commands.body.register import link
-from contactfpga.console import numbers, outputs, terminal
 from contactfpga.inputs.values import number_in, shown
+from contactfpga.robot.body import Body, folds
+from contactfpga.robot.body.open_body import OpenBody
+from contactfpga.robot.body.plan import Plan
+from contactfpga.tools.commands.body.register import link
+from contactfpga.tools.console import numbers, outputs, terminal
 from contactfpga.zones.zone import Zones
 
 HELP = "Learn which cells the folding cover presses over a joint's range, while nobody touches it."

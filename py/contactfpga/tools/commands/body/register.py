@@ -7,13 +7,13 @@ import dataclasses
 import json
 import math
 
-from contactfpga.body import Body, registration
-from contactfpga.body.plan import Plan
-from contactfpga.body.registration import Press, Registration
-from contactfpga.console import numbers, terminal
 from contactfpga.driver import driver
 from contactfpga.driver.board import Board
 from contactfpga.inputs.values import shown
+from contactfpga.robot.body import Body, registration
+from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.registration import Press, Registration
+from contactfpga.tools.console import numbers, terminal
 
 HELP = "Find where a sheet sits on its link, by pressing a few known points."
 

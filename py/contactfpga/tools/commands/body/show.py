@@ -7,10 +7,10 @@ import json
 import math
 import time
 
-from contactfpga.body import Body, Contact, Snapshot
-from contactfpga.body.snapshot import BASE, LINK
-from contactfpga.console import numbers, terminal
 from contactfpga.inputs.values import number_in
+from contactfpga.robot.body import Body, Contact, Snapshot
+from contactfpga.robot.body.snapshot import BASE, LINK
+from contactfpga.tools.console import numbers, terminal
 
 HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.cover import design, figures, impact, sense
-from contactfpga.cover.answer import CoverError
+from contactfpga.design.cover.answer import CoverError
+from contactfpga.tools.commands.cover import design, figures, impact, sense
 
 HELP = "Compute the soft cover: impact, sensitivity and design."
 EXTRA = "sim"

@@ -6,13 +6,13 @@ import argparse
 import dataclasses
 from typing import Any
 
-from contactfpga.commands.cover import units
-from contactfpga.commands.cover.printing import KPA, MM, notes, say, table
-from contactfpga.cover.answer import NoSolution
-from contactfpga.cover.design import Candidate, Design, Thin, design, margin
-from contactfpga.cover.sense import Sense
-from contactfpga.cover.task import Task
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.design.cover.design import Candidate, Design, Thin, design, margin
+from contactfpga.design.cover.sense import Sense
+from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
+from contactfpga.tools.commands.cover import units
+from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table
 
 HELP = "Find material, thickness and pitch for an arm, a switch and limits."
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from contactfpga.commands.cover.printing import MM, say
-from contactfpga.console import flags, outputs
-from contactfpga.cover import line, paper
-from contactfpga.cover.task import Task
+from contactfpga.design.cover import line, paper
+from contactfpga.design.cover.task import Task
+from contactfpga.tools.commands.cover.printing import MM, say
+from contactfpga.tools.console import flags, outputs
 
 HELP = "Draw the paper's curves, the impact over time and the design map."
 
@@ -26,7 +26,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     folder = outputs.folder(args.output)
-    from contactfpga.cover import drawing  # matplotlib, which only drawing needs
+    from contactfpga.design.cover import drawing  # matplotlib, which only drawing needs
 
     task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
     data = line.read(args.data) if args.data else None

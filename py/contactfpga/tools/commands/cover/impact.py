@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from contactfpga.commands.cover import units
-from contactfpga.commands.cover.printing import KPA, MM, notes, say, table, unsolved
-from contactfpga.cover import elastic, impact
-from contactfpga.cover.answer import CoverError, NoSolution
-from contactfpga.cover.arm import Arm
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.impact import METHODS, Impact
+from contactfpga.design.cover import elastic, impact
+from contactfpga.design.cover.answer import CoverError, NoSolution
+from contactfpga.design.cover.arm import Arm
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.impact import METHODS, Impact
+from contactfpga.tools.commands.cover import units
+from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table, unsolved
 
 HELP = "Compute compression, time and peak force when an arm runs into something."
 

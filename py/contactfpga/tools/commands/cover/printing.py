@@ -6,7 +6,7 @@ import dataclasses
 import json
 from typing import Any
 
-from contactfpga.cover.answer import NoSolution
+from contactfpga.design.cover.answer import NoSolution
 from contactfpga.errors import UNSOLVED
 
 MM, KPA = 1e3, 1e-3

@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from contactfpga.commands.cover import units
-from contactfpga.commands.cover.printing import MM, notes, say, table
-from contactfpga.cover import elastic, sense
-from contactfpga.cover.answer import CoverError, NoSolution
-from contactfpga.cover.hertz import Ball
-from contactfpga.cover.sense import Model, Sense, Sheet
-from contactfpga.cover.switch import Switch
+from contactfpga.design.cover import elastic, sense
+from contactfpga.design.cover.answer import CoverError, NoSolution
+from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.sense import Model, Sense, Sheet
+from contactfpga.design.cover.switch import Switch
 from contactfpga.errors import UNSOLVED
+from contactfpga.tools.commands.cover import units
+from contactfpga.tools.commands.cover.printing import MM, notes, say, table
 
 HELP = "Compute the force that closes a switch under the cover, or how far a force reaches."
 

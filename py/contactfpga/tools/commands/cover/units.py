@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from contactfpga.console import numbers
+from contactfpga.tools.console import numbers
 
 LENGTH, LENGTH_FROM_0 = numbers.length(), numbers.length(low=0.0)
 ALONG = numbers.length(10.0)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from contactfpga.commands.haptics import contacts, place, threshold, wrench, zero
-from contactfpga.console import interrupt
-from contactfpga.haptics.answer import HapticsError
 from contactfpga.inputs import files
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.tools.commands.haptics import contacts, place, threshold, wrench, zero
+from contactfpga.tools.console import interrupt
 
 HELP = "Compute forces at contacts from pressure units; set their zeros and thresholds."
 EXTRA = "haptics"

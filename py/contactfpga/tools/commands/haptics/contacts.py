@@ -6,9 +6,9 @@ import argparse
 import json
 from typing import Any
 
-from contactfpga.commands.haptics import reading
-from contactfpga.console import terminal
-from contactfpga.haptics import Center, Contacts, solve
+from contactfpga.robot.haptics import Center, Contacts, solve
+from contactfpga.tools.commands.haptics import reading
+from contactfpga.tools.console import terminal
 
 HELP = "Compute the force at each contact from a wrench."
 

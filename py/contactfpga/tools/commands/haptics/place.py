@@ -7,12 +7,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from contactfpga.console import numbers, outputs
-from contactfpga.haptics import Cylinder, LoadCells, Plane
-from contactfpga.haptics.answer import HapticsError
-from contactfpga.haptics.layouts import Layout
-from contactfpga.haptics.rate import Rating, Task, compared, rate
-from contactfpga.haptics.surface import Surface
+from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
+from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.layouts import Layout
+from contactfpga.robot.haptics.rate import Rating, Task, compared, rate
+from contactfpga.robot.haptics.surface import Surface
+from contactfpga.tools.console import numbers, outputs
 
 HELP = "Compare places for the pressure units of a link."
 
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _show(task, ratings if args.all else _best(ratings))
     if picture is not None:
-        from contactfpga.haptics import drawing
+        from contactfpga.robot.haptics import drawing
 
         drawing.draw(picture, task, ratings)
     return 0
@@ -118,7 +118,7 @@ def _answer(rating: Rating) -> dict[str, Any]:
 
 
 def _show(task: Task, ratings: list[Rating]) -> None:
-    from contactfpga.console import tables
+    from contactfpga.tools.console import tables
 
     head = [
         "units",

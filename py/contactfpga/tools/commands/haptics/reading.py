@@ -6,15 +6,15 @@ import json
 from pathlib import Path
 from typing import Any
 
-from contactfpga.haptics import surface as surfaces
-from contactfpga.haptics.answer import HapticsError, direction, matrix, number, positive, vector
-from contactfpga.haptics.contact import Touch
-from contactfpga.haptics.surface import Surface
-from contactfpga.haptics.unit import Unit
-from contactfpga.haptics.units import LoadCells
-from contactfpga.haptics.wrench import Noise, Wrench
 from contactfpga.inputs.files import read_small, told
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics import surface as surfaces
+from contactfpga.robot.haptics.answer import HapticsError, direction, matrix, number, positive, vector
+from contactfpga.robot.haptics.contact import Touch
+from contactfpga.robot.haptics.surface import Surface
+from contactfpga.robot.haptics.unit import Unit
+from contactfpga.robot.haptics.units import LoadCells
+from contactfpga.robot.haptics.wrench import Noise, Wrench
 
 MAX_BYTES = 1_000_000
 MAX_CONTACTS = 64

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import re
 
-from contactfpga.console import flags, terminal
-from contactfpga.console.forces import cells_of
 from contactfpga.errors import NoSuchCommand
-from contactfpga.haptics import HapticsError, LoadCells
 from contactfpga.inputs.values import shown
+from contactfpga.robot.haptics import HapticsError, LoadCells
+from contactfpga.tools.console import flags, terminal
+from contactfpga.tools.console.forces import cells_of
 
 HELP = "Set the deviations from zero at which a board's units and their weighted sums raise contact."
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from contactfpga.commands.haptics import reading
-from contactfpga.console import terminal
+from contactfpga.tools.commands.haptics import reading
+from contactfpga.tools.console import terminal
 
 HELP = "Compute the wrench on the link from the readings of its pressure units."
 

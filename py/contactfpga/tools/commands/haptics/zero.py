@@ -6,14 +6,14 @@ import argparse
 
 import numpy as np
 
-from contactfpga.console import flags, numbers, outputs, terminal
-from contactfpga.console.forces import cells_of
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.haptics import HapticsError, WithReadings
-from contactfpga.haptics.answer import Floats
-from contactfpga.haptics.table import write
 from contactfpga.inputs.files import write_text
+from contactfpga.robot.haptics import HapticsError, WithReadings
+from contactfpga.robot.haptics.answer import Floats
+from contactfpga.robot.haptics.table import write
+from contactfpga.tools.console import flags, numbers, outputs, terminal
+from contactfpga.tools.console.forces import cells_of
 
 HELP = "Read the zeros of a board's pressure units while nothing touches, and set them on the board."
 

@@ -1,0 +1,1 @@
+"""What designs a sheet: the cover over it, and its circuit."""

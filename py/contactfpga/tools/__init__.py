@@ -1,0 +1,1 @@
+"""What a person uses: commands, the view in the browser, recordings."""
