@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from reversal import FAST, small
 
+from contactfpga import examples
 from contactfpga.skin import Skin
-from contactfpga.tools import cli, examples
+from contactfpga.tools import cli
 from contactfpga_sim.lab import latency
 
 FILE = str(examples() / "fast.toml")

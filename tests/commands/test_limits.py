@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contactfpga import ContactFPGAError, Skin, SkinError, cli
+from contactfpga import ContactFPGAError, Skin, SkinError
 from contactfpga.design.cover.task import Task
 from contactfpga.driver import mcap_part, mcap_records
 from contactfpga.inputs import array_file, tomlfile, values, xmlfile
@@ -24,6 +24,7 @@ from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin.several import MOST_SHEETS, Several
 from contactfpga.surfaces import Mesh, SurfaceError, mesh, mesh_file
 from contactfpga.surfaces.laying import Triangles
+from contactfpga.tools import cli
 from contactfpga.tools.commands.haptics import reading
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.model.scenes.file import SceneFile

@@ -11,8 +11,9 @@ import pytest
 from model_board import DirectPort
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.design.circuit import Circuit
+from contactfpga.tools import cli
 from contactfpga.tools.console import flags, settling
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.sheet.line import Line

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from recorded_stream import recorded
 
-from contactfpga import ContactFPGAError, cli, examples
+from contactfpga import ContactFPGAError, examples
 from contactfpga.inputs.files import replaced, write_text
 from contactfpga.robot.body.folds import Folds
 from contactfpga.surfaces import Mesh
+from contactfpga.tools import cli
 from contactfpga.tools.recordings.export import export
 
 

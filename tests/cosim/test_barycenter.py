@@ -15,8 +15,9 @@ from sample import sample
 from scipy import ndimage
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools import cli
 from contactfpga.zones.zone import Zones
 from contactfpga_hdl.top import Top
 from contactfpga_sim.lab.chart import errors, speed

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from sample import sample
 
-from contactfpga import Batch, Skin, cli
+from contactfpga import Batch, Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools import cli
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.many import decode
 from contactfpga.wire.protocol import PacketError, check_prefix, decode_frame, unseal

@@ -11,8 +11,9 @@ import toy_labeller
 from toy_labeller import TOY
 
 import contactfpga
-from contactfpga import Skin, SkinError, boards, cli
+from contactfpga import Skin, SkinError, boards
 from contactfpga.choices.choice import own_files
+from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import methods, numbers, picture
 from contactfpga_sim.lab.chart.study import Task, study

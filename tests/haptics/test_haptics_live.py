@@ -7,7 +7,7 @@ import pytest
 from bumpers import flat
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.robot.haptics import (
     AloneWatch,
     Cylinder,
@@ -21,6 +21,7 @@ from contactfpga.robot.haptics import (
     felt,
 )
 from contactfpga.robot.haptics.table import write
+from contactfpga.tools import cli
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
 from contactfpga_sim.model.board.virtual import VirtualBoard

@@ -149,18 +149,30 @@ def test_british_spelling_is_seen(british, american):
     assert not BRITISH.search(american)
 
 
-ROOMS = sorted(
-    path.parent.relative_to(ROOT)
-    for package in ("hdl/contactfpga_hdl", "sim/contactfpga_sim", "py/contactfpga")
-    for path in (ROOT / package).glob("*/__init__.py")
-)
+PACKAGES = ("hdl/contactfpga_hdl", "sim/contactfpga_sim", "py/contactfpga")
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=str)
-def test_each_room_is_in_the_readme_the_architecture_and_its_picture(room):
-    package = f"`{room.parent}"
-    (readme,) = [line for line in words(ROOT / "README.md").splitlines() if line.startswith(f"| {package}")]
-    assert f"`{room.name}`" in readme
-    section = words(ROOT / "docs/architecture.md").partition(f"{package}`\n")[2].partition("\n## ")[0]
-    assert re.search(rf"^\| (`\w+`, )?`{room.name}`", section, re.MULTILINE)
-    assert f">{room.name}</text>" in (ROOT / "docs/images/rooms.svg").read_text(encoding="utf-8")
+def folders(pattern: str) -> list[tuple[str, Path]]:
+    """Each package, and each of its folders that fit the pattern."""
+    return [(name, path.parent) for name in PACKAGES for path in sorted((ROOT / name).glob(f"{pattern}/__init__.py"))]
+
+
+@pytest.mark.parametrize(("package", "folder"), folders("*"), ids=str)
+def test_each_folder_of_a_package_is_in_the_readme_and_the_picture(package, folder):
+    (readme,) = [line for line in words(ROOT / "README.md").splitlines() if line.startswith(f"| `{package}/`")]
+    assert f"`{folder.name}`" in readme
+    assert f">{folder.name}</text>" in (ROOT / "docs/images/rooms.svg").read_text(encoding="utf-8")
+
+
+LEAVES = [
+    (package, folder)
+    for package, folder in [*folders("*"), *folders("*/*")]
+    if not list(folder.glob("*/__init__.py")) and not {"lab", "commands"} & {folder.parent.name}
+]
+
+
+@pytest.mark.parametrize(("package", "folder"), LEAVES, ids=str)
+def test_each_folder_is_in_the_architecture(package, folder):
+    section = words(ROOT / "docs/architecture.md").partition(f"`{package}`\n")[2].partition("\n## ")[0]
+    name = folder.relative_to(ROOT / package).as_posix()
+    assert re.search(rf"^\| (`[\w/]+`, )?`{name}`", section, re.MULTILINE)

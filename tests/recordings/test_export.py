@@ -10,7 +10,8 @@ import pytest
 from recorded_stream import StreamPort, recorded
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
+from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, table
 from contactfpga.wire.protocol import Frame, no_records
 

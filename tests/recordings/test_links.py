@@ -8,8 +8,9 @@ from recorded_stream import NAMES, StreamPort, recorded_both
 from rosbags.highlevel import AnyReader
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.robot.body import Body
+from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.wire.hellos import Cutter
 

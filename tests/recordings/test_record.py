@@ -8,7 +8,8 @@ from fake_board import FakeBoard, wait_until
 from recorded_stream import StreamPort, recorded
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
+from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.session import Session
 

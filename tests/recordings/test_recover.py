@@ -13,7 +13,8 @@ from fake_board import FakeBoard, wait_until
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
+from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording
 from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
 from contactfpga.tools.recordings.recover import recover

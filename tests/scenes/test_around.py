@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from contactfpga import examples
 from contactfpga.design.cover import Cover
 from contactfpga.skin import Skin
-from contactfpga.tools import cli, examples
+from contactfpga.tools import cli
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes import scene as scenes
 from contactfpga_sim.model.scenes.contacts import Contact

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import contactfpga
-from contactfpga import Skin, SkinError, cli
+from contactfpga import Skin, SkinError
 from contactfpga.choices.choice import FIELDS
 from contactfpga.robot.body import Body, BodyError
 from contactfpga.skin.several import Several
+from contactfpga.tools import cli
 
 NAMED = "evil_module:x"
 ESCAPED = [

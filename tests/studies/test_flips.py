@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, touches
 from contactfpga_sim.lab.flips.campaign import Row

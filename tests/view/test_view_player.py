@@ -4,8 +4,9 @@ import pytest
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga import Skin, cli
+from contactfpga import Skin
 from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.tools import cli
 from contactfpga.tools.console import reading
 from contactfpga.tools.view import opening, replayed
 from contactfpga.tools.view import player as playing
