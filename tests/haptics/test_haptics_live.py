@@ -20,7 +20,7 @@ from contactfpga.robot.haptics import (
     contacts,
     felt,
 )
-from contactfpga.robot.haptics.table import write
+from contactfpga.robot.haptics.units import write
 from contactfpga.tools import cli
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker

@@ -9,7 +9,7 @@ from bumpers import exerted, flat, hexapod, on_cylinder, touch, units, wrench
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.sense import Model, Sheet
 from contactfpga.design.cover.switch import Switch
-from contactfpga.robot.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, resolution
+from contactfpga.robot.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, posterior
 from contactfpga.skin import sheet
 
 MU = 0.5
@@ -185,6 +185,6 @@ def lattice(pitch_mm, lines=16):
     ("reach", "barycenter", "consistent"), [(1, 0.2314, 0.1818), (2, 0.1505, 0.0974), (3, 0.1309, 0.0851)]
 )
 def test_barycenter_against_the_set_of_consistent_places(reach, barycenter, consistent):
-    found = resolution.static(float(reach), fineness=512 if reach == 1 else 256)
+    found = posterior.static(float(reach), fineness=512 if reach == 1 else 256)
     assert found.barycenter_rms == pytest.approx(barycenter, abs=1e-4)
     assert found.set_rms == pytest.approx(consistent, abs=1e-4)

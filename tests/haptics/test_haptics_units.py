@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contactfpga
-from contactfpga.robot.haptics import Bumper, DriftWatch, HapticsError, LoadCells, Motion, calibrate, table
+from contactfpga.robot.haptics import Bumper, DriftWatch, HapticsError, LoadCells, Motion, calibrate
 from contactfpga.robot.haptics.calibrate import rank_of
+from contactfpga.robot.haptics.units import write
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -227,10 +228,10 @@ def test_the_example_file_is_read_and_written_back(tmp_path):
     assert (cells.frame, cells.rank, len(cells.units)) == ("forearm", 6, 6)
     assert cells.wrench(cells.zeros).array == pytest.approx(np.zeros(6))
     again = tmp_path / "units.toml"
-    again.write_text(table.write(cells))
+    again.write_text(write(cells))
     assert LoadCells.load(again).units == cells.units
     better = LoadCells(cells.units, bumper=cells.bumper, matrix=1.01 * cells.matrix)
-    again.write_text(table.write(better))
+    again.write_text(write(better))
     assert LoadCells.load(again).matrix == pytest.approx(1.01 * cells.matrix)
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactfpga.robot.haptics.answer import Floats
-from contactfpga.robot.haptics.surface import Cylinder, Plane, Surface
-from contactfpga.robot.haptics.wrench import Noise
+from contactfpga.robot.haptics.values import Floats
+from contactfpga.robot.haptics.wrench import Cylinder, Noise, Plane, Surface
 
 
 def centers(surface: Surface, wrenches: Floats) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import overload
 
@@ -12,9 +13,10 @@ import numpy as np
 
 from contactfpga import notebook
 from contactfpga.inputs.values import shown
-from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.robot.haptics.surface import Center
-from contactfpga.robot.haptics.wrench import ALARM, Wrench
+from contactfpga.robot.haptics.units import LoadCells
+from contactfpga.robot.haptics.values import Floats, HapticsError, Vector
+from contactfpga.robot.haptics.wrench import ALARM, Center, Motion, Wrench
+from contactfpga.zones.zone import Zone, Zones
 
 FULL_WRENCH = "FULL_WRENCH"
 """Force at a place that is not known: the center of pressure."""
@@ -50,7 +52,7 @@ class Touch:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Seen:
+class Context:
     """What is known of the contacts of a frame besides forces."""
 
     link: str = ""
@@ -59,7 +61,7 @@ class Seen:
     """Of each contact; fewer where the rest is not followed."""
 
 
-NOTHING_MORE = Seen()
+NO_CONTEXT = Context()
 
 
 class Contact:
@@ -75,7 +77,7 @@ class Contact:
         frame: str,
         intervals: Callable[[], list[Interval]] | None = None,
         number: int = 0,
-        seen: Seen = NOTHING_MORE,
+        context: Context = NO_CONTEXT,
     ):
         self.touch = touch
         self.force_n = force_n
@@ -84,11 +86,11 @@ class Contact:
         """Push, 0 or above: a contact never pulls. None as ``force_n``."""
         self.frame = frame
         """Name of the frame in which point, normal and force are."""
-        self.link = seen.link
+        self.link = context.link
         """Name of the link that is touched."""
-        self.time_us = seen.time_us
+        self.time_us = context.time_us
         """Device time of the frame that shows it, in us since power-up; None where no frame does."""
-        self.track = seen.tracks[number] if number < len(seen.tracks) else None
+        self.track = context.tracks[number] if number < len(context.tracks) else None
         """Id that stays from frame to frame (:class:`~contactfpga.tracking.tracker.Tracker`); None: not followed."""
         self._intervals = intervals
         self._number = number
@@ -178,7 +180,7 @@ class Contacts(Sequence[Contact]):
         touches: Sequence[Touch],
         solution: Solution,
         center: Center | None = None,
-        seen: Seen = NOTHING_MORE,
+        context: Context = NO_CONTEXT,
     ):
         self.wrench = wrench
         self.center = center
@@ -196,13 +198,14 @@ class Contacts(Sequence[Contact]):
         self.beyond_friction = solution.beyond_friction
         """No forces within friction's limits exert this wrench: friction is larger than given, or a contact unseen.
         Intervals then hold for pushes with any friction."""
-        if wrench.frame and not seen.link:
-            seen = Seen(wrench.frame, seen.time_us, seen.tracks)
+        if wrench.frame and not context.link:
+            context = Context(wrench.frame, context.time_us, context.tracks)
         made = []
         for number, (touch, force) in enumerate(zip(touches, solution.forces_n)):
             nx, ny, nz = touch.normal
             push = -(nx * force[0] + ny * force[1] + nz * force[2])
-            made.append(Contact(touch, force, push if push > 0 else 0.0, wrench.frame, self._intervals, number, seen))
+            push = push if push > 0 else 0.0
+            made.append(Contact(touch, force, push, wrench.frame, self._intervals, number, context))
         self._contacts = tuple(made)
 
     def _intervals(self) -> list[Interval]:
@@ -283,3 +286,87 @@ def _push(contact: Contact) -> list[str]:
         return [f"{contact.normal_n:.3f}", ""]
     least, most = interval
     return [f"{contact.normal_n:.3f}", f"{least:.3f} and {'any' if most is None else f'{most:.3f}'}"]
+
+
+EARLIER_US = 20_000
+"""Device time by which a place is older than the zone of the next contact, which presses the units before it closes a
+switch."""
+
+Key = tuple[int, tuple[float, float, float] | None]
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Alone:
+    """Of one frame with a single zone."""
+
+    time_us: int
+    center_m: tuple[float, float, float]
+    sigma_m: float
+
+
+class AloneWatch:
+    """Takes every frame with its readings, and remembers the place of a contact that was alone, for
+    :func:`~contactfpga.robot.haptics.felt`.
+
+    With two contacts the units say nothing about where each is along the line through both, and the barycenter of one
+    to three cells is off by a quarter of the pitch: that is the largest error of the forces. A single contact's center
+    of pressure is known to less than a millimeter. It stays its place while more contacts come and its zone keeps the
+    same cells.
+    """
+
+    def __init__(self, cells: LoadCells):
+        """Raises :class:`HapticsError` where the cells have no surface."""
+        if cells.surface is None:
+            raise HapticsError("surface is missing; give units.toml a table [surface] with the bumper's outside")
+        self._cells, self._surface = cells, cells.surface
+        self._key: Key | None = None
+        """Of the zone that is alone."""
+        self._recent: deque[_Alone] = deque()
+        self._kept: dict[Key, _Alone] = {}
+
+    def take(self, zones: Zones, motion: Motion | None = None) -> None:
+        """The next frame, with its readings (:class:`~contactfpga.robot.haptics.WithReadings`); ``motion`` as for
+        :meth:`LoadCells.wrench <contactfpga.robot.haptics.LoadCells.wrench>`."""
+        if len(zones) == 1:
+            self._kept = {}
+            self._alone(zones, motion)
+            return
+        if self._key is not None and self._recent and zones.time_us - self._recent[0].time_us >= EARLIER_US:
+            self._kept[self._key] = self._recent[0]
+        keys = {_key(zone) for zone in zones}
+        self._key = None
+        self._recent.clear()
+        self._kept = {key: place for key, place in self._kept.items() if key in keys}
+
+    def _alone(self, zones: Zones, motion: Motion | None) -> None:
+        key = _key(zones[0])
+        if key != self._key:
+            self._key = key
+            self._recent.clear()
+        if zones.units is None:
+            return
+        center = self._surface.center(self._cells.wrench(zones.units.readings, motion))
+        if center is not None and center.covariance_m2 is not None:
+            sigma = math.sqrt(float(center.covariance_m2.trace()) / 2)
+            self._recent.append(_Alone(zones.time_us, center.point_m, sigma))
+        while len(self._recent) > 1 and zones.time_us - self._recent[1].time_us >= EARLIER_US:
+            self._recent.popleft()
+
+    def sharpened(self, zones: Zones, touches: Sequence[Touch]) -> list[Touch]:
+        """The touches of a frame's zones, in the order of those that have a place, each where it was alone if that is
+        known better and lies on its zone."""
+        placed = [zone for zone in zones if zone.point_mm is not None]
+        return [self._sharper(zone, touch, zones.sheet.pitch_x_mm) for zone, touch in zip(placed, touches, strict=True)]
+
+    def _sharper(self, zone: Zone, touch: Touch, pitch_mm: float) -> Touch:
+        place = self._kept.get(_key(zone))
+        if place is None or place.sigma_m >= touch.point_sigma_m:
+            return touch
+        if math.dist(place.center_m, touch.point_m) > 1e-3 * pitch_mm * math.sqrt(zone.area_cells):
+            return touch  # something that the sheet does not show pressed as well
+        return dataclasses.replace(touch, point_m=place.center_m, point_sigma_m=place.sigma_m)
+
+
+def _key(zone: Zone) -> Key:
+    """Changes with the zone's cells."""
+    return zone.area_cells, zone.point_mm

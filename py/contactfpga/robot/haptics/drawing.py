@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contactfpga import picture_style as style
-from contactfpga.robot.haptics.answer import Floats
 from contactfpga.robot.haptics.rate import ALONG, TURNS, Rating, Task
-from contactfpga.robot.haptics.surface import Cylinder
+from contactfpga.robot.haptics.values import Floats
+from contactfpga.robot.haptics.wrench import Cylinder
 
 
 def draw(path: Path, task: Task, ratings: list[Rating]) -> Path:

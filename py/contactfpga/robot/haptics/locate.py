@@ -12,14 +12,156 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contactfpga.robot.haptics import posterior, resolution
-from contactfpga.robot.haptics.answer import Floats, HapticsError
-from contactfpga.robot.haptics.evidence import Closing, Known
+from contactfpga.design.cover import medium, sense
+from contactfpga.design.cover.answer import NoSolution
+from contactfpga.robot.haptics import posterior
 from contactfpga.robot.haptics.posterior import Box, Posterior
-from contactfpga.robot.haptics.reach import Reach
-from contactfpga.robot.haptics.surface import Center
+from contactfpga.robot.haptics.values import Floats, HapticsError
+from contactfpga.robot.haptics.wrench import Center
 from contactfpga.skin import sheet as sheets
 from contactfpga.zones.zone import Zones
+
+STEPS, PATCH_STEPS = 512, 240
+"""Entries of the table, of a point and of a patch, which takes longer; between them it is straight."""
+
+LARGEST_N = 1e4
+
+
+class Reach:
+    """The force that closes a switch at a distance, and the distance at which a force still does. Both are tables
+    (:mod:`contactfpga.design.cover` computes them), within 0.01 % of the force.
+
+    Args:
+        cover: foam, switch and, for a patch, what touches.
+        model: the assumed contact, for instance ``Model("bonded", "point")``.
+        farthest_m: largest distance asked; None: four times the foam's thickness.
+    """
+
+    def __init__(self, cover: sense.Sheet, model: sense.Model, farthest_m: float | None = None):
+        self.model = model
+        farthest = 4 * cover.thickness_m if farthest_m is None else farthest_m
+        steps = STEPS if model.contact == "point" else PATCH_STEPS
+        self._distances = np.linspace(0, farthest, steps)
+        if model.contact == "point":
+            spread = medium.spread(model.within, self._distances / cover.thickness_m)
+            found = cover.switch.closing_pa * cover.thickness_m**2 / np.maximum(spread, 1e-30)
+        else:
+            found = np.array([_force(cover.force_n(model, float(distance))) for distance in self._distances])
+        # In a layer a force far away presses no more, and just before that takes more than any arm has.
+        grows = np.concatenate([[True], found[1:] > found[:-1]]) & (found < LARGEST_N)
+        count = steps if grows.all() else int(grows.argmin())
+        if count < 2:
+            raise HapticsError(f"model is '{model}'; no force closes a switch under this cover")
+        self._distances = self._distances[:count]
+        forces = found[:count]
+        # Over a half-space this root is straight in the distance's square, and nearly so in a layer.
+        self._squares = self._distances**2
+        self._roots = forces**0.4
+
+    def closing_n(self, distance_m: Floats) -> Floats:
+        """Force in N that closes a switch at each distance; 1e9 where none does."""
+        roots = np.interp(distance_m * distance_m, self._squares, self._roots)
+        return np.where(distance_m > self._distances[-1], 1e9, roots * roots * np.sqrt(roots))
+
+    def reach_m(self, force_n: float) -> float:
+        """How far in m the force closes switches; 0 if it does not even close the one below it."""
+        return math.sqrt(np.interp(max(0.0, force_n) ** 0.4, self._roots, self._squares, left=0.0))
+
+
+def _force(found: float | NoSolution) -> float:
+    return math.inf if isinstance(found, NoSolution) else found
+
+
+ROUNDING = 1e-4
+"""Share by which the table of forces may be off."""
+
+
+CERTAIN = 10.0
+"""Standard deviations beyond a threshold at which nothing is left to chance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Closing:
+    """A switch that closed, and the push at that instant: the contact lies on the circle of that push's reach."""
+
+    row: int
+    column: int
+    force_n: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Observations:
+    """All that is known of one contact, and what each part of it says about its place."""
+
+    cells: Sequence[tuple[int, int]]
+    force_n: float
+    closings: Sequence[Closing]
+    center: Place | None
+    pitches_m: tuple[float, float]
+    lines: tuple[int, int]
+    """Rows and columns of the sheet."""
+    reach: Reach
+    spread: float
+    force_sigma_n: float
+
+    def evidence(self, x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
+        """Logarithm of probability and misfit at the places x, y of a grid with this step."""
+        chance, misfit = np.zeros(len(x)), np.zeros(len(x))
+        when = {(one.row, one.column): one.force_n for one in self.closings}
+        for cell in self.cells:
+            needed, sigma = self._needed(cell, x, y, step_m)
+            if cell in when:
+                off = ((when[cell] - needed) / sigma) ** 2
+                chance -= 0.5 * off + np.log(sigma)
+                misfit += off
+            else:
+                _one_side((self.force_n - needed) / sigma, chance, misfit)
+        for cell in self._open():
+            needed, sigma = self._needed(cell, x, y, step_m)
+            if float(needed.min()) - self.force_n < CERTAIN * float(sigma.max()):
+                _one_side((needed - self.force_n) / sigma, chance, misfit)
+        if self.center is not None:
+            off = self._from_center(x, y)
+            chance -= 0.5 * off
+            misfit += off
+        return chance, misfit
+
+    def _needed(self, cell: tuple[int, int], x: Floats, y: Floats, step_m: float) -> tuple[Floats, Floats]:
+        """The force in N that closes the switch from each place, and its standard deviation, which includes how much
+        the force varies within a step of the grid."""
+        row, column = cell
+        distance = np.hypot(x - column * self.pitches_m[0], y - row * self.pitches_m[1])
+        needed = self.reach.closing_n(distance)
+        farther = self.reach.closing_n(distance + step_m / 2)
+        within = np.minimum(farther - needed, needed)
+        sigma = np.sqrt(self.force_sigma_n**2 + (self.spread * needed) ** 2 + (within / 1.7) ** 2)
+        return needed, np.maximum(sigma, ROUNDING * needed)
+
+    def _open(self) -> list[tuple[int, int]]:
+        """Open switches that the contact might have closed: those around the pressed ones."""
+        far = self.reach.reach_m(self.force_n * (1 + 3 * self.spread) + 3 * self.force_sigma_n)
+        wide, high = (math.ceil(far / pitch) for pitch in self.pitches_m)
+        rows, columns = zip(*self.cells)
+        return [
+            (row, column)
+            for row in range(min(rows) - high, max(rows) + high + 1)
+            for column in range(min(columns) - wide, max(columns) + wide + 1)
+            if (row, column) not in self.cells and 0 <= row < self.lines[0] and 0 <= column < self.lines[1]
+        ]
+
+    def _from_center(self, x: Floats, y: Floats) -> Floats:
+        assert self.center is not None
+        inverse = np.linalg.inv(self.center.covariance_m2)
+        dx, dy = x - self.center.x_m, y - self.center.y_m
+        return np.asarray(inverse[0, 0] * dx * dx + 2 * inverse[0, 1] * dx * dy + inverse[1, 1] * dy * dy)
+
+
+def _one_side(standing: Floats, chance: Floats, misfit: Floats) -> None:
+    """A switch that is on the right side of its threshold if ``standing``, in standard deviations, is above 0."""
+    # The logistic curve is the normal one to 1 %, and needs no scipy.
+    chance -= np.logaddexp(0.0, -1.702 * standing)
+    misfit += np.minimum(standing, 0.0) ** 2
+
 
 HELPS_FROM = 0.8
 """Reach over pitch above which the set of consistent places says more than the barycenter."""
@@ -60,7 +202,7 @@ class Locator:
         self._pitch_x, self._pitch_y = 1e-3 * sheet.pitch_x_mm, 1e-3 * sheet.pitch_y_mm
         self._reach = reach
         self._known = functools.partial(
-            Known,
+            Observations,
             pitches_m=(self._pitch_x, self._pitch_y),
             lines=(sheet.rows, sheet.columns),
             reach=reach,
@@ -98,11 +240,11 @@ class Locator:
         """By a zone's barycenter. Without force it is as unsure as a barycenter can be."""
         # What 95 % stay below hangs on the reach alone; it need not be exact to more than 2 % of the pitch.
         if force_n is None:
-            radius = resolution.worst_95(self._pitch_x, self._pitch_y)
+            radius = posterior.worst_95(self._pitch_x, self._pitch_y)
             return Place(x_m, y_m, radius, np.eye(2) * (radius / 2) ** 2, "barycenter")
         unit = min(self._pitch_x, self._pitch_y)
         reach = max(0.05, round(self._reach.reach_m(force_n) / unit * 50) / 50)
-        found = resolution.static(reach, self._pitch_x / unit, self._pitch_y / unit, 96)
+        found = posterior.static(reach, self._pitch_x / unit, self._pitch_y / unit, 96)
         return Place(
             x_m, y_m, found.barycenter_95 * unit, np.eye(2) * (found.barycenter_rms * unit) ** 2 / 2, "barycenter"
         )

@@ -1,17 +1,23 @@
-"""The linear system of one frame: forces at known places, and the wrench that they exert, weighted by its noise."""
+"""The linear system of one frame: forces at known places, and the wrench that they exert, weighted by its noise; solved
+for any number of contacts by non-negative least squares (scipy, from three on) or in friction's cones (Clarabel).
+
+Both solvers are loaded where they are needed.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.robot.haptics.contact import Touch
-from contactfpga.robot.haptics.vectors import turning
-from contactfpga.robot.haptics.wrench import Wrench
+from contactfpga.errors import MissingExtra
+from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution, Touch
+from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, turning
+from contactfpga.robot.haptics.wrench import ALARM, Wrench
+from contactfpga.surfaces.shapes import vector
 
 SAME_M = 1e-9
 """Points nearer to each other than this are one."""
@@ -117,3 +123,258 @@ def distinct(touches: Sequence[Touch]) -> None:
         for first in range(last):
             if math.dist(one.point_m, touches[first].point_m) < SAME_M:
                 raise HapticsError(f"contacts {first} and {last} both lie at {one.point_m}; give one of them")
+
+
+EDGES = 12
+"""Of the pyramid that stands for friction's cone, inside of it."""
+
+SMALL = 1e-6
+"""Share of the wrench that pushes alone may leave over where no noise is known."""
+
+
+def along_normals(system: System) -> Solution:
+    """Only pushes along the normals, for contacts without friction and for units that do not see it."""
+    found = _along_normals(system)
+    if system.places_widen(np.ravel(found)):
+        found = _along_normals(system)
+    return _solution(system, found, PURE_FORCE_WITH_KNOWN_DIRECTION, frictionless=True)
+
+
+def by_least_squares(system: System) -> Solution:
+    """Pushes along the normals if these exert the wrench to within its noise, else forces within friction's cones."""
+    forces = _along_normals(system)
+    if system.places_widen(np.ravel(forces)):
+        forces = _along_normals(system)
+    if _suffice(system, forces):
+        return _solution(system, forces, PURE_FORCE_WITH_KNOWN_DIRECTION)
+    return _solution(system, _along_edges(system), PURE_FORCE)
+
+
+def within_cones(system: System) -> Solution:
+    """The forces within friction's cones that come nearest to the wrench. Raises
+    :class:`~contactfpga.MissingExtra` without Clarabel."""
+    forces = _nearest(system)
+    if system.places_widen(forces):
+        forces = _nearest(system)
+    return _solution(system, [vector(force) for force in forces.reshape(-1, 3)], PURE_FORCE)
+
+
+def _along_normals(system: System) -> list[Vector]:
+    matrix = system.pushes()
+    if matrix.shape[1] <= 2:
+        amounts = _few(matrix, system)
+    else:
+        amounts = _least_squares(system.root @ matrix, system.root @ system.wrench).tolist()
+    found: list[Vector] = []
+    for amount, touch in zip(amounts, system.touches):
+        nx, ny, nz = touch.normal
+        found.append((-amount * nx, -amount * ny, -amount * nz))
+    return found
+
+
+def _few(matrix: Floats, system: System) -> list[float]:
+    """The best one or two amounts, none below 0."""
+    turned = matrix.T @ system.weight
+    gram, wanted = (turned @ matrix).tolist(), (turned @ system.wrench).tolist()
+    alone = [max(0.0, want / gram[at][at]) if gram[at][at] > 0 else 0.0 for at, want in enumerate(wanted)]
+    if len(alone) == 1:
+        return alone
+    (aa, ab), (_, bb) = gram
+    area = aa * bb - ab * ab
+    if area > 1e-12 * aa * bb:
+        both = [(wanted[0] * bb - wanted[1] * ab) / area, (wanted[1] * aa - wanted[0] * ab) / area]
+        if min(both) >= 0:
+            return both
+    gains = [want * amount for want, amount in zip(wanted, alone)]
+    return [alone[0], 0.0] if gains[0] >= gains[1] else [0.0, alone[1]]
+
+
+def _suffice(system: System, forces: list[Vector]) -> bool:
+    if not any(touch.friction for touch in system.touches):
+        return True
+    rest = system.wrench - system.matrix() @ np.ravel(forces)
+    off = float(rest @ system.weight @ rest)
+    if system.noise is None:
+        return off <= SMALL**2 * float(system.wrench @ system.weight @ system.wrench)
+    freedom = system.freedom(_rank(system, system.pushes()))
+    return freedom == 0 or off <= ALARM[freedom - 1]
+
+
+def _along_edges(system: System) -> list[Vector]:
+    edges, owners = [], []
+    turns = [2 * math.pi * step / EDGES for step in range(EDGES)]
+    for number, touch in enumerate(system.touches):
+        inward, first, second = _frame(touch.normal).T
+        directions = [inward]
+        if touch.friction:
+            sideways = [math.cos(turn) * first + math.sin(turn) * second for turn in turns]
+            directions += [inward + touch.friction * each for each in sideways]
+        edges += directions
+        owners += [number] * len(directions)
+    matrix = system.matrix()
+    columns = np.stack([matrix[:, 3 * own : 3 * own + 3] @ edge for own, edge in zip(owners, edges)], axis=1)
+    amounts = _least_squares(system.root @ columns, system.root @ system.wrench)
+    found = np.zeros((len(system.touches), 3))
+    for amount, own, edge in zip(amounts, owners, edges):
+        found[own] += amount * edge
+    return [vector(force) for force in found]
+
+
+def _least_squares(matrix: Floats, wanted: Floats) -> Floats:
+    try:
+        from scipy.optimize import nnls
+    except ModuleNotFoundError:
+        raise MissingExtra("The force at three contacts or more", "haptics") from None
+    return np.asarray(nnls(matrix, wanted)[0])
+
+
+def _solution(system: System, forces: list[Vector], model: str, frictionless: bool = False) -> Solution:
+    known = model == PURE_FORCE_WITH_KNOWN_DIRECTION
+    matrix = system.pushes() if known else system.matrix()
+    rank, null = _spaces(system, matrix)
+
+    def intervals() -> list[Interval]:
+        return _intervals(system, forces, frictionless)
+
+    def covariance() -> Floats | None:
+        if system.noise is None:
+            return None
+        inverse = np.linalg.pinv(matrix.T @ system.weight @ matrix, rcond=1e-12, hermitian=True)
+        if not known:
+            return np.asarray(inverse)
+        spread = np.zeros((3 * len(forces), len(forces)))
+        for number, touch in enumerate(system.touches):
+            spread[3 * number : 3 * number + 3, number] = touch.normal
+        return np.asarray(spread @ inverse @ spread.T)
+
+    chi2, freedom = system.chi2(system.wrench - system.matrix() @ np.ravel(forces)), system.freedom(rank)
+    null_space = null.T.tolist()
+    return Solution(model, forces, intervals, rank, null_space, chi2, freedom, system.touches, system.given, covariance)
+
+
+def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
+    """Rank, and the null space as columns."""
+    _, values, turned = np.linalg.svd(system.centered(matrix))
+    rank = int((values > 1e-9 * values[0]).sum())
+    return rank, turned[rank:].T
+
+
+def _rank(system: System, matrix: Floats) -> int:
+    return _spaces(system, matrix)[0]
+
+
+DETERMINED = 1e-9
+"""A push that the null space changes by no more than this share is known."""
+
+SMALLEST = 1e-7
+"""Weight of the forces' own size against the wrench."""
+
+TOLERANCE = 1e-10
+"""Of Clarabel's answers, as a share."""
+
+
+def _frame(normal: Vector) -> Floats:
+    """(3, 3): columns inward, and two along the surface."""
+    inward = -np.array(normal)
+    least = np.zeros(3)
+    least[int(np.argmin(np.abs(inward)))] = 1.0
+    first = np.cross(inward, least)
+    first /= math.sqrt(float(first @ first))
+    return np.stack([inward, first, np.cross(inward, first)], axis=1)
+
+
+def _intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> list[Interval]:
+    """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
+    ``forces``, which lie in them, and so in the interval. None: no largest one."""
+    basis, firsts = _basis(system.touches, frictionless)
+    _, values, turned = np.linalg.svd(system.centered(system.matrix() @ basis))
+    rank = int((values > 1e-9 * values[0]).sum())
+    fixed, free = turned[:rank], turned[rank:].T
+    start = basis.T @ np.ravel(forces)
+    size = max(1e-12, float(np.abs(start).max()))
+    solver = None
+    found: list[Interval] = []
+    for first in firsts:
+        push = max(0.0, float(start[first]))
+        if float(np.abs(free[first]).max(initial=0.0)) <= DETERMINED:
+            found.append((push, push))
+            continue
+        solver = solver or _Solver(system.touches, frictionless, fixed, start / size)
+        low, high = solver.least(first, 1.0), solver.least(first, -1.0)
+        least = 0.0 if low is None else min(push, max(0.0, float(start[first]) + size * low))
+        found.append((least, None if high is None else max(push, float(start[first]) - size * high)))
+    return found
+
+
+def _nearest(system: System) -> Floats:
+    """The forces (3k,) in N in the cones that exert the nearest wrench; if several do, the smallest of them."""
+    basis, firsts = _basis(system.touches, False)
+    matrix = system.root @ system.matrix() @ basis
+    square = matrix.T @ matrix
+    # Of equal ones the smallest forces, and those along the surface count most.
+    sizes = np.ones(len(square))
+    sizes[firsts] = 0.1
+    square += np.diag(SMALLEST * float(np.trace(square)) / len(square) * sizes)
+    size = max(1e-12, float(np.abs(system.wrench[:3]).max()))
+    wanted = matrix.T @ (system.root @ system.wrench) / size
+    scale = float(np.abs(square).max())
+    solver = _Solver(system.touches, False, np.zeros((0, len(square))), np.zeros(len(square)))
+    return np.asarray(basis @ (size * solver.solve(square / scale, -wanted / scale)))
+
+
+def _basis(touches: Sequence[Touch], frictionless: bool) -> tuple[Floats, list[int]]:
+    """(3k, n): axes of the forces that are looked for, and which of the n are pushes."""
+    blocks = [_frame(touch.normal)[:, : 1 if frictionless or not touch.friction else 3] for touch in touches]
+    widths = [block.shape[1] for block in blocks]
+    basis = np.zeros((3 * len(touches), sum(widths)))
+    firsts = [sum(widths[:number]) for number in range(len(widths))]
+    for number, (block, first) in enumerate(zip(blocks, firsts)):
+        basis[3 * number : 3 * number + 3, first : first + block.shape[1]] = block
+    return basis, firsts
+
+
+class _Solver:
+    """start + y in all cones, where fixed y = 0. So few of its numbers are not 0 that 64 contacts take no longer each
+    than three do; with the null space of ``fixed`` in place of it they take 50 times as long."""
+
+    def __init__(self, touches: Sequence[Touch], frictionless: bool, fixed: Floats, start: Floats):
+        try:
+            import clarabel
+            from scipy import sparse
+        except ModuleNotFoundError:
+            raise MissingExtra("The interval of a push among three contacts or more", "haptics") from None
+        self._clarabel, self._sparse = clarabel, sparse
+        scales: list[float] = []
+        self._cones: list[Any] = [clarabel.ZeroConeT(len(fixed))] if len(fixed) else []
+        for touch in touches:
+            flat = frictionless or not touch.friction
+            scales += [1.0] if flat else [touch.friction, 1.0, 1.0]
+            self._cones.append(clarabel.NonnegativeConeT(1) if flat else clarabel.SecondOrderConeT(3))
+        self._sides = sparse.vstack([sparse.csc_matrix(fixed), -sparse.diags(scales)], format="csc")
+        self._start = np.concatenate([np.zeros(len(fixed)), np.array(scales) * start])
+
+    def least(self, at: int, factor: float) -> float | None:
+        """The least of ``factor`` times this one of y; None where there is none."""
+        count = self._sides.shape[1]
+        slope = np.zeros(count)
+        slope[at] = factor
+        solution = self._run(self._sparse.csc_matrix((count, count)), slope)
+        status = str(solution.status)
+        if "DualInfeasible" in status:
+            return None
+        if "Solved" not in status:
+            raise HapticsError(f"the interval of a push was not found ({status}); do contacts lie in one point?")
+        return float(solution.obj_val)
+
+    def solve(self, square: Floats, slope: Floats) -> Floats:
+        """The y with the least of y square y / 2 + slope y."""
+        solution = self._run(self._sparse.csc_matrix(np.triu(square)), slope)
+        if "Solved" not in str(solution.status):
+            raise HapticsError(f"no forces within friction's cones were found ({solution.status})")
+        return np.array(solution.x)
+
+    def _run(self, square: Any, slope: Floats) -> Any:
+        settings = self._clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+        return self._clarabel.DefaultSolver(square, slope, self._sides, self._start, self._cones, settings).solve()

@@ -1,22 +1,51 @@
-"""The pressure units that carry the bumper: readings to a wrench, and what they cannot see."""
+"""The pressure units that carry the bumper: readings to a wrench, what they cannot see, and the file units.toml."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
-from contactfpga.robot.haptics import table
-from contactfpga.robot.haptics.answer import Floats, HapticsError, Vector
-from contactfpga.robot.haptics.surface import Surface
-from contactfpga.robot.haptics.unit import Unit
-from contactfpga.robot.haptics.vectors import turning
-from contactfpga.robot.haptics.wrench import Bumper, Motion, Noise, Wrench
+from contactfpga.robot.haptics.values import (
+    Floats,
+    HapticsError,
+    Vector,
+    direction,
+    matrix,
+    number,
+    positive,
+    turning,
+    vector,
+)
+from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
+
+
+@dataclasses.dataclass(frozen=True)
+class Unit:
+    """One unit. It pushes the bumper along its axis, and reads how hard."""
+
+    point_m: Vector
+    axis: Vector
+    """Unit vector."""
+    gain_n: float = 1.0
+    """Newtons per step of its reading."""
+    zero: float = 0.0
+    """Its reading while nothing touches."""
+    sigma_n: float = 0.05
+    """Standard deviation of its noise."""
+    range: tuple[float, float] | None = None
+    """Readings at its ends: a unit that reads one of them is saturated. None: it has none."""
+    preload_n: float | None = None
+    """What a spring presses it with while nothing touches. None: not known, and whether it lifts is not told."""
+
 
 COMPONENTS = ("force along x", "force along y", "force along z", "moment about x", "moment about y", "moment about z")
 
@@ -75,7 +104,7 @@ class LoadCells:
     @classmethod
     def load(cls, path: str | Path) -> LoadCells:
         """The units in a TOML file. Raises :class:`HapticsError`, OSError."""
-        return cls(**table.load(path))
+        return cls(**load(path))
 
     def wrench(self, readings: Sequence[float] | Floats, motion: Motion | None = None) -> Wrench:
         """What the contacts exert on the link, from one reading per unit. With ``motion`` the bumper's weight and
@@ -189,10 +218,10 @@ class LoadCells:
         if len(read) < 10:
             raise HapticsError(f"{len(read)} readings are too few for a zero; give at least 10")
         varies = read.std(axis=0, ddof=1) * np.abs(self._gains)
-        for number, unit in enumerate(self.units):
-            if varies[number] > 3 * unit.sigma_n:
+        for index, unit in enumerate(self.units):
+            if varies[index] > 3 * unit.sigma_n:
                 raise HapticsError(
-                    f"unit {number} varies by {varies[number]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
+                    f"unit {index} varies by {varies[index]:.3g} N, its noise is {unit.sigma_n:g} N; something moves"
                 )
         return self.changed(read.mean(axis=0), self.matrix if self.calibrated else None, gravity_m_s2)
 
@@ -230,3 +259,124 @@ def reduced(rows: Floats) -> Floats:
 def _in_words(wrench: Floats) -> str:
     parts = [name for name, value in zip(COMPONENTS, wrench) if abs(value) > 1e-6]
     return " with ".join(parts)
+
+
+MAX_UNITS = 64
+KEYS = ("frame", "zero_gravity_m_s2", "matrix", "surface", "bumper", "unit")
+UNIT_KEYS = ("point_m", "axis", "gain_n", "zero", "sigma_n", "range", "preload_n")
+BUMPER_KEYS = ("mass_kg", "center_m", "inertia_kg_m2")
+
+
+def load(path: str | Path) -> dict[str, Any]:
+    """The arguments of :class:`LoadCells`, from a units.toml. Raises :class:`HapticsError`, OSError."""
+    values = tomlfile.load(path, HapticsError)
+    try:
+        return read(values)
+    except HapticsError as error:
+        raise HapticsError(f"{path}: {error}") from None
+
+
+def read(values: dict[str, Any]) -> dict[str, Any]:
+    """The same, from the tables of such a file."""
+    _known(values, KEYS, "the file")
+    given = values.get("unit")
+    if not isinstance(given, list) or not given:
+        raise HapticsError("there is no unit; give a table [[unit]] with point_m and axis for each")
+    if len(given) > MAX_UNITS:
+        raise HapticsError(f"there are {len(given)} units; at most {MAX_UNITS} are read")
+    units = [_unit(one, f"unit[{index}]") for index, one in enumerate(given)]
+    frame = values.get("frame", "")
+    if not isinstance(frame, str):
+        raise HapticsError(f"frame is {shown(frame)}; it must be the name of the link's frame")
+    gravity = vector("zero_gravity_m_s2", values.get("zero_gravity_m_s2", (0, 0, 0)), "m/s2")
+    found = matrix("matrix", values["matrix"], 6, len(units)) if "matrix" in values else None
+    bumper = _bumper(values["bumper"]) if "bumper" in values else None
+    made = {"units": units, "frame": frame, "bumper": bumper, "zero_gravity_m_s2": gravity, "matrix": found}
+    return made | (_surface(values["surface"]) if "surface" in values else {})
+
+
+def _surface(values: Any) -> dict[str, Any]:
+    """The bumper's outside, and where the sheet begins on it."""
+    kind = dict(values) if isinstance(values, dict) else values
+    place = kind.pop("sheet_m", (0.0, 0.0)) if isinstance(kind, dict) else None
+    found = read_surface(kind)
+    if not isinstance(place, (list, tuple)) or len(place) != 2:
+        raise HapticsError(f"surface.sheet_m is {shown(place)}; it must be two numbers, x and y in m")
+    x, y = (number(f"surface.sheet_m[{index}]", one, unit="m") for index, one in enumerate(place))
+    return {"surface": found, "sheet_m": (x, y)}
+
+
+def _unit(values: Any, name: str) -> Unit:
+    _known(values, UNIT_KEYS, name)
+    for key in ("point_m", "axis"):
+        if key not in values:
+            raise HapticsError(f"{key} is missing in {name}")
+    gain = number(f"{name}.gain_n", values.get("gain_n", 1.0), unit="N")
+    if gain == 0:
+        raise HapticsError(f"{name}.gain_n is 0; it must be the newtons of a step of the reading")
+    preload = values.get("preload_n")
+    return Unit(
+        vector(f"{name}.point_m", values["point_m"], "in m"),
+        direction(f"{name}.axis", values["axis"]),
+        gain,
+        number(f"{name}.zero", values.get("zero", 0.0)),
+        positive(f"{name}.sigma_n", values.get("sigma_n", 0.05), "N"),
+        _range(f"{name}.range", values.get("range")),
+        None if preload is None else number(f"{name}.preload_n", preload, 0, unit="N"),
+    )
+
+
+def _range(name: str, value: Any) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise HapticsError(f"{name} is {shown(value)}; it must be the two readings at the ends")
+    low, high = (number(f"{name}[{index}]", one) for index, one in enumerate(value))
+    if not low < high:
+        raise HapticsError(f"{name} is {shown(value)}; the first reading must be below the second")
+    return low, high
+
+
+def _bumper(values: Any) -> Bumper:
+    _known(values, BUMPER_KEYS, "bumper")
+    if "mass_kg" not in values:
+        raise HapticsError("mass_kg is missing in bumper")
+    x, y, z = matrix("bumper.inertia_kg_m2", values.get("inertia_kg_m2", [[0] * 3] * 3), 3, 3).tolist()
+    center = vector("bumper.center_m", values.get("center_m", (0, 0, 0)), "in m")
+    return Bumper(positive("bumper.mass_kg", values["mass_kg"], "kg"), center, (tuple(x), tuple(y), tuple(z)))
+
+
+def _known(values: Any, keys: tuple[str, ...], name: str) -> None:
+    if not isinstance(values, dict):
+        raise HapticsError(f"{name} is {shown(values)}; it must be a table with {', '.join(keys)}")
+    for key in values:
+        if key not in keys:
+            raise HapticsError(f"unknown key {shown(key)} in {name}; known are {', '.join(keys)}")
+
+
+def write(cells: LoadCells) -> str:
+    """The text that :func:`read` reads back."""
+    lines = [f"frame = {json.dumps(cells.frame)}"] if cells.frame else []
+    if any(cells.zero_gravity_m_s2):
+        lines.append(f"zero_gravity_m_s2 = {json.dumps(list(cells.zero_gravity_m_s2))}")
+    if cells.calibrated:
+        lines.append(f"matrix = {json.dumps(np.asarray(cells.matrix).tolist())}")
+    if cells.surface:
+        lines += ["", "[surface]", *_written(cells.surface), f"sheet_m = {json.dumps(list(cells.sheet_m))}"]
+    if cells.bumper:
+        lines += ["", "[bumper]", f"mass_kg = {cells.bumper.mass_kg!r}"]
+        lines.append(f"center_m = {json.dumps(list(cells.bumper.center_m))}")
+        lines.append(f"inertia_kg_m2 = {json.dumps([list(row) for row in cells.bumper.inertia_kg_m2])}")
+    for unit in cells.units:
+        lines += ["", "[[unit]]"]
+        for key in UNIT_KEYS:
+            value = getattr(unit, key)
+            if value is not None:
+                lines.append(f"{key} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _written(outside: Surface) -> list[str]:
+    kind = next(name for name, (made, _) in SURFACES.items() if isinstance(outside, made))
+    length = SURFACES[kind][1]
+    return [f'kind = "{kind}"', f"{length} = {getattr(outside, length)!r}"]

@@ -14,8 +14,8 @@ from contactfpga.design.cover.sense import Model
 from contactfpga.design.cover.sense import Sheet as Foam
 from contactfpga.design.cover.switch import Switch
 from contactfpga.robot.haptics import Closing, LoadCells, Locator, Place, Plane, Reach
-from contactfpga.robot.haptics.layouts import tripod
 from contactfpga.robot.haptics.posterior import radius_95
+from contactfpga.robot.haptics.rate import tripod
 from contactfpga.skin.sheet import Sheet
 
 LINES = 16

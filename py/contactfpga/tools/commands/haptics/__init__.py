@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from contactfpga.inputs import files
-from contactfpga.robot.haptics.answer import HapticsError
+from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.tools.commands.haptics import contacts, place, threshold, wrench, zero
 from contactfpga.tools.console import interrupt
 

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from contactfpga.robot.haptics import Center, Contacts, solve
+from contactfpga.robot.haptics import Center, Contacts, contacts
 from contactfpga.tools.commands.haptics import reading
 from contactfpga.tools.console import terminal
 
@@ -26,7 +26,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the topic."""
     wrench, touches, surface = reading.contacts(args.file)
-    found = solve.contacts(wrench, touches, surface, cones=args.cones)
+    found = contacts(wrench, touches, surface, cones=args.cones)
     answer = _answer(found)
     if surface is not None:
         answer["center_of_pressure"] = None if found.center is None else _center(found.center)

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
-from contactfpga.robot.haptics.answer import HapticsError
-from contactfpga.robot.haptics.layouts import Layout
-from contactfpga.robot.haptics.rate import Rating, Task, compared, rate
-from contactfpga.robot.haptics.surface import Surface
+from contactfpga.robot.haptics.rate import Layout, Rating, Task, compared, rate
+from contactfpga.robot.haptics.values import HapticsError
+from contactfpga.robot.haptics.wrench import Surface
 from contactfpga.tools.console import numbers, outputs
 
 HELP = "Compare places for the pressure units of a link."

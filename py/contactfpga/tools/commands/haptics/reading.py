@@ -8,13 +8,10 @@ from typing import Any
 
 from contactfpga.inputs.files import read_small, told
 from contactfpga.inputs.values import shown
-from contactfpga.robot.haptics import surface as surfaces
-from contactfpga.robot.haptics.answer import HapticsError, direction, matrix, number, positive, vector
 from contactfpga.robot.haptics.contact import Touch
-from contactfpga.robot.haptics.surface import Surface
-from contactfpga.robot.haptics.unit import Unit
-from contactfpga.robot.haptics.units import LoadCells
-from contactfpga.robot.haptics.wrench import Noise, Wrench
+from contactfpga.robot.haptics.units import LoadCells, Unit
+from contactfpga.robot.haptics.values import HapticsError, direction, matrix, number, positive, vector
+from contactfpga.robot.haptics.wrench import Noise, Surface, Wrench, read_surface
 
 MAX_BYTES = 1_000_000
 MAX_CONTACTS = 64
@@ -44,7 +41,7 @@ def contacts(path: str | Path) -> tuple[Wrench, list[Touch], Surface | None]:
     if not isinstance(listed, list) or len(listed) > MAX_CONTACTS:
         raise HapticsError(f"contacts is {shown(listed)}; it must be a list of at most {MAX_CONTACTS}")
     touches = [_touch(one, f"contacts[{index}]") for index, one in enumerate(listed)]
-    surface = surfaces.read(values["surface"]) if "surface" in values else None
+    surface = read_surface(values["surface"]) if "surface" in values else None
     if touches and surface is not None:
         raise HapticsError("surface is given beside contacts; it counts only where no contact is given")
     if not touches and surface is None:
