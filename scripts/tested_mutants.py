@@ -37,7 +37,7 @@ CHEAP_S = 12
 LIMIT_S = 1800
 
 EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {
-    ("units/sums.py", "compares & (self.sum != count - 1) -> (compares)"): (
+    ("units/watch.py", "compares & (self.sum != count - 1) -> (compares)"): (
         "alive",
         "Believed equivalent: `compares` is high for as many clocks in a row as there are sums. It is gone now.",
     ),

@@ -1,6 +1,8 @@
 """What the stages hand to each other."""
 
-from amaranth.lib import data
+from amaranth.hdl import Module, Mux, Signal, Value
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import HEARD_BITS, STUCK_BITS, TIME_BITS, Derived
 from contactfpga.wire.faults import SLOT_DIGITS
@@ -95,3 +97,26 @@ def summary_layout(derived: Derived) -> data.StructLayout:
             "changed": 1,
         }
     )
+
+
+def row_number(m: Module, derived: Derived, row: data.View, taken: Value) -> Value:
+    """The number of the row on offer: it comes with a row where the scan skips rows, otherwise rows are counted as they
+    are ``taken``."""
+    if derived.skips:
+        return row.y
+    y_next = Signal(range(max(2, derived.skin.rows)))
+    with m.If(taken):
+        m.d.sync += y_next.eq(Mux(row.last, 0, y_next + 1))
+    return y_next
+
+
+def labeller_ports(derived: Derived) -> dict[str, wiring.Member]:
+    """Rows of cells in, zones out.
+
+    rows (in): a frame's rows in ascending order.
+    records (out): its zones, then an end mark.
+    """
+    return {
+        "rows": In(stream.Signature(row_layout(derived))),
+        "records": Out(stream.Signature(record_layout(derived))),
+    }

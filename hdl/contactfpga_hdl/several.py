@@ -1,13 +1,12 @@
 """Several sheets at one FPGA: a whole chain for each, and one UART."""
 
-from amaranth.hdl import Cat, Module
+from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
 from contactfpga.skin.several import Several
 from contactfpga.wire.numbered import Place
-from contactfpga_hdl.link.turns import Turns
 from contactfpga_hdl.link.uart import Transmitter
 from contactfpga_hdl.top import Top, receiver_of
 
@@ -65,3 +64,24 @@ class SeveralTop(wiring.Component):
             for name, member in sheet.signature.members.items():
                 if name not in _INSIDE:
                     yield number, name, member
+
+
+class Turns(wiring.Component):
+    """A turn goes round from sheet to sheet. Who has it may begin a packet, and keeps it to its end; who has nothing to
+    send passes it on in the same clock. So a sheet waits for one packet of each other sheet at most.
+
+    holds (in), by sheet: a packet begins in this clock, or does not end in it; only looked at in the sheet's turn.
+    turn (out), by sheet: a packet may begin; high for one sheet in each clock, for the first one after power-up.
+    """
+
+    def __init__(self, sheets: int):
+        self.sheets = sheets
+        super().__init__({"holds": In(sheets), "turn": Out(sheets)})
+
+    def elaborate(self, platform):
+        m = Module()
+        others = Signal(self.sheets - 1)  # by sheet after the first one; none: it is the first one's turn
+        m.d.comb += self.turn.eq(Cat(~others.any(), others))
+        with m.If(~(self.turn & self.holds).any()):
+            m.d.sync += others.eq(self.turn)
+        return m

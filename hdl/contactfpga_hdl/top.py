@@ -10,21 +10,14 @@ from contactfpga.choices import debounces
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST, Derived
 from contactfpga.wire.numbered import Place
-from contactfpga_hdl.dual import Dual
-from contactfpga_hdl.link.alive import Alive
 from contactfpga_hdl.link.link import Link, offset_bits
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_hdl.link.pulses import PulseReceiver
 from contactfpga_hdl.link.request import RequestReader
 from contactfpga_hdl.link.uart import LINE_BITS, Receiver, Transmitter
 from contactfpga_hdl.payloads import zone_layout
-from contactfpga_hdl.report.audit import Audit, Bitmap
+from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Backlog
-from contactfpga_hdl.report.divide import Divider
-from contactfpga_hdl.scan.pins import column_pins, connect_lines, connect_pins, row_pins
-from contactfpga_hdl.scan.sample_at import moves_sample
-from contactfpga_hdl.units.ports import unit_pins
-from contactfpga_hdl.units.units import Units
+from contactfpga_hdl.scan.pins import column_pins, connect_pins, moves_sample, row_pins
 
 _Stage = TypeVar("_Stage", bound=wiring.Component)
 
@@ -69,7 +62,7 @@ class Top(wiring.Component):
         ports = {
             **row_pins(skin),
             **column_pins(skin),
-            **unit_pins(skin),
+            **_unit_pins(skin),
             **(_UART if place is None else _SHARED),
             "contact": Out(1),
             **({"alive": Out(1)} if skin.alive else {}),
@@ -105,7 +98,7 @@ class Top(wiring.Component):
         m.d.sync += self._restarts.eq(scan.upset | link.upset)
         wiring.connect(m, items, packer.items)
         wiring.connect(m, packer.frames, link.frames)
-        connect_lines(m, self.skin, scan.pins, self)
+        self._connect_sheet(m, scan)
         units = self._units(m, request, link) if self.skin.units else None
         self._watch_faults(m, scan, packer, units)
         if "faults" in link.signature.members:
@@ -137,6 +130,14 @@ class Top(wiring.Component):
             self._probe(m, "byte", link.bytes, data=link.bytes.payload)
         return m
 
+    def _connect_sheet(self, m: Module, scan: Any) -> None:
+        if not self.skin.row_order and not self.skin.column_order:
+            connect_pins(m, scan.pins, self)
+            return
+        from contactfpga_hdl.scan.lines import connect_lines
+
+        connect_lines(m, self.skin, scan.pins, self)
+
     def _connect_line(self, m: Module, request: RequestReader, link: Link) -> None:
         """Add what reads requests, and the UART, if it is this sheet's alone."""
         if self.place is None:
@@ -158,14 +159,16 @@ class Top(wiring.Component):
         m.submodules[name] = stage if self.skin.dual else ResetInserter(self._restarts)(stage)
         return stage
 
-    def _units(self, m: Module, request: RequestReader, link: Link) -> Units:
+    def _units(self, m: Module, request: RequestReader, link: Link) -> wiring.Component:
+        from contactfpga_hdl.units.units import Units
+
         units = self._put(m, "units", Units(self.skin))
         connect_pins(m, units.pins, self)
         wiring.connect(m, units.packet, link.units)
         m.d.comb += [units.command.eq(request.command), units.what.eq(request.what), units.value.eq(request.value)]
         return units
 
-    def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: Units | None) -> None:
+    def _watch_faults(self, m: Module, scan: Any, packer: Packer, units: wiring.Component | None) -> None:
         """What a fault does to the pins, and what units do."""
         fault = Signal()
         over, unwatched = (0, 0) if units is None else (units.over, ~units.armed)
@@ -179,6 +182,8 @@ class Top(wiring.Component):
         else:
             m.d.comb += self.contact.eq(scan.contact)
         if self.skin.alive:
+            from contactfpga_hdl.link.alive import Alive
+
             m.submodules.alive = alive = Alive(self.derived.clocks_per_us)
             watched = scan.watched if self.derived.scan.waits else 0
             m.d.comb += [alive.well.eq(_packed(packer) | watched), alive.fault.eq(fault), self.alive.eq(alive.pin)]
@@ -190,6 +195,8 @@ class Top(wiring.Component):
         return blind
 
     def _compared(self) -> Module:
+        from contactfpga_hdl.dual import Dual
+
         m = Module()
         first, second = Top(self.skin, self.probes, copy=True), Top(self.skin, copy=True)
         m.submodules.dual = dual = Dual(self.skin, first, second)
@@ -236,6 +243,8 @@ class Top(wiring.Component):
         return items, audit.summary
 
     def _divided(self, m: Module, backlog: Backlog) -> stream.Interface:
+        from contactfpga_hdl.report.divide import Divider
+
         divide = self._put(m, "divide", Divider(self.skin))
         wiring.connect(m, backlog.waiting, divide.records)
         if self.probes:
@@ -245,6 +254,8 @@ class Top(wiring.Component):
 
     def _bitmap(self, m: Module, rows: stream.Interface) -> tuple[stream.Interface, data.View]:
         """Items of a frame's rows as they are, and its summary."""
+        from contactfpga_hdl.report.bitmap import Bitmap
+
         bitmap = self._put(m, "bitmap", Bitmap(self.skin))
         backlog = self._put(m, "backlog", Backlog(self.skin))
         self._hand_over(m, rows, bitmap.rows, bitmap.free)
@@ -260,9 +271,21 @@ class Top(wiring.Component):
             m.d.comb += getattr(self, f"{name}_{field}").eq(value)
 
 
-def receiver_of(derived: Derived) -> Receiver | PulseReceiver:
+def receiver_of(derived: Derived) -> wiring.Component:
     """What reads the receive pin."""
-    return PulseReceiver(derived.bit_clocks) if derived.pulsed else Receiver(derived.bit_clocks)
+    if not derived.pulsed:
+        return Receiver(derived.bit_clocks)
+    from contactfpga_hdl.link.pulses import PulseReceiver
+
+    return PulseReceiver(derived.bit_clocks)
+
+
+def _unit_pins(skin: Skin) -> dict[str, wiring.Member]:
+    if not skin.units:
+        return {}
+    from contactfpga_hdl.units.ports import unit_pins
+
+    return unit_pins(skin)
 
 
 def _packed(packer: Packer) -> Value:

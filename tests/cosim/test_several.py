@@ -12,7 +12,7 @@ from contactfpga import Skin, examples
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.sheets import Sorter
 from contactfpga.skin.several import Several
-from contactfpga_hdl.link.turns import Turns
+from contactfpga_hdl.several import Turns
 from contactfpga_sim.model.board.several import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several

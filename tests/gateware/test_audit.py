@@ -7,7 +7,8 @@ import math
 import pytest
 
 from contactfpga import Skin
-from contactfpga_hdl.report.audit import Audit, Bitmap
+from contactfpga_hdl.report.audit import Audit
+from contactfpga_hdl.report.bitmap import Bitmap
 
 SHEETS = ((1, 1), (1, 9), (9, 1), (5, 7), (6, 16))
 AT_END = ("zones", "overflow", "changed")  # there one clock after the end mark

@@ -11,8 +11,9 @@ from contactfpga import Skin
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga_hdl.link.link import offset_bits
 from contactfpga_hdl.link.pack import Packer
-from contactfpga_hdl.report.audit import Audit, Bitmap
+from contactfpga_hdl.report.audit import Audit
 from contactfpga_hdl.report.backlog import Backlog
+from contactfpga_hdl.report.bitmap import Bitmap
 from contactfpga_hdl.report.divide import Divider
 
 SHEETS = {

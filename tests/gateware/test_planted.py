@@ -31,13 +31,13 @@ FAULTS = {
         (f"{GATEWARE}/test_units.py::test_the_wire_gets_the_newest_sweep_whole_however_late_it_takes_it",),
     ),
     "a threshold of one high bit is none": Fault(
-        "units/settings.py",
+        "units/watch.py",
         "given[place].eq(number != 0)",
         "given[place].eq(number[:17] != 0)",
         (f"{FORMAL}[thresholds of units, 3 units]",),
     ),
     "sums of a lone unit go on": Fault(
-        "units/sums.py",
+        "units/watch.py",
         "Mux(first, 0, totals[0])",
         "Mux(first & (self.sum == 0), 0, totals[0])",
         (f"{GATEWARE}/test_units.py::test_readings_and_thresholds_are_the_golden_models_in_every_clock",),

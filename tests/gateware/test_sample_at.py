@@ -11,7 +11,8 @@ from sample import sample
 
 from contactfpga import Skin
 from contactfpga.skin.derived import SAMPLE_AT, Derived
-from contactfpga_hdl.scan.sample_at import SampleAt, sample_at_ports
+from contactfpga_hdl.scan.pins import sample_at_ports
+from contactfpga_hdl.scan.sample_at import SampleAt
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.request import command, request

@@ -6,7 +6,8 @@ import math
 import pytest
 
 from contactfpga import Skin
-from contactfpga_hdl.report.tally import Change, Tally
+from contactfpga_hdl.report.audit import Tally
+from contactfpga_hdl.report.change import Change
 
 SHEETS = ((1, 1), (1, 9), (9, 1), (5, 7), (3, 64), (64, 3), (16, 16))
 

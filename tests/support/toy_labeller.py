@@ -6,8 +6,7 @@ from amaranth.lib import wiring
 
 from contactfpga.choices.labellers import Labeller
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.ports import labeller_ports
-from contactfpga_hdl.util.row_number import row_number
+from contactfpga_hdl.payloads import labeller_ports, row_number
 from contactfpga_sim.model.golden.work import Departure, LabellerRule, Labelling
 
 TOY = Labeller(

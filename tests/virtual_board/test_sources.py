@@ -40,6 +40,7 @@ skins = [
     small.replace(labeller="single", debounce="asym_eager_defer_pk", units=2, converter="ads131m08"),
     fast.replace(guard=True, self_test=True, labeller="serial", **round),
     fast.replace(report="barycenter", send="on_change"),
+    small.replace(report="cells", row_order=(2, 1, 0), baud=4_000_000),
 ]
 for skin in skins:
     rtlil.convert(Top(skin), name="top")

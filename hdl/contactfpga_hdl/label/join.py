@@ -1,6 +1,7 @@
 """Steps to zones: which runs belong together, known from brackets and a stack."""
 
 import math
+from typing import TYPE_CHECKING
 
 from amaranth.hdl import Array, Const, Module, Mux, Signal, Value
 from amaranth.lib import data, wiring
@@ -8,8 +9,10 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.label.steps import join_layout, nesting, place_of, step_layout, waiting
-from contactfpga_hdl.label.turns import Turns, turns_layout
 from contactfpga_hdl.util.stack import Stack
+
+if TYPE_CHECKING:
+    from contactfpga_hdl.label.around import Turns
 
 
 class _Brackets:
@@ -54,7 +57,8 @@ class Join(wiring.Component):
                 "first": range(self._runs),
                 "last": range(self._runs),
                 "place": range(derived.open_zones),  # of the first one in the table
-                **(turns_layout() if derived.skin.closed else {}),
+                # turns of the cluster that is walked, and of the first and the last run; a 1 is a turn back
+                **({"turn": 1, "first_turn": 1, "last_turn": 1} if derived.skin.closed else {}),
             }
         )
 
@@ -71,6 +75,8 @@ class Join(wiring.Component):
         pop = self.step.has_before & earlier & (current.open == 0)
         turns = None
         if self.derived.skin.closed:
+            from contactfpga_hdl.label.around import Turns
+
             turns = Turns(self.derived)
             with m.If(self.step.opens):
                 m.d.comb += current.open.eq(self.step.seam)
@@ -135,7 +141,9 @@ class Join(wiring.Component):
                     m.d.sync += [old_turned.eq(known.new_turned), known.turned.eq(0)]
         return old_after[0], old_before[0], old_turned[0]
 
-    def _take_in(self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: Turns | None) -> data.View:
+    def _take_in(
+        self, m: Module, current: data.View, pop: Value, waiting: data.View, turns: "Turns | None"
+    ) -> data.View:
         """The current group, with the group that waited on the stack if the run before continues it."""
         joined = Signal(self._group_layout)
         m.d.comb += joined.eq(current)
@@ -180,7 +188,7 @@ class Join(wiring.Component):
         pop: Value,
         waiting: data.View,
         joined: data.View,
-        turns: Turns | None,
+        turns: "Turns | None",
     ) -> None:
         """Set the brackets of runs of the new row that are now known to be of one zone."""
         over = pop & waiting.has_run & current.has_run  # two groups of runs become one

@@ -11,9 +11,7 @@ from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.ports import labeller_ports
-from contactfpga_hdl.payloads import moments_layout
-from contactfpga_hdl.util.row_number import row_number
+from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 def _step_layout() -> data.StructLayout:

@@ -11,10 +11,9 @@ from amaranth.lib import data, memory, wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.ports import labeller_ports
-from contactfpga_hdl.label.serial_turns import SerialTurns, stored_turns
-from contactfpga_hdl.label.steps import nesting, place_of
-from contactfpga_hdl.label.unwrap import kept_layout, zone_of
+from contactfpga_hdl.label.around import SerialTurns, stored_turns
+from contactfpga_hdl.label.steps import kept_layout, nesting, place_of, zone_of
+from contactfpga_hdl.payloads import labeller_ports
 
 
 class _Walk:

@@ -5,9 +5,7 @@ from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.ports import labeller_ports
-from contactfpga_hdl.payloads import moments_layout
-from contactfpga_hdl.util.row_number import row_number
+from contactfpga_hdl.payloads import labeller_ports, moments_layout, row_number
 
 
 class SingleLabeller(wiring.Component):

@@ -1,4 +1,5 @@
-"""What the link sends unasked: a hello every half second, and a frame after a long pause."""
+"""What the link sends unasked: a hello every half second where frames take uneven times, and a frame after a long
+pause."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib import wiring

@@ -9,12 +9,9 @@ from contactfpga.skin.derived import CHECK_BYTES, TIME_BITS, Derived
 from contactfpga.wire import numbered, protocol
 from contactfpga.wire.numbered import Place
 from contactfpga.wire.units import plain_bytes
-from contactfpga_hdl.link.due import hello_period, keep_alive
-from contactfpga_hdl.link.faults import Reporter
 from contactfpga_hdl.link.odometer import LIVE_DIGITS, Odometer
 from contactfpga_hdl.link.pack import frames_signature
 from contactfpga_hdl.payloads import faults_layout, slots_layout, summary_layout, tag_layout
-from contactfpga_hdl.units.pack import packet_signature
 from contactfpga_hdl.util.upset import upset_places
 
 HELLO_REGION = 3
@@ -78,7 +75,7 @@ class Link(wiring.Component):
     bytes (out): stuffed packets, one after the other; a byte is offered two clocks after the one before was taken.
     upset (out): high while two frames share a region, as after a bit of its number turned by itself: one would be sent
     while another is written over it. Never with ``dual``, which finds more.
-    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.link.turns.Turns`;
+    turn (in), holds (out): with a ``place`` among several sheets, see :class:`~contactfpga_hdl.several.Turns`;
     packets then say the sheet's number.
     """
 
@@ -88,7 +85,6 @@ class Link(wiring.Component):
         self.derived = Derived(skin)
         self._hello = stored_hello(skin, place)
         self._offset_bits = offset_bits(skin, place)
-        faults = faults_layout(self.derived)
         super().__init__(
             {
                 "frames": In(frames_signature(self.derived, self._offset_bits)),
@@ -99,14 +95,38 @@ class Link(wiring.Component):
                 "time": In(TIME_BITS),
                 "due": Out(1),
                 "number": In(protocol.DIGIT_BITS * protocol.HEARD_DIGITS),
-                **({"faults": In(faults)} if faults.size else {}),
-                **({"slots": In(stream.Signature(slots_layout(self.derived)))} if skin.self_test else {}),
-                **({"units": In(packet_signature())} if skin.units else {}),
+                **self._optional_ports(),
                 **({} if place is None else {"turn": In(1), "holds": Out(1)}),
                 "upset": Out(1),
                 "bytes": Out(stream.Signature(8)),
             }
         )
+
+    def _hello_period(self, m: Module) -> Value:
+        """High for a clock when another half second is over."""
+        if not self.derived.scan.even:
+            from contactfpga_hdl.link.due import hello_period
+
+            return hello_period(m, self)
+        period = self.derived.hello_frames
+        since = Signal(range(max(2, period)))
+        due = since == period - 1
+        with m.If(self.frames.decide):
+            m.d.sync += since.eq(Mux(due, 0, since + 1))
+        return self.frames.decide & due
+
+    def _optional_ports(self) -> dict[str, wiring.Member]:
+        """Of what only some Skins send besides frames."""
+        ports: dict[str, wiring.Member] = {}
+        if (faults := faults_layout(self.derived)).size:
+            ports["faults"] = In(faults)
+        if self.skin.self_test:
+            ports["slots"] = In(stream.Signature(slots_layout(self.derived)))
+        if self.skin.units:
+            from contactfpga_hdl.units.pack import packet_signature
+
+            ports["units"] = In(packet_signature())
+        return ports
 
     def elaborate(self, platform):
         m = Module()
@@ -118,7 +138,7 @@ class Link(wiring.Component):
         frames_sent = self._decide(m, wire, regions)
         with m.If(wire.take_hello):
             m.d.sync += hello_due.eq(0)
-        with m.If(hello_period(m, self) | self.asked):
+        with m.If(self._hello_period(m) | self.asked):
             m.d.sync += hello_due.eq(1)
         byte = self._read_byte(m, wire, regions, self._state_digit(m, wire, frames_sent))
         reporter = self._reporter(m, wire) if "faults" in self.signature.members else None
@@ -130,7 +150,9 @@ class Link(wiring.Component):
         self._send(m, wire, regions, hello_due, byte, reporter)
         return m
 
-    def _reporter(self, m: Module, wire: _Wire) -> Reporter:
+    def _reporter(self, m: Module, wire: _Wire) -> wiring.Component:
+        from contactfpga_hdl.link.faults import Reporter
+
         m.submodules.reporter = reporter = Reporter(self.skin)
         m.d.comb += [
             reporter.word.eq(self.faults),
@@ -145,7 +167,7 @@ class Link(wiring.Component):
         return reporter
 
     def _take_report(
-        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value, reporter: Reporter
+        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, end: Value, reporter: wiring.Component
     ) -> None:
         """Before a frame, but not after another report."""
         m.d.comb += wire.take_report.eq(reporter.due & ~hello_due & ~(wire.is_report & regions.waits))
@@ -201,6 +223,8 @@ class Link(wiring.Component):
         with m.If(decide & verdict.send):
             m.d.sync += overwritten.eq(overwritten + drops)
         if self.skin.send == "on_change":
+            from contactfpga_hdl.link.due import keep_alive
+
             keep_alive(m, self)
             m.d.comb += verdict.send.eq(self.summary.changed | self.tag.requested | self.due)
         return frames_sent
@@ -220,7 +244,13 @@ class Link(wiring.Component):
         return Mux(in_state, Cat(digit, Const(1, 1)), read.data)
 
     def _send(
-        self, m: Module, wire: _Wire, regions: _Regions, hello_due: Value, byte: Value, reporter: Reporter | None
+        self,
+        m: Module,
+        wire: _Wire,
+        regions: _Regions,
+        hello_due: Value,
+        byte: Value,
+        reporter: wiring.Component | None,
     ) -> None:
         end = Signal.like(wire.offset)
         seeded = wire.take_frame | wire.take_report | wire.take_units

@@ -1,21 +1,26 @@
 """What a frame holds: its items for the packer, and a summary that was checked against its cells."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+import math
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import (
-    item_layout,
     moments_layout,
     passed_layout,
     record_layout,
     row_layout,
+    row_number,
     summary_layout,
     zone_layout,
 )
-from contactfpga_hdl.report.tally import Change, Tally
+from contactfpga_hdl.util.bits import popcount
+
+GROUPS = 4
+"""The most groups of a row. Each of a row's steps may hold up the counting, and the next row comes six clocks later."""
 
 
 class Audit(wiring.Component):
@@ -53,7 +58,7 @@ class Audit(wiring.Component):
         overflow = Signal()
         fits = zones < self.derived.zone_capacity
         passes = record.end | fits
-        m.submodules.counts = counts = _Counts(self.skin)
+        m.submodules.counts = counts = Counts(self.skin)
         m.d.comb += [
             self.records.ready.eq(self.items.ready | ~passes),
             self.items.valid.eq(self.records.valid & passes),
@@ -83,54 +88,74 @@ class Audit(wiring.Component):
         return m
 
 
-class Bitmap(wiring.Component):
-    """With ``report = "cells"`` in the place of labeller and audit: rows go into the frame as they are.
+class Tally(wiring.Component):
+    """Moments of each row, one group of columns per clock.
 
-    rows (in): a frame's rows in ascending order.
-    free (out): the row on offer can be counted.
-    items (out): the same without delay; the end mark follows the last one three clocks later, when that is counted.
-    summary (out): as of :class:`Audit`, where it has no zones.
+    A row has at most :data:`GROUPS` groups, an empty one none.
+
+    taken (in): high for the clock in which ``row`` (in) is taken. Only empty rows may be taken while ``busy``.
+    moments (out): a group's share in each clock without ``hold``, from two clocks after ``taken`` on; otherwise zero.
+    hold (in): no group is counted.
+    busy (out): falls after the last group.
     """
 
     def __init__(self, skin: Skin):
         self.skin = skin
         self.derived = Derived(skin)
+        self._columns = 4  # of a group; a power of two
+        while skin.columns > GROUPS * self._columns:
+            self._columns *= 2
+        self._groups = math.ceil(skin.columns / self._columns)
         super().__init__(
             {
-                "rows": In(stream.Signature(row_layout(self.derived))),
-                "free": Out(1),
-                "items": Out(stream.Signature(item_layout(self.derived))),
-                "summary": Out(summary_layout(self.derived)),
+                "taken": In(1),
+                "row": In(row_layout(self.derived)),
+                "moments": Out(moments_layout(self.derived)),
+                "hold": In(1),
+                "busy": Out(1),
             }
         )
 
     def elaborate(self, platform):
         m = Module()
-        taken = self.rows.valid & self.rows.ready
-        countdown = Signal(range(4))
-        counting = countdown != 0
-        ends = countdown == 1
-        with m.If(taken & self.rows.payload.last):
-            m.d.sync += countdown.eq(3)
-        with m.Elif(counting & (~ends | self.items.ready)):
-            m.d.sync += countdown.eq(countdown - 1)
-        m.submodules.counts = counts = _Counts(self.skin)
+        cells = Signal(self._groups * self._columns)
+        left = Signal(range(self._groups + 2))  # groups to come, and the one that is being added
+        y = Signal(range(max(2, self.skin.rows)))
+        first = Signal(range(max(2, self._groups * self._columns)))  # column of the group
+        group = cells[: self._columns]
+        area = Signal(range(self._columns + 1))
+        offsets = Signal(range(math.comb(self._columns, 2) + 1))  # of the pressed columns from the first one, summed
+        first_counted = Signal.like(first)
+        number = row_number(m, self.derived, self.row, self.taken)
+        with m.If(self.taken & self.row.cells.any()):
+            m.d.sync += [cells.eq(self.row.cells), first.eq(0), left.eq(self._groups + 1), y.eq(number)]
+        with m.Elif(self.busy & ~self.hold):
+            m.d.sync += [
+                cells.eq(cells >> self._columns),
+                first.eq(first + self._columns),
+                left.eq(left - 1),
+                area.eq(popcount(group)),
+                offsets.eq(_count_offsets(group)),
+                first_counted.eq(first),
+            ]
         m.d.comb += [
-            self.rows.ready.eq(~counting & self.items.ready),
-            self.items.valid.eq(self.rows.valid & ~counting | ends),
-            self.items.payload.data.eq(Mux(ends, 0, self.rows.payload.cells)),
-            self.items.payload.end.eq(ends),
-            counts.taken.eq(taken),
-            counts.row.eq(self.rows.payload),
-            self.free.eq(counts.free),
-            counts.ends.eq(ends & self.items.ready),
-            self.summary.cells.eq(counts.cells),
-            self.summary.changed.eq(counts.changed),
+            self.busy.eq(left != 0),
+            self.moments.area.eq(area),
+            self.moments.sum_x.eq(area * first_counted + offsets),
+            self.moments.sum_y.eq(area * y),
         ]
         return m
 
 
-class _Counts(wiring.Component):
+def _count_offsets(bits: Value) -> Value:
+    """The numbers of the bits that are set, summed: for each bit of the numbers, how many have it."""
+    return sum(
+        popcount(bit for offset, bit in enumerate(bits) if offset >> place & 1) << place
+        for place in range((len(bits) - 1).bit_length())
+    )
+
+
+class Counts(wiring.Component):
     """What a frame's rows say of it, and whether its zones explain all of its cells.
 
     Rows with a pressed cell come at least ``Derived.min_row_clocks`` apart, or when they are ``free`` to.
@@ -196,6 +221,8 @@ class _Counts(wiring.Component):
             ]
 
     def _watch_change(self, m: Module) -> None:
+        from contactfpga_hdl.report.change import Change
+
         m.submodules.change = change = Change(self.skin)
         m.d.comb += [change.taken.eq(self.taken), change.row.eq(self.row), change.clear.eq(self.ends)]
         with m.If(self.ends):

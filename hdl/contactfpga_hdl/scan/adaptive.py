@@ -6,8 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import HEARD_BITS, TIME_BITS, Derived
-from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins
-from contactfpga_hdl.scan.ports import scan_ports
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, scan_ports
 from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.scan.shift import RowChain

@@ -1,19 +1,21 @@
 """Between scanner and sheet: which pins there are, and the drivers for one pin per row and per column.
 
 A scanner counts rows and columns as the sheet does, the guard lines last. Its direct pins are in that order too;
-:func:`connect_lines` puts them on the lines that they are soldered to. Pins of shift registers are in the order of the
-lines already.
+:func:`~contactfpga_hdl.scan.lines.connect_lines` puts them on the lines that they are soldered to. Pins of shift
+registers are in the order of the lines already.
 """
 
-from collections.abc import Sequence
-
-from amaranth.hdl import Cat, Module, Signal, Value
-from amaranth.lib import wiring
+from amaranth.hdl import Module, Signal
+from amaranth.lib import stream, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
+from contactfpga.skin.derived import HEARD_BITS, SAMPLE_AT, Derived
+from contactfpga.wire.command import VALUE_DIGITS
+from contactfpga.wire.framing import DIGIT_BITS
+from contactfpga_hdl.payloads import faults_layout, row_layout, tag_layout
 from contactfpga_hdl.util.upset import upset
 
 
@@ -60,38 +62,6 @@ def connect_pins(m: Module, inner: wiring.PureInterface, outer: wiring.PureInter
         m.d.comb += outside.eq(inside) if member.flow == Out else inside.eq(outside)
 
 
-def connect_lines(m: Module, skin: Skin, scan: wiring.PureInterface, lines: wiring.PureInterface) -> None:
-    """Connect the pins of a scanner to the ones of the same names at the lines, each row and column to its own."""
-    for name, member in scan.signature.members.items():
-        inside, outside = getattr(scan, name), getattr(lines, name)
-        order = line_order(skin, name)
-        if member.flow == Out:
-            m.d.comb += outside.eq(on_lines(inside, order))
-        else:
-            m.d.comb += inside.eq(of_lines(outside, order))
-
-
-def line_order(skin: Skin, name: str) -> tuple[int, ...]:
-    """The line of each bit of a port that has one per row or column; of any other port ()."""
-    if name in ("rows", "rows_drive", "rows_read"):
-        return skin.line_of_row
-    return skin.line_of_column if name in ("columns", "columns_drive") else ()
-
-
-def on_lines(word: Value, order: Sequence[int]) -> Value:
-    """A word of rows or columns in the order of the lines that they are soldered to; () leaves it as it is."""
-    return word if _in_order(order) else Cat(word[order.index(line)] for line in range(len(order)))
-
-
-def of_lines(word: Value, order: Sequence[int]) -> Value:
-    """The other way."""
-    return word if _in_order(order) else Cat(word[line] for line in order)
-
-
-def _in_order(order: Sequence[int]) -> bool:
-    return tuple(order) == tuple(range(len(order)))
-
-
 def first_row(skin: Skin) -> int:
     """The row of a raster's first slot, in which a guard row is driven."""
     return skin.rows if skin.guard else 0
@@ -106,7 +76,7 @@ def row_driver(skin: Skin) -> wiring.Signature:
     driven already may be shifted again.
     drive (in): high in the last clock before the slot; the rows are driven from the next clock on.
     release (in): high in the last clock in which they are driven.
-    upset (out): see :func:`~contactfpga_hdl.scan.ports.scan_ports`.
+    upset (out): see :func:`~contactfpga_hdl.scan.pins.scan_ports`.
 
     Direct rows drive row 0 after power-up, or the guard row; in an adaptive scan all rows.
     """
@@ -182,3 +152,47 @@ class DirectColumns(wiring.Component):
         begun = Signal()
         m.d.sync += [begun.eq(self.begin), self.done.eq(begun)]
         return m
+
+
+def scan_ports(derived: Derived) -> dict[str, wiring.Member]:
+    """Between the sheet, the stages that take its rows, and the link.
+
+    pins: those of the row driver and of the column reader.
+    rows (out): rows in ascending order.
+    tag (out): of the frame whose last row's strobe was; when it is complete is the scan's rule.
+    request (in): high for a clock; the tag of the next frame to start answers it with ``requested``.
+    heard (in): taken over into that tag.
+    epoch (out): high for a clock when another 2^22 us are over.
+    faults (out): with ``guard`` or ``self_test``, what it knows of faulty lines.
+    upset (out): high for a clock when a register was found to have turned by itself, see
+    :func:`~contactfpga_hdl.util.upset.upset`; never with ``dual``, which finds more.
+    contact (out): high while any switch reads pressed; when it rises and falls is the scan's rule.
+    """
+    skin = derived.skin
+    faults = faults_layout(derived)
+    return {
+        "pins": Out(wiring.Signature(row_pins(skin) | column_pins(skin))),
+        "rows": Out(stream.Signature(row_layout(derived))),
+        "tag": Out(tag_layout(derived)),
+        "request": In(1),
+        "heard": In(HEARD_BITS),
+        "epoch": Out(1),
+        "upset": Out(1),
+        "contact": Out(1),
+        **({"faults": Out(faults)} if faults.size else {}),
+        **sample_at_ports(derived),
+    }
+
+
+def moves_sample(derived: Derived) -> bool:
+    """Whether the scan obeys the command "sample at"."""
+    return SAMPLE_AT in derived.commands
+
+
+def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
+    """Of a scan that obeys the command "sample at".
+
+    moves (in): high for a clock when the command comes, with the request.
+    clocks (in): its value, in that clock.
+    """
+    return {"moves": In(1), "clocks": In(DIGIT_BITS * VALUE_DIGITS)} if moves_sample(derived) else {}

@@ -8,8 +8,6 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.scan.stuck import watched
 
-RETRY_BIT = 16
-"""Bit of the clock in microseconds: each time it turns, stuck columns are tried again."""
 LOOKS = 4
 """Samples of a column that lie apart. It is stuck only if it reads pressed in all of them."""
 LEAST_BITS = 4

@@ -5,13 +5,8 @@ from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
-from contactfpga_hdl.scan.guard import Told
-from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row
-from contactfpga_hdl.scan.ports import scan_ports
-from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
-from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
-from contactfpga_hdl.scan.shift import ColumnChain, RowChain
-from contactfpga_hdl.scan.stuck import Stuck, present
+from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row, moves_sample, scan_ports
+from contactfpga_hdl.scan.stuck import RETRY_BIT, Stuck, present
 from contactfpga_hdl.util.upset import upset, upset_count
 
 
@@ -86,8 +81,8 @@ class Scanner(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         skin = self.skin
-        m.submodules.driver = driver = DirectRows(skin) if skin.row_drive == "direct" else RowChain(skin)
-        m.submodules.reader = reader = DirectColumns(skin) if skin.column_read == "direct" else ColumnChain(skin)
+        m.submodules.driver = driver = self._row_driver()
+        m.submodules.reader = reader = self._column_reader()
         m.submodules.stuck = stuck = Stuck(skin)
         connect_pins(m, driver.pins, self.pins)
         connect_pins(m, reader.pins, self.pins)
@@ -112,7 +107,21 @@ class Scanner(wiring.Component):
         ]
         return m
 
-    def _drive_rows(self, m: Module, slots: _Slots, driver: DirectRows | RowChain) -> None:
+    def _row_driver(self) -> wiring.Component:
+        if self.skin.row_drive == "direct":
+            return DirectRows(self.skin)
+        from contactfpga_hdl.scan.shift import RowChain
+
+        return RowChain(self.skin)
+
+    def _column_reader(self) -> wiring.Component:
+        if self.skin.column_read == "direct":
+            return DirectColumns(self.skin)
+        from contactfpga_hdl.scan.shift import ColumnChain
+
+        return ColumnChain(self.skin)
+
+    def _drive_rows(self, m: Module, slots: _Slots, driver: wiring.Component) -> None:
         derived = self.derived
         slot, shifting = derived.row_clocks, derived.row_shift_clocks
         ends = slots.clock == slot - 1
@@ -128,7 +137,7 @@ class Scanner(wiring.Component):
             driver.release.eq(slots.clock == derived.settle_clocks - 1),
         ]
 
-    def _sample_columns(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> Value:
+    def _sample_columns(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
         """A slot has two samples: in the last clock its row is driven, and in the last one that no row is. Returns the
         levels of what was sampled."""
         derived = self.derived
@@ -158,11 +167,13 @@ class Scanner(wiring.Component):
         """Of the next row, counted from 1."""
         if not moves_sample(self.derived):
             return self.derived.settle_clocks
+        from contactfpga_hdl.scan.sample_at import SampleAt
+
         chosen = SampleAt(m, self.derived, self.moves, self.clocks, slots.begins_rows)
         sample.early = chosen.early
         return Mux(sample.is_guard, chosen.settle, chosen.clock) if self.skin.guard else chosen.clock
 
-    def _keep_sample(self, m: Module, slots: _Slots, reader: DirectColumns | ColumnChain, sample: _Sample) -> Value:
+    def _keep_sample(self, m: Module, slots: _Slots, reader: wiring.Component, sample: _Sample) -> Value:
         """What was sampled early counts when it always does."""
         derived = self.derived
         counts = (derived.settle_clocks + 1 + derived.column_shift_clocks) % derived.row_clocks
@@ -175,6 +186,8 @@ class Scanner(wiring.Component):
 
     def _precharge(self, m: Module, slots: _Slots, sample: _Sample, time: Value) -> None:
         """While no row is driven, but for a clock after the last one and a clock before the next one."""
+        from contactfpga_hdl.scan.precharge import Precharge
+
         m.submodules.precharge = precharge = Precharge(self.skin)
         m.d.comb += [
             precharge.drive.eq(
@@ -189,6 +202,8 @@ class Scanner(wiring.Component):
     def _check_lines(self, m: Module, sample: _Sample, stuck: Stuck, time: Value) -> Value:
         """A row that is whole reads the guard column, the guard row all columns. Returns whether a fault was told as
         the frame ended; it is there with the number of stuck columns."""
+        from contactfpga_hdl.scan.guard import Told
+
         skin = self.skin
         m.submodules.told = told = Told(skin)
         ended = Signal()

@@ -7,9 +7,8 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import TIME_BITS, Derived
-from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways
-from contactfpga_hdl.scan.ports import scan_ports
-from contactfpga_hdl.scan.precharge import RETRY_BIT, Precharge
+from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways, scan_ports
+from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, tag_faults, turned
 from contactfpga_hdl.scan.reversal_rows import (
@@ -22,7 +21,7 @@ from contactfpga_hdl.scan.reversal_rows import (
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
 from contactfpga_hdl.scan.reversal_turns import take_turns
 from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
-from contactfpga_hdl.scan.stuck import count_columns, present
+from contactfpga_hdl.scan.stuck import RETRY_BIT, count_columns, present
 from contactfpga_hdl.util.upset import upset_count
 
 

@@ -3,10 +3,11 @@
 from amaranth.hdl import Const, Module, Mux, Signal
 from amaranth.lib import wiring
 
+from contactfpga_hdl.scan.pins import moves_sample
 from contactfpga_hdl.scan.reversal_guard import Checks
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
-from contactfpga_hdl.scan.sample_at import SampleAt, moves_sample
-from contactfpga_hdl.util.lowest import lowest
+from contactfpga_hdl.scan.sample_at import SampleAt
+from contactfpga_hdl.util.bits import lowest
 
 SYNCHRONIZED = 3
 """Clocks that a touch has been there when its row reads touched in a synchronizer's output, that clock included."""

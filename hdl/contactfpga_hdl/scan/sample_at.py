@@ -1,25 +1,8 @@
 """The command "sample at": a row's columns are sampled before its settle time is over (docs/protocol.md)."""
 
 from amaranth.hdl import Module, Mux, Signal, Value
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In
 
-from contactfpga.skin.derived import SAMPLE_AT, Derived
-from contactfpga.wire.command import VALUE_DIGITS
-from contactfpga.wire.framing import DIGIT_BITS
-
-
-def moves_sample(derived: Derived) -> bool:
-    return SAMPLE_AT in derived.commands
-
-
-def sample_at_ports(derived: Derived) -> dict[str, wiring.Member]:
-    """Of a scan that obeys it.
-
-    moves (in): high for a clock when the command comes, with the request.
-    clocks (in): its value, in that clock.
-    """
-    return {"moves": In(1), "clocks": In(DIGIT_BITS * VALUE_DIGITS)} if moves_sample(derived) else {}
+from contactfpga.skin.derived import Derived
 
 
 class SampleAt:

@@ -11,7 +11,8 @@ from amaranth.lib.cdc import FFSynchronizer
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.scan.pins import column_reader, of_lines, on_lines, released_levels, row_driver
+from contactfpga_hdl.scan.lines import of_lines, on_lines
+from contactfpga_hdl.scan.pins import column_reader, released_levels, row_driver
 
 
 class RowChain(wiring.Component):

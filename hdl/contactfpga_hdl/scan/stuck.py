@@ -6,7 +6,10 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import STUCK_BITS, STUCK_MAX
-from contactfpga_hdl.util.popcount import popcount
+from contactfpga_hdl.util.bits import popcount
+
+RETRY_BIT = 16
+"""Bit of the clock in microseconds: each time it turns, stuck columns are tried again."""
 
 
 def present(skin: Skin, row: int) -> int:

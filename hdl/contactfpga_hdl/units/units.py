@@ -17,7 +17,7 @@ class Units(wiring.Component):
     to seven, the packet's ``due`` as docs/timing.md says.
 
     pins: those at the converter.
-    command, what, value (in): see :class:`~contactfpga_hdl.units.settings.Settings`.
+    command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
     over, armed (out): see :class:`~contactfpga_hdl.units.watch.Watch`.
     packet (out): see :func:`~contactfpga_hdl.units.pack.packet_signature`.
     """

@@ -1,22 +1,21 @@
 """Whether a unit's deviation from its zero, or a weighted sum of deviations, has reached its threshold."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga.skin.units import INDEX_BITS, MAX_WEIGHT, NUMBER_BITS, SUM_THRESHOLD, THRESHOLD, ZERO, number_shift
 from contactfpga.wire.command import MOST_VALUE, MOST_WHAT
 from contactfpga_hdl.units.ports import reading_layout
-from contactfpga_hdl.units.settings import Settings
-from contactfpga_hdl.units.sums import Sums
 
 
 class Watch(wiring.Component):
     """Each unit is compared with each of its readings, each sum once a sweep.
 
     done, reading (in): of the converter.
-    command, what, value (in): see :class:`~contactfpga_hdl.units.settings.Settings`.
+    command, what, value (in): see :class:`~contactfpga_hdl.units.watch.Settings`.
     over (out): a threshold is reached. A unit's counts two clocks after ``done``, sum k's four + k clocks after that of
     the sweep's last unit, and stands until the next comparison.
     armed (out): there is a threshold.
@@ -70,4 +69,121 @@ class Watch(wiring.Component):
             sums.watched.eq(settings.sum_watched),
             self.over.eq(of_units.any() | sums.over.any()),
         ]
+        return m
+
+
+class Settings(wiring.Component):
+    """Registers, so that a restart of two copies clears them.
+
+    command (in): high for a clock; ``what`` and ``value`` are then a command's. Those of units and sums that are not
+    there do nothing.
+    unit (in): whose ``zero`` and ``threshold`` are looked at; ``watched``: it has a threshold.
+    sum (in), with sums: likewise.
+    armed (out): there is a threshold.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        units = Derived(skin).units
+        self._bits, self._sum_bits = units.converter.bits, units.sum_bits
+        sums = {"sum": In(2), "sum_threshold": Out(self._sum_bits), "sum_watched": Out(1)} if skin.unit_sums else {}
+        super().__init__(
+            {
+                "command": In(1),
+                "what": In(range(MOST_WHAT + 1)),
+                "value": In(range(MOST_VALUE + 1)),
+                "unit": In(INDEX_BITS),
+                "zero": Out(self._bits),
+                "threshold": Out(self._bits),
+                "watched": Out(1),
+                **sums,
+                "armed": Out(1),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        units, sums = self.skin.units, len(self.skin.unit_sums)
+        zeros, _ = self._registers(m, "zero", ZERO, units, self._bits)
+        thresholds, watched = self._registers(m, "threshold", THRESHOLD, units, self._bits)
+        m.d.comb += [
+            self.zero.eq(zeros[self.unit]),
+            self.threshold.eq(thresholds[self.unit]),
+            self.watched.eq(watched[self.unit]),
+        ]
+        some = Cat(watched)
+        if sums:
+            thresholds, of_sums = self._registers(m, "sum_threshold", SUM_THRESHOLD, sums, self._sum_bits)
+            m.d.comb += [self.sum_threshold.eq(thresholds[self.sum]), self.sum_watched.eq(of_sums[self.sum])]
+            some = Cat(some, of_sums)
+        m.d.comb += self.armed.eq(some.any())
+        return m
+
+    def _registers(self, m: Module, name: str, what: int, count: int, bits: int) -> tuple[Array, Array]:
+        """What commands set, and whether it is not 0."""
+        values = [Signal(bits, name=f"{name}_{index}") for index in range(count)]
+        given = [Signal(name=f"{name}_{index}_given") for index in range(count)]
+        index, number = self.value[:INDEX_BITS], self.value[INDEX_BITS:]
+        scaled = Value.cast(number << number_shift(bits))[:bits]
+        assert len(number) == NUMBER_BITS
+        for place in range(count):
+            with m.If(self.command & (self.what == what) & (index == place)):
+                m.d.sync += [values[place].eq(scaled), given[place].eq(number != 0)]
+        return Array(values), Array(given)
+
+
+class Sums(wiring.Component):
+    """One multiplier takes the sums in turn, a clock each, while their totals go round.
+
+    taken (in): high for a clock; then ``deviation`` is that of ``unit``, and stays for as many clocks as there are
+    sums. ``last``: of the sweep's last unit.
+    sum (out): whose ``threshold`` and ``watched`` (in) are wanted in this clock.
+    over (out): a bit for each sum, three clocks after its turn in the last unit's.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        units = Derived(skin).units
+        self._bits, self._total = units.converter.bits, signed(units.sum_bits + 1)
+        super().__init__(
+            {
+                "taken": In(1),
+                "deviation": In(signed(self._bits + 1)),
+                "unit": In(INDEX_BITS),
+                "last": In(1),
+                "sum": Out(2),
+                "threshold": In(units.sum_bits),
+                "watched": In(1),
+                "over": Out(len(skin.unit_sums)),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        rows = self.skin.unit_sums
+        count = len(rows)
+        turn, busy = Signal(2), Signal()
+        multiplies, adds, compares = Signal(), Signal(), Signal()
+        ongoing = multiplies & (turn != count - 1)
+        m.d.comb += multiplies.eq(self.taken | busy)
+        m.d.sync += [busy.eq(ongoing), turn.eq(Mux(ongoing, turn + 1, 0)), adds.eq(multiplies)]
+        table = [[Const(rows[index][unit], signed(8)) for unit in range(self.skin.units)] for index in range(count)]
+        assert MAX_WEIGHT < 128
+        weight = Signal(signed(8))
+        m.d.comb += weight.eq(Array([Array(row)[self.unit] for row in table])[turn])
+        product = Signal(signed(self._bits + 9))
+        first, last = Signal(), Signal()
+        m.d.sync += [product.eq(self.deviation * weight), first.eq(self.unit == 0), last.eq(self.last)]
+        totals = [Signal(self._total, name=f"total_{index}") for index in range(count)]
+        added = Signal(self._total)
+        m.d.comb += added.eq(Mux(first, 0, totals[0]) + product)
+        with m.If(adds):  # they go round, so that the next one is in front
+            m.d.sync += [total.eq(after) for total, after in zip(totals, [*totals[1:], added], strict=True)]
+        # High for as many clocks in a row as there are sums.
+        m.d.sync += [compares.eq(adds & last), self.sum.eq(Mux(compares, self.sum + 1, 0))]
+        total = totals[-1]
+        amount = Mux(total < 0, -total, total)
+        with m.If(compares):
+            reached = self.watched & (amount.as_unsigned() >= self.threshold)
+            m.d.sync += self.over.bit_select(self.sum, 1).eq(reached)
         return m

@@ -19,7 +19,7 @@ Clocks = Callable[["Derived"], int]
 class Labeller(Choice):
     """Rows in, zone records out.
 
-    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.label.ports.labeller_ports`. ``golden`` is a
+    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.payloads.labeller_ports`. ``golden`` is a
     :class:`contactfpga_sim.model.golden.work.LabellerRule`.
     """
 

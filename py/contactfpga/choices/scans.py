@@ -23,7 +23,7 @@ Count = Callable[["Derived"], int]
 class Scan(Choice):
     """Drives rows, samples columns.
 
-    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.scan.ports.scan_ports`, and one that is not
+    ``gateware`` is a component with the ports of :func:`contactfpga_hdl.scan.pins.scan_ports`, and one that is not
     ``even`` also with those of :class:`contactfpga_hdl.scan.adaptive.AdaptiveScanner`. ``golden`` is a
     :class:`contactfpga_sim.model.golden.scan.ScanRule`.
     """
@@ -39,7 +39,7 @@ class Scan(Choice):
     guards: bool = False
     """It looks at the guard lines of a Skin with ``guard``, and has the port ``faults``."""
     moves_sample: bool = False
-    """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.sample_at.sample_at_ports`."""
+    """It obeys the command "sample at", with the ports of :func:`contactfpga_hdl.scan.pins.sample_at_ports`."""
     check: Callable[[Skin], None]
     """Raises SkinError where the scan cannot serve a Skin; called before anything is derived from it."""
     choice_clocks: Callable[[RowTimes], int]

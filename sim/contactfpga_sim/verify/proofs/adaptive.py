@@ -4,7 +4,7 @@ from amaranth.hdl import Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.adaptive import AdaptiveScanner
-from contactfpga_hdl.util.popcount import popcount
+from contactfpga_hdl.util.bits import popcount
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside

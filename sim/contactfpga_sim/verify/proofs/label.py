@@ -6,10 +6,8 @@ from amaranth.hdl import Array, Const, Mux, Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.label.join import Join
-from contactfpga_hdl.label.run import RunLabeller
-from contactfpga_hdl.label.steps import place_of, waiting
-from contactfpga_hdl.label.sum import Sum
-from contactfpga_hdl.label.walk import Walk
+from contactfpga_hdl.label.run import RunLabeller, Sum
+from contactfpga_hdl.label.steps import Walk, place_of, waiting
 from contactfpga_hdl.util.stack import Stack
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case

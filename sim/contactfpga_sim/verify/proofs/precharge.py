@@ -7,9 +7,10 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import released_levels
-from contactfpga_hdl.scan.precharge import LOOKS, RETRY_BIT, Precharge
+from contactfpga_hdl.scan.precharge import LOOKS, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.stuck import RETRY_BIT
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside

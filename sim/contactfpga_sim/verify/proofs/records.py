@@ -5,11 +5,10 @@ from functools import partial
 from amaranth.hdl import Cat, Const, Mux, Signal
 
 from contactfpga.skin.derived import Derived
+from contactfpga_hdl.label.around import Unwrap
 from contactfpga_hdl.label.join import Join
 from contactfpga_hdl.label.run import RunLabeller
-from contactfpga_hdl.label.steps import place_of
-from contactfpga_hdl.label.unwrap import Unwrap
-from contactfpga_hdl.label.walk import Walk
+from contactfpga_hdl.label.steps import Walk, place_of
 from contactfpga_hdl.payloads import zone_layout
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case

@@ -6,7 +6,7 @@ from typing import Any
 from amaranth.hdl import Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_hdl.util.popcount import popcount
+from contactfpga_hdl.util.bits import popcount
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside

@@ -6,7 +6,7 @@ from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga.skin import Skin
 from contactfpga_hdl.scan.seek import Seek
-from contactfpga_hdl.util.popcount import popcount
+from contactfpga_hdl.util.bits import popcount
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside

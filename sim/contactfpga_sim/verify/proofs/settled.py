@@ -3,7 +3,7 @@
 from amaranth.hdl import Value
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.scan.sample_at import moves_sample
+from contactfpga_hdl.scan.pins import moves_sample
 from contactfpga_sim.verify.proofs.inside import Inside
 from contactfpga_sim.verify.proofs.proof import Proof
 

@@ -7,8 +7,9 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 from contactfpga.choices.debounces import DebounceName
 from contactfpga.skin import Skin
 from contactfpga_hdl.debounce.even import Debounce
-from contactfpga_hdl.report.audit import Audit, Bitmap
-from contactfpga_hdl.util.queue import Queue
+from contactfpga_hdl.report.audit import Audit
+from contactfpga_hdl.report.backlog import Queue
+from contactfpga_hdl.report.bitmap import Bitmap
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof

@@ -11,7 +11,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 from amaranth.lib import data
 
 from contactfpga.skin.derived import Derived
-from contactfpga_hdl.label.unwrap import kept_layout
+from contactfpga_hdl.label.around import kept_layout
 from contactfpga_sim.verify.proofs.proof import Proof
 from contactfpga_sim.verify.proofs.zones import OpenRow, RowStep, columns_apart, moments_of, spread
 

@@ -9,7 +9,7 @@ from contactfpga.skin import Skin
 from contactfpga.wire import protocol
 from contactfpga.wire.numbered import Place
 from contactfpga_hdl.link.link import Link
-from contactfpga_hdl.link.turns import Turns
+from contactfpga_hdl.several import Turns
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof

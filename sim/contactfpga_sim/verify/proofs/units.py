@@ -7,8 +7,7 @@ from amaranth.hdl import Array, Cat, Const, Mux, Signal, Value
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.units.mcp3208 import Mcp3208
-from contactfpga_hdl.units.settings import Settings
-from contactfpga_hdl.units.watch import Watch
+from contactfpga_hdl.units.watch import Settings, Watch
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof
