@@ -8,8 +8,9 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.stats import NetCounters
 from contactfpga.robot.net.address import LOOPBACK, is_loopback, key_of, own_endpoint, parse
-from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Counters, Message, Stream
+from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Message, Stream
 from contactfpga.wire.asked import Asked, asked_in
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request
@@ -34,7 +35,7 @@ class Receiver:
     """What a ``zenoh://`` port and the driver make of messages."""
 
     def __init__(self):
-        self.counters = Counters()
+        self.counters = NetCounters()
         self.stream = Stream(self.counters)
         self.host = Conversation("x")
         self.frames = []
@@ -122,7 +123,7 @@ class Stranger:
 def test_after_any_forged_message_a_reader_goes_on_within_a_second(seed):
     """At any place, the beginning included, between messages that are 10 ms or a beat apart and may get lost."""
     rng = random.Random(seed)
-    sender, counters, now_s = Sender(rng), Counters(), 1000.0
+    sender, counters, now_s = Sender(rng), NetCounters(), 1000.0
     stream, step_s, losing = Stream(counters), rng.choice([0.01, BEAT_S]), rng.choice([0.0, 0.0, 0.3])
     forged_at, found, sent = rng.choice([0, 1, 2, rng.randrange(3, 20)]), b"", {}
     read = sender.send(b"-first-", now_s)
@@ -151,7 +152,7 @@ def test_after_any_forged_message_a_reader_goes_on_within_a_second(seed):
 
 def test_a_stream_of_forged_messages_that_no_publisher_bears_out_is_refused():
     """As long as the publisher is heard, whatever others send is none of its own."""
-    rng, counters, now_s = random.Random(1), Counters(), 0.0
+    rng, counters, now_s = random.Random(1), NetCounters(), 0.0
     sender, stream, other = Sender(rng), Stream(counters), Sender(rng)
     found = b"".join(piece for _ in range(2) for piece, _ in stream.take(sender.send(b"!", now_s), now_s))
     sent, strangers = b"!!", 0
@@ -169,7 +170,7 @@ def test_a_stream_of_forged_messages_that_no_publisher_bears_out_is_refused():
 
 
 def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
-    rng, counters = random.Random(1), Counters()
+    rng, counters = random.Random(1), NetCounters()
     sender, stream = Sender(rng), Stream(counters)
     assert stream.take(sender.send(b"abc", 0.0), 0.0) == [], "the first one, until another bears it out"
     assert stream.take(sender.send(b"def", 0.1), 0.1) == [(b"abc", False), (b"def", False)]
@@ -183,7 +184,7 @@ def test_a_hole_is_counted_in_messages_and_bytes_and_makes_no_packet_of_two():
 
 
 def test_two_messages_in_the_wrong_order_leave_no_hole():
-    sender, counters = Sender(random.Random(1)), Counters()
+    sender, counters = Sender(random.Random(1)), NetCounters()
     stream = Stream(counters)
     messages = [sender.send(b"%d" % number, 0.0) for number in range(4)]
     found = [stream.take(messages[number], 0.0) for number in (0, 1, 3, 2)]
@@ -194,7 +195,7 @@ def test_two_messages_in_the_wrong_order_leave_no_hole():
 @pytest.mark.parametrize("step_s", [-0.001, -3600.0, 2.1, 3600.0])
 def test_a_step_of_the_publishers_clock_is_a_break(step_s):
     """Or its process stood still, and its port ran over meanwhile: the same from here."""
-    counters, sender = Counters(), Sender(random.Random(1))
+    counters, sender = NetCounters(), Sender(random.Random(1))
     stream = Stream(counters)
     stream.take(sender.send(b"", 1000.0), 0.0)
     stream.take(sender.send(b"a", 1000.0), 0.0)
@@ -204,7 +205,7 @@ def test_a_step_of_the_publishers_clock_is_a_break(step_s):
 
 
 def test_what_is_no_message_is_refused_and_counted():
-    counters, sender = Counters(), Sender(random.Random(1))
+    counters, sender = NetCounters(), Sender(random.Random(1))
     stream = Stream(counters)
     whole = sender.send(b"x", 0.0)
     for bad in (b"", b"cfp1", b"zzzz" + whole[4:], whole + bytes(MOST_BYTES), b"\x80\x04pickled"):

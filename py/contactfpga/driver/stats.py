@@ -6,7 +6,30 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable
 
-from contactfpga.robot.net.message import Counters
+
+@dataclasses.dataclass
+class NetCounters:
+    """What happened between a publisher and a ``zenoh://`` port."""
+
+    messages: int = 0
+    """Messages received."""
+    lost_messages: int = 0
+    """Messages that did not come: dropped by choice where the network was too slow, or while it was broken."""
+    lost_bytes: int = 0
+    """Bytes of the board in them."""
+    refused: int = 0
+    """Messages that were dropped: malformed, duplicate, late, from a second publisher of the key, or followed by no
+    later message."""
+    publishers: int = 0
+    """Publishers that were heard: 1, and one more for each restart."""
+    breaks: int = 0
+    """Holes after which times are not known before the next hello."""
+    passed_breaks: int = 0
+    """Those of them that were read, or left out, up to now."""
+    left_out: int = 0
+    """Bytes that this program did not take in time."""
+    denied: int = 0
+    """Messages to the board, of all programs, that the publisher did not pass on."""
 
 
 @dataclasses.dataclass
@@ -56,7 +79,7 @@ class Stats:
     bytes: int = 0
     """All bytes received."""
 
-    net: Counters | None = None
+    net: NetCounters | None = None
     """What happened on the network, for a ``zenoh://`` port; None for any other port."""
 
     def to_dict(self) -> dict[str, object]:
@@ -73,7 +96,14 @@ def total(every: Iterable[Stats]) -> Stats:
             if field.name != "net":
                 setattr(found, field.name, getattr(found, field.name) + getattr(one, field.name))
         if one.net is not None:
-            before = found.net or Counters()
-            names = [field.name for field in dataclasses.fields(Counters)]
-            found.net = Counters(**{name: getattr(before, name) + getattr(one.net, name) for name in names})
+            before = found.net or NetCounters()
+            names = [field.name for field in dataclasses.fields(NetCounters)]
+            found.net = NetCounters(**{name: getattr(before, name) + getattr(one.net, name) for name in names})
     return found
+
+
+def refused(counters: NetCounters) -> str:
+    """For an error message: what else was sent under the key, if anything was."""
+    if not counters.refused:
+        return ""
+    return f" (messages under its key that it did not send: {counters.refused}; docs/net.md says who can send there)"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from contactfpga.driver.conversation import Conversation
+from contactfpga.driver.stats import NetCounters, refused
 from contactfpga.errors import BoardSilent, OnlyNoise, ReadTimeout
-from contactfpga.robot.net.message import Counters, refused
 
 
-def timed_out(name: str, timeout: float, said: Conversation, start: int, net: Counters | None) -> ReadTimeout:
+def timed_out(name: str, timeout: float, said: Conversation, start: int, net: NetCounters | None) -> ReadTimeout:
     """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
     ``net``: what is counted about the network; None: there is none."""
     stats = said.stats

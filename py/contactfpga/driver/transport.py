@@ -7,19 +7,22 @@ import os
 import shlex
 import time
 import weakref
-from typing import Protocol
+from importlib import import_module
+from typing import Any, Protocol
 
-from contactfpga.design.circuit import Circuit, load_checked
-from contactfpga.design.cover import Cover, load_cover
-from contactfpga.driver import forks, recording, sheets, sim_address
-from contactfpga.driver.replay import ReplayTransport
+from contactfpga.driver import forks, recording, sheets
+from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
-from contactfpga.robot.net.address import SCHEME
-from contactfpga.robot.net.message import Counters
-from contactfpga.robot.net.port import ZenohPort
 from contactfpga.skin import Skin
-from contactfpga.skin.several import Several
+
+SCHEMES = {
+    "sim": "contactfpga_sim.model.board.virtual:board_at",
+    "replay": "contactfpga.driver.replay:ReplayTransport",
+    "zenoh": "contactfpga.robot.net.port:ZenohPort",
+}
+"""What opens the addresses of a scheme, loaded when it is used first: a function of the address, "module:attribute".
+It returns a :class:`Transport`; ``sim`` a :class:`SimulatedPort`."""
 
 CHUNK = 65_536
 """Most bytes one read returns."""
@@ -154,11 +157,6 @@ class SimTransport:
         if _SIMULATED.setdefault(id(board), self) is not self:
             raise PortBusy(f"{name} is in use: this program opened it already; close that first")
 
-    @classmethod
-    def named(cls, name: str) -> SimTransport:
-        """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE``"""
-        return cls(name, virtual_board(name))
-
     def read(self, timeout_s: float) -> bytes:
         # Not less than a clock: time that rounds to none would not pass, and the deadline never come.
         return bytes(self._board.read(max(timeout_s, 1e-6) if timeout_s > 0 else 0.0))
@@ -204,10 +202,10 @@ class RecordingTransport:
             self._transport.close()
 
 
-def counters_of(transport: Transport) -> Counters | None:
-    """What a network between counts; None: there is none."""
+def counters_of(transport: Transport) -> NetCounters | None:
+    """The counters of the network between host and board; None if there is no network."""
     inner = transport._transport if isinstance(transport, RecordingTransport) else transport
-    return inner.counters if isinstance(inner, ZenohPort) else None
+    return getattr(inner, "counters", None)
 
 
 def connect(name: str | SimulatedPort, baud: int) -> Transport:
@@ -219,14 +217,29 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
     if (sheet := sheets.split(name)) is not None:
         return sheets.share(*sheet, baud, connect)
     if name.startswith("sim:"):
-        return SimTransport.named(name)
-    if name.startswith("replay:"):
-        return ReplayTransport(name)
-    if name.startswith(SCHEME):
-        return ZenohPort(name)
+        return SimTransport(name, virtual_board(name))
+    for scheme in ("replay:", "zenoh://"):
+        if name.startswith(scheme):
+            transport: Transport = _opener(scheme.partition(":")[0])(name)
+            return transport
     if (reason := _no_port(name)) is not None:
         raise PortNotFound(reason)
     return SerialTransport(name, baud)
+
+
+def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
+    ``skin``: where it names no file."""
+    board: SimulatedPort = _opener("sim")(name, skin)
+    return board
+
+
+def _opener(scheme: str) -> Any:
+    module, _, attribute = SCHEMES[scheme].partition(":")
+    try:
+        return getattr(import_module(module), attribute)
+    except ModuleNotFoundError as error:
+        raise MissingExtra(f"{scheme}:// ({error})", scheme) from None
 
 
 def _no_port(name: str) -> str | None:
@@ -241,43 +254,6 @@ def _no_port(name: str) -> str | None:
     if name.endswith(".toml"):
         return f"{name} is a file; for the boards of a robot there is: contactfpga body {shlex.quote(name)}"
     return f"{name} is a file; to play a recording name {shlex.quote(f'replay://{name}')} as the port"
-
-
-def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
-    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for;
-    ``skin``: where it names no file."""
-    asked = sim_address.parse(name)
-    cover, circuit = None, None
-    several = Several.load(asked.sheets) if asked.sheets is not None else None
-    if asked.skin is not None:
-        skin = Skin.load(asked.skin)
-        cover, circuit = load_cover(asked.skin), load_checked(asked.skin, skin)
-    try:
-        return _virtual_board(asked, skin, cover, circuit) if several is None else _virtual_sheets(asked, several)
-    except ModuleNotFoundError as error:
-        raise MissingExtra(f"sim:// ({error})", "sim") from None
-    except ValueError as error:  # a scene that is not known, or that does not fit the sheet
-        raise PortNotFound(f"{name}: {error}") from None
-
-
-def _virtual_board(
-    asked: sim_address.SimAddress, skin: Skin | None, cover: Cover | None, circuit: Circuit | None
-) -> SimulatedPort:
-    """The one place at which the host loads the simulation, which need not be installed."""
-    from contactfpga_sim.model.board import virtual
-
-    units = None
-    if asked.units is not None:
-        from contactfpga.robot.haptics import LoadCells  # which most boards have no use for
-
-        units = LoadCells.load(asked.units)
-    return virtual.board_for(asked.scene, skin, asked.threshold, cover, circuit, units)
-
-
-def _virtual_sheets(asked: sim_address.SimAddress, several: Several) -> SimulatedPort:
-    from contactfpga_sim.model.board import virtual
-
-    return virtual.sheets_for(several, asked.scene)
 
 
 def _reason(error: Exception) -> str:

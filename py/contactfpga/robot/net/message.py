@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import struct
 
+from contactfpga.driver.stats import NetCounters
+
 _HEAD = struct.Struct("<4sQQQqI")
 _NAME, VERSION = b"cfp", b"1"
 _MAGIC = _NAME + VERSION
@@ -64,41 +66,9 @@ class Message:
         )
 
 
-@dataclasses.dataclass
-class Counters:
-    """What happened between a publisher and a ``zenoh://`` port."""
-
-    messages: int = 0
-    """Messages received."""
-    lost_messages: int = 0
-    """Messages that did not come: dropped by choice where the network was too slow, or while it was broken."""
-    lost_bytes: int = 0
-    """Bytes of the board in them."""
-    refused: int = 0
-    """Messages that were dropped: malformed, duplicate, late, from a second publisher of the key, or followed by no
-    later message."""
-    publishers: int = 0
-    """Publishers that were heard: 1, and one more for each restart."""
-    breaks: int = 0
-    """Holes after which times are not known before the next hello."""
-    passed_breaks: int = 0
-    """Those of them that were read, or left out, up to now."""
-    left_out: int = 0
-    """Bytes that this program did not take in time."""
-    denied: int = 0
-    """Messages to the board, of all programs, that the publisher did not pass on."""
-
-
 def token(publisher: int) -> str:
     """How a publisher's number reads in the key of its token of liveliness."""
     return f"{publisher:016x}"
-
-
-def refused(counters: Counters) -> str:
-    """For an error message: what else was sent under the key, if anything was."""
-    if not counters.refused:
-        return ""
-    return f" (messages under its key that it did not send: {counters.refused}; docs/net.md says who can send there)"
 
 
 class Stream:
@@ -110,7 +80,7 @@ class Stream:
     after it for at most :data:`QUIET_S` and two beats.
     """
 
-    def __init__(self, counters: Counters):
+    def __init__(self, counters: NetCounters):
         self.heard_s: float | None = None
         """When a message came that its publisher can have sent now."""
         self.ended = False

@@ -10,8 +10,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
+from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import ContactFPGAError
-from contactfpga.robot.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Counters, Message, Stream, token
+from contactfpga.robot.net.message import BEAT_S, MOST_ASKED, MOST_BYTES, Message, Stream, token
 from contactfpga.robot.net.session import LEASE_MS
 from contactfpga.wire.asked import Asked, asked_in
 
@@ -135,7 +136,7 @@ def _check_alone(session: zenoh.Session, key: str) -> None:
     anyone can declare one."""
     if not list(session.liveliness().get(f"{key}/alive/*", timeout=LEASE_MS / 1000)):
         return
-    counters, heard = Counters(), threading.Event()
+    counters, heard = NetCounters(), threading.Event()
     stream = Stream(counters)
 
     def take(sample: zenoh.Sample) -> None:

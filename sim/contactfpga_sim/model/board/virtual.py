@@ -8,8 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from contactfpga.choices import converters
-from contactfpga.design.circuit import Circuit
-from contactfpga.design.cover import Cover
+from contactfpga.design.circuit import Circuit, load_checked
+from contactfpga.design.cover import Cover, load_cover
+from contactfpga.driver import sim_address
+from contactfpga.errors import PortNotFound
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
@@ -147,23 +149,30 @@ class VirtualBoard:
         self.close()
 
 
-def board_for(
-    scene: str | None,
-    skin: Skin | None,
-    threshold: float | None,
-    cover: Cover | None,
-    circuit: Circuit | None = None,
-    units: LoadCells | None = None,
-) -> VirtualBoard:
-    """What ``sim://`` asks for; ``threshold``: above which the numbers of a recording count as pressed; ``units``: that
-    the scene presses on."""
+def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
+    """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for; ``skin``: where it names no
+    file. Raises :class:`~contactfpga.PortNotFound`, and as the files that it names do."""
+    address = sim_address.parse(name)
+    cover, circuit, units = None, None, None
+    several = Several.load(address.sheets) if address.sheets is not None else None
+    if address.skin is not None:
+        skin = Skin.load(address.skin)
+        cover, circuit = load_cover(address.skin), load_checked(address.skin, skin)
+    try:
+        if several is not None:
+            return VirtualSheets(several, [address.scene] * len(several.skins))
+        if address.units is not None:
+            units = LoadCells.load(address.units)
+        scene = _compared(address.scene, address.threshold)
+        return VirtualBoard(skin, scene, cover if address.threshold is None else None, circuit, units=units)
+    except ValueError as error:  # a scene that is not known, or that does not fit the sheet
+        raise PortNotFound(f"{name}: {error}") from None
+
+
+def _compared(scene: str | None, threshold: float | None) -> str | Recording | None:
+    """The scene; with a threshold the recording in its file, whose numbers above it count as pressed."""
     if threshold is None:
-        return VirtualBoard(skin, scene, cover, circuit, units=units)
+        return scene
     if scene is None or not scene.endswith((".npy", ".npz")):
         raise ValueError(f"threshold is {threshold:g}; only numbers of a .npy or .npz file are compared with it")
-    return VirtualBoard(skin, Recording.load(scene, threshold), circuit=circuit, units=units)
-
-
-def sheets_for(several: Several, scene: str | None) -> VirtualSheets:
-    """The same for ``sim://?sheets=FILE``; the scene touches each sheet."""
-    return VirtualSheets(several, [scene] * len(several.skins))
+    return Recording.load(scene, threshold)
