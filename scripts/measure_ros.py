@@ -25,7 +25,7 @@ from contactfpga.robot.ros.hashes import type_hash
 from contactfpga.robot.ros.markers import markers, outline
 from contactfpga.robot.ros.settings import TOPICS
 from contactfpga.tools.console import interrupt
-from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab import writer
 
 sys.path.append(str(ROOT / "tests" / "support"))
 

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import planted
 
-from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab import writer
 
 GATEWARE = planted.ROOT / "hdl" / planted.GATEWARE
 KEPT = planted.ROOT / "build" / "tested-mutants"

@@ -8,8 +8,8 @@ from contactfpga_hdl.board.sizes import DEVICES, SEEDS, Device, Netlists, Regist
 from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_hdl.board.tools import BitstreamFailed
 from contactfpga_sim.lab import size
-from contactfpga_sim.lab.pages.writer import table_of, update
 from contactfpga_sim.lab.size import DESIGNS, square
+from contactfpga_sim.lab.writer import table_of, update
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden import all_departures

@@ -16,7 +16,7 @@ from contactfpga.choices.choice import own_files
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import methods, numbers, picture
-from contactfpga_sim.lab.chart.study import Task, study
+from contactfpga_sim.lab.chart.compute import Task, study
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.verify.cosim import bench_amaranth, bench_native

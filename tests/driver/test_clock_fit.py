@@ -13,9 +13,7 @@ from contactfpga.driver.clock_fit import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run
-from contactfpga_sim.lab import clock
-from contactfpga_sim.lab.clock import PATHS, accuracy, followed, moments
-from contactfpga_sim.lab.pages import clock_page
+from contactfpga_sim.lab.clock.compute import PATHS, accuracy, compute, followed, moments, tables
 
 SKIN = contactfpga.Skin()
 QUIET = dataclasses.replace(PATHS["usb_125us"], rate_hz=200.0)
@@ -33,7 +31,7 @@ def test_the_fit_is_far_nearer_than_arrivals_and_states_its_uncertainty(name):
 def test_the_page_holds_what_a_run_shows():
     page = (Path(__file__).parents[2] / "docs/clock.md").read_text(encoding="utf-8")
     (row,) = [line for line in page.splitlines() if line.startswith(f"| {PATHS['slow'].title} |")]
-    assert row in clock_page.accuracy_table(("slow",))
+    assert row in tables.accuracy_table(("slow",))
 
 
 def test_no_sample_is_said_to_come_after_its_arrival():
@@ -200,8 +198,8 @@ def test_the_simulated_board_is_on_its_own_clock():
 
 def test_paths_are_worse_than_none_by_what_they_say():
     """The simulation itself: mean delays as their ticks and jitter have them."""
-    path = clock.Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
+    path = compute.Path("x", 1e-3, 1e-3, 1e-4, rate_hz=331.0)
     frames = list(moments(path, 0.0, 1, 10.0))
     mean = np.mean([moment.arrived_s - moment.sampled_s for moment in frames])
-    assert mean == pytest.approx(clock.SENT_S + 0.5e-3 + 1e-4, rel=0.1)
+    assert mean == pytest.approx(compute.SENT_S + 0.5e-3 + 1e-4, rel=0.1)
     assert USUAL_PPM < 200

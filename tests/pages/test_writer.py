@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from contactfpga.tools.console.outputs import OutputError
-from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab import writer
 
 PAGE = "a\n<!-- figures: one -->\nold\n<!-- end -->\nb\n<!-- figures: two -->\nkept\n<!-- end -->\n"
 
@@ -57,12 +57,20 @@ def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
     [
-        ("pages.figures", ["none.md"], "contactfpga: page is 'none.md'; there is no such page"),
-        ("pages.cover_page", ["none.md", "."], "contactfpga: page is 'none.md'; there is no such page"),
-        ("netlist.replay", ["icebreaker", "--skin", "none.toml"], "contactfpga: none.toml: No such file or directory"),
-        ("netlist.replay", ["icebreaker", "--skin", "bad.toml"], "contactfpga: bad.toml: rows is 0; it must lie"),
-        ("mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
-        ("board.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
+        ("lab.performance.scans", ["none.md"], "contactfpga: page is 'none.md'; there is no such page"),
+        ("lab.cover.tables", ["none.md", "."], "contactfpga: page is 'none.md'; there is no such page"),
+        (
+            "verify.netlist.replay",
+            ["icebreaker", "--skin", "none.toml"],
+            "contactfpga: none.toml: No such file or directory",
+        ),
+        (
+            "verify.netlist.replay",
+            ["icebreaker", "--skin", "bad.toml"],
+            "contactfpga: bad.toml: rows is 0; it must lie",
+        ),
+        ("verify.mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
+        ("model.board.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
     ],
 )
 def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):

@@ -15,11 +15,10 @@ import pytest
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.arm import latency_charts, sweep
+from contactfpga_sim.lab.arm import latency_charts, sweep, tables
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import Task
-from contactfpga_sim.lab.pages import arm_page
 
 PAPER = Case.load("paper")
 PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
@@ -123,7 +122,7 @@ def test_the_page_and_its_pictures_are_what_the_command_writes(tmp_path, monkeyp
         re.sub(r"(<!-- figures: \w+ -->).*?(<!-- end -->)", r"\1\n\2", PAGE, flags=re.DOTALL), encoding="utf-8"
     )
     monkeypatch.setattr(sys, "argv", ["study", str(page), str(tmp_path)])
-    assert arm_page.main() == 0
+    assert tables.main() == 0
     assert page.read_text(encoding="utf-8") == PAGE
     drawn = sorted(tmp_path.glob("*.svg"))
     assert len(drawn) == 5

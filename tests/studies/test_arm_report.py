@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from contactfpga.tools import cli
-from contactfpga_sim.lab.arm import comply, report
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.arm import comply, report, tables
 from contactfpga_sim.lab.arm.case import Case, CaseError, names
 from contactfpga_sim.lab.arm.run import run
-from contactfpga_sim.lab.pages import arm_page, writer
 
 PAPER = Case.load("paper")
 PUSH = Case.load("push")
@@ -183,7 +183,7 @@ PAGE = (Path(__file__).parents[2] / "docs/arm.md").read_text(encoding="utf-8")
 
 
 def test_the_pages_set_is_what_the_command_gives(found):
-    assert writer.update(PAGE, {"set": lambda: arm_page.set_table(found)}) == PAGE
+    assert writer.update(PAGE, {"set": lambda: tables.set_table(found)}) == PAGE
 
 
 def test_the_page_has_a_section_for_every_table():

@@ -16,12 +16,22 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
 from contactfpga.wire import protocol
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.chart import errors, front_picture, host, numbers, picture, speed, steady, study
+from contactfpga_sim.lab import kept, writer
+from contactfpga_sim.lab.chart import (
+    compute,
+    errors,
+    front_picture,
+    host,
+    numbers,
+    page_pictures,
+    picture,
+    speed,
+    steady,
+    tables,
+)
+from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
 from contactfpga_sim.lab.chart.errors import Blob, Interval
 from contactfpga_sim.lab.chart.methods import EXTENT_MM, METHODS
-from contactfpga_sim.lab.chart.study import FAMILIES_DRAWN, Task
-from contactfpga_sim.lab.pages import chart_page, chart_pictures, writer
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import predict, zones
 from contactfpga_sim.model.scenes.scene import edge, fingertip, palm, two_fingers
@@ -91,7 +101,7 @@ def test_the_interval_of_a_mean_holds_it_95_times_of_100():
 def test_the_front_holds_what_nothing_else_beats():
     rng = np.random.default_rng(2)
     points = [tuple(map(float, rng.integers(0, 12, 2))) for _ in range(60)] + [(math.nan, 0.0)]
-    best = [points[index] for index in study.front(points)]
+    best = [points[index] for index in compute.front(points)]
     for x, y in points[:-1]:
         beaten = any(u <= x and v <= y and (u, v) != (x, y) for u, v in points[:-1])
         assert ((x, y) in best) == (not beaten)
@@ -165,14 +175,14 @@ def test_the_host_finds_the_zones_that_the_board_finds():
 
 def test_the_host_takes_time_for_cells_only():
     with ThreadPoolExecutor(1) as pool:
-        run, cells = study.study([task(), task("cells, 20 mm")], pool, with_size=False)
+        run, cells = compute.study([task(), task("cells, 20 mm")], pool, with_size=False)
     assert host.timed(run).host_us == 0
     assert 1 < host.timed(cells).host_us < 1000
 
 
 def test_numbers_are_read_as_they_were_written(tmp_path):
     with ThreadPoolExecutor(1) as pool:
-        points = study.study([task(), task("cells, 20 mm", "palm")], pool, with_size=False)
+        points = compute.study([task(), task("cells, 20 mm", "palm")], pool, with_size=False)
     numbers.write(points, tmp_path / "one.csv")
     back = numbers.read(tmp_path / "one.csv")
     numbers.write(back, tmp_path / "two.csv")
@@ -185,7 +195,7 @@ def test_numbers_are_read_as_they_were_written(tmp_path):
 
 def test_exact_labellers_add_no_error_and_the_others_do():
     names = [f"{labeller}, 10 mm" for labeller in ("run", "serial", "cells", "projection", "single")]
-    found = {name: study.accuracy(task(name, "fingers", 60), 0) for name in names}
+    found = {name: compute.accuracy(task(name, "fingers", 60), 0) for name in names}
     wrong = {name: sum(kinds["labeller"]["miscounted"]) for name, kinds in found.items()}
     assert wrong["run, 10 mm"] == wrong["serial, 10 mm"] == wrong["cells, 10 mm"] == 0
     assert 0 < wrong["projection, 10 mm"] < wrong["single, 10 mm"]
@@ -199,23 +209,23 @@ def test_every_executor_gives_the_same_points(monkeypatch, tmp_path):
     distributed = pytest.importorskip("distributed")
     tasks = [task(checked=1), task("single, 20 mm", "bumper", 130)]
     with ThreadPoolExecutor(2) as pool:
-        points = study.study(tasks, pool, with_size=False)
+        points = compute.study(tasks, pool, with_size=False)
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path / "others")
     with (
         distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        assert study.study(tasks, client.get_executor(), with_size=False) == points
+        assert compute.study(tasks, client.get_executor(), with_size=False) == points
 
 
 def test_what_was_worked_out_is_kept_and_other_code_works_it_out_anew(monkeypatch):
     calls = []
-    monkeypatch.setattr(study, "_scene_errors", lambda *args: calls.append(1) or (errors.Errors(False, 0, 0, 0),) * 3)
-    study.accuracy(task(), 0)
-    study.accuracy(task(), 0)
+    monkeypatch.setattr(compute, "_scene_errors", lambda *args: calls.append(1) or (errors.Errors(False, 0, 0, 0),) * 3)
+    compute.accuracy(task(), 0)
+    compute.accuracy(task(), 0)
     assert len(calls) == 20
     monkeypatch.setattr(kept.sources, "digest", lambda *_: "other code")
-    study.accuracy(task(), 0)
+    compute.accuracy(task(), 0)
     assert len(calls) == 40
 
 
@@ -252,21 +262,21 @@ def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
 def test_the_page_shows_what_its_numbers_say(tmp_path, monkeypatch):
     """Pictures and table of docs/chart.md and README.md come from docs/chart/chart.csv."""
     monkeypatch.chdir(ROOT)
-    points = numbers.read(chart_page.NUMBERS)
+    points = numbers.read(tables.NUMBERS)
     assert {point.task.method for point in points} == set(METHODS)
     assert {point.task.family for point in points} == set(FAMILIES_DRAWN)
     assert min(point.task.count for point in points) >= 1000
     picture.save(points, tmp_path)
     assert (tmp_path / "chart.svg").read_text() == (ROOT / "docs/chart/chart.svg").read_text()
     front_picture.save(points, tmp_path / "front.svg")
-    assert (tmp_path / "front.svg").read_text() == (ROOT / chart_pictures.FRONT).read_text()
+    assert (tmp_path / "front.svg").read_text() == (ROOT / page_pictures.FRONT).read_text()
     page = (ROOT / "docs/chart.md").read_text()
-    assert writer.update(page, {"front": chart_page.front_table}) == page
+    assert writer.update(page, {"front": tables.front_table}) == page
 
 
 def test_the_picture_of_the_front_names_it_and_what_it_is_compared_with(tmp_path):
-    points = [point for point in numbers.read(ROOT / chart_page.NUMBERS) if point.task.family == front_picture.FAMILY]
-    best = study.front([(picture.reached_us(one), one.errors["total"]["barycenter_mm"].mean) for one in points])
+    points = [point for point in numbers.read(ROOT / tables.NUMBERS) if point.task.family == front_picture.FAMILY]
+    best = compute.front([(picture.reached_us(one), one.errors["total"]["barycenter_mm"].mean) for one in points])
     host = {point.task.method for point in points if point.task.skin.report == "cells"}
     (panel,) = front_picture.picture(points).axes
     named = {text.get_text() for text in panel.texts}
@@ -277,7 +287,7 @@ def test_the_picture_of_the_front_names_it_and_what_it_is_compared_with(tmp_path
 
 
 def test_zero_has_a_place_of_its_own_on_the_axis_of_shares():
-    panels = picture.picture(numbers.read(ROOT / chart_page.NUMBERS)).axes
+    panels = picture.picture(numbers.read(ROOT / tables.NUMBERS)).axes
     for panel in panels[1::2]:
         zero, least, most = panel.transData.transform([(100, 0), (100, 0.01), (100, 1)])[:, 1]
         assert panel.bbox.y0 < zero < least - 5 < most < panel.bbox.y1
@@ -285,7 +295,7 @@ def test_zero_has_a_place_of_its_own_on_the_axis_of_shares():
 
 
 def test_no_point_lies_outside_its_panel():
-    points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
+    points = numbers.read(ROOT / tables.NUMBERS)[:24]
     far = dataclasses.replace(points[0].speed, median_us=9_000.0, worst_us=30_000.0)
     wrong = {
         kind: errors | {"barycenter_mm": Interval(170.0, 160.0, 180.0, 9)} for kind, errors in points[0].errors.items()
@@ -306,7 +316,7 @@ def test_no_point_lies_outside_its_panel():
 
 
 def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own():
-    points = numbers.read(ROOT / chart_page.NUMBERS)[:24]
+    points = numbers.read(ROOT / tables.NUMBERS)[:24]
     toy = Skin(pitch_x_mm=7.0, labeller="toy_labeller:TOY")
     points.append(dataclasses.replace(points[0], task=dataclasses.replace(points[0].task, method="toy", skin=toy)))
     before, found = picture.colors(points[:24]), picture.colors(points)
@@ -320,15 +330,15 @@ def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own()
 @pytest.mark.timeout(7200)
 def test_the_pages_numbers_are_found_again(tmp_path):
     assert cli.main(["chart", "--output", str(tmp_path)]) == 0
-    for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / chart_page.NUMBERS), strict=True):
+    for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / tables.NUMBERS), strict=True):
         assert dataclasses.replace(found, host_us=shown.host_us) == shown
 
 
 @pytest.mark.slow
 def test_zones_are_faster_from_the_board_until_there_are_many(monkeypatch):
-    monkeypatch.setattr(chart_page, "SHEETS", (16,))
-    monkeypatch.setattr(chart_page.host, "label_us", lambda frames, connectivity: 13.0)
-    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in chart_page.host_table().splitlines()[2:]}
+    monkeypatch.setattr(tables, "SHEETS", (16,))
+    monkeypatch.setattr(tables.host, "label_us", lambda frames, connectivity: 13.0)
+    faster = {int(line.split("|")[2]): line.split("|")[6].strip() for line in tables.host_table().splitlines()[2:]}
     # 4 bytes per zone against 32 bytes of cells; in 13 us the wire carries 4 bytes, and a tenth of a zone is left
     assert faster == {1: "board", 5: "board", 8: "board", 9: "host", 64: "host"}
 

@@ -16,11 +16,11 @@ from shadows import zones_by_image_tools
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
-from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, touch
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, tables, touch
 from contactfpga_sim.lab.failures.catalogue import STUDIES
 from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
 from contactfpga_sim.lab.failures.uart import Line
-from contactfpga_sim.lab.pages import failures_page, writer
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
 
@@ -205,7 +205,7 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
     text = PAGE.read_text()
-    assert writer.update(text, failures_page.tables(turned)) == text
+    assert writer.update(text, tables.tables(turned)) == text
     for name, methods in turned.items():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(STUDIES[name], methods) == drawn
@@ -406,7 +406,7 @@ def outcomes(*verdicts):
 )
 def test_lines_of_the_table(verdicts, expected):
     study = Study("x", "X", "x", "y", tuple(range(len(verdicts))), {}, "it helps")
-    (line,) = failures_page.rows(study, {"method": outcomes(*verdicts)})
+    (line,) = tables.rows(study, {"method": outcomes(*verdicts)})
     assert line.split(" | ")[1:-1] == ["method", *expected]
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
+from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
-from contactfpga_sim.lab.faults import start, study, trial
-from contactfpga_sim.lab.faults.catalogue import FAULTS
-from contactfpga_sim.lab.faults.hurt import Hurt
-from contactfpga_sim.lab.faults.study import Place
-from contactfpga_sim.lab.faults.trial import Told
-from contactfpga_sim.lab.pages import safety_page, writer
+from contactfpga_sim.lab.safety import compute, start, tables, trial
+from contactfpga_sim.lab.safety.catalogue import FAULTS
+from contactfpga_sim.lab.safety.compute import Place
+from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.lab.safety.trial import Told
 from contactfpga_sim.model.sheet import guards
 
 pytestmark = pytest.mark.timeout(1200)  # boards may have to be built
@@ -32,8 +32,8 @@ NEVER = {"closed switch", "dead switch", "shorted columns", "broken contact"}
 
 def one(skin, fault, number=-1):
     """A fault at its last place: a line at the far end."""
-    name, hurt = list(study.places(skin, fault))[number]
-    return study.at(skin, hurt, name)
+    name, hurt = list(compute.places(skin, fault))[number]
+    return compute.at(skin, hurt, name)
 
 
 @pytest.mark.parametrize("fault", sorted(GUARDED_TELLS))
@@ -61,7 +61,7 @@ def test_what_no_line_can_show_is_not_told(fault):
 
 
 def test_a_whole_sheet_is_right_and_tells_nothing():
-    place = study.at(GUARDED, Hurt())
+    place = compute.at(GUARDED, Hurt())
     assert not place.harmful
     assert [place.us(by) for by in ("flags", "deadline", "alive", "contact")] == [None] * 4
     assert place.wrong == 0
@@ -132,9 +132,9 @@ def test_coverage_counts_faults_that_are_told_at_every_place(monkeypatch):
         Place("here", dict.fromkeys(("rest", "finger", "all"), told(by))) for by in ({"flags": 100, "deadline": 90}, {})
     )
     halves = {"broken row": (tells, tells), "broken column": (tells, says_nothing)}
-    monkeypatch.setattr(study, "found", lambda skin, fault: halves.get(fault, (says_nothing,)))
+    monkeypatch.setattr(compute, "found", lambda skin, fault: halves.get(fault, (says_nothing,)))
     monkeypatch.setattr(start, "found", lambda fault: {})
-    lines = safety_page.coverage_table().splitlines()[2:]
+    lines = tables.coverage_table().splitlines()[2:]
     listed, places = len(FAULTS), len(FAULTS) + 2
     assert lines[0] == f"| none | 1 of {listed} | {100 / listed:.0f} % | 3 of {places} |"
 
@@ -146,15 +146,15 @@ def test_the_page_lists_every_fault_and_every_option():
         fault.title for fault in FAULTS.values()
     ]
     table = re.search(r"<!-- figures: coverage -->\n(.*?)<!-- end -->", text, re.DOTALL)[1]
-    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == list(safety_page.OPTIONS)
-    assert writer.update(text, {"times": safety_page.times_table}) == text
+    assert [line.split(" | ")[0].removeprefix("| ") for line in table.splitlines()[2:]] == list(tables.OPTIONS)
+    assert writer.update(text, {"times": tables.times_table}) == text
 
 
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_the_page_is_up_to_date():
     text = PAGE.read_text(encoding="utf-8")
-    assert writer.update(text, safety_page.TABLES) == text
+    assert writer.update(text, tables.TABLES) == text
 
 
 @pytest.mark.campaign

@@ -13,12 +13,12 @@ from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size
-from contactfpga_sim.lab.fit import cost, search
+from contactfpga_sim.lab import size, writer
+from contactfpga_sim.lab.fit import cost, search, tables
 from contactfpga_sim.lab.fit.goals import Goals
 from contactfpga_sim.lab.fit.sources import source
 from contactfpga_sim.lab.fit.trial import Task
-from contactfpga_sim.lab.pages import figures, fit_page, writer
+from contactfpga_sim.lab.performance import scans
 
 pytestmark = pytest.mark.usefixtures("alone")
 
@@ -118,10 +118,10 @@ def test_a_recording_of_few_frames_is_refused(tmp_path, capsys):
     assert "few.npy has 3 frames; two to choose with and two to report are the least" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", fit_page.EXAMPLES)
+@pytest.mark.parametrize("name", tables.EXAMPLES)
 def test_the_page_shows_what_the_examples_say(name):
-    command = f"contactfpga fit {fit_page.EXAMPLES[name]}"
-    assert command in (ROOT / fit_page.EXAMPLES[name].split()[0]).read_text()
+    command = f"contactfpga fit {tables.EXAMPLES[name]}"
+    assert command in (ROOT / tables.EXAMPLES[name].split()[0]).read_text()
     section = (
         (ROOT / "docs" / "fit.md").read_text().partition(f"<!-- figures: {name} -->")[2].partition("<!-- end -->")[0]
     )
@@ -132,7 +132,7 @@ def test_the_page_shows_what_the_examples_say(name):
 @pytest.mark.slow
 def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
     path = file(HANDS)
-    section = fit_page.section(f"{path} --pitch-mm 10 --scan raster")
+    section = tables.section(f"{path} --pitch-mm 10 --scan raster")
     lines = section.splitlines()
     assert lines[0] == f"    contactfpga fit {path} --pitch-mm 10 --scan raster"
     assert lines[2:4] == [
@@ -147,11 +147,11 @@ def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
 
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("name", fit_page.EXAMPLES)
+@pytest.mark.parametrize("name", tables.EXAMPLES)
 def test_the_page_is_up_to_date(name, monkeypatch):
     monkeypatch.undo()  # what was synthesized before is kept
     text = (ROOT / "docs" / "fit.md").read_text()
-    assert writer.update(text, {name: fit_page.TABLES[name]}) == text
+    assert writer.update(text, {name: tables.TABLES[name]}) == text
 
 
 @pytest.mark.campaign
@@ -170,7 +170,7 @@ def test_a_second_contact_in_the_bumpers_file_changes_the_answer(file, monkeypat
 @pytest.mark.slow
 @pytest.mark.recordings
 def test_real_contacts_need_an_exact_labeller(shortcuts):
-    path = figures.RECORDINGS / "dtmf16x16.dev.npz"
+    path = scans.RECORDINGS / "dtmf16x16.dev.npz"
     if not path.exists():
         pytest.skip("the recordings are not there")
     found = chosen(str(path), pitches=None, latency_us=None)

@@ -12,14 +12,14 @@ import pytest
 from contactfpga import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
+from contactfpga_sim.lab import kept, writer
 from contactfpga_sim.lab.flips import campaign, designs, flip, reference, summary, touches
+from contactfpga_sim.lab.flips import tables as flips_tables
 from contactfpga_sim.lab.flips.campaign import Row
 from contactfpga_sim.lab.flips.designs import DESIGNS
 from contactfpga_sim.lab.flips.flip import Flip, Found
 from contactfpga_sim.lab.flips.reference import Heard, Reference
 from contactfpga_sim.lab.flips.summary import Design
-from contactfpga_sim.lab.pages import flips_page, writer
 from contactfpga_sim.model.board import native, state
 from contactfpga_sim.model.board.state import Bit
 
@@ -321,7 +321,7 @@ def test_the_page_says_what_the_numbers_beside_it_say():
     page = Path("docs/flips.md").read_text(encoding="utf-8")
     rows, sizes = campaign.read(Path("docs/flips/flips.csv")), summary.read(Path("docs/flips/designs.csv"))
     assert [design.name for design in sizes] == list(DESIGNS)
-    assert writer.update(page, flips_page.tables(rows, sizes)) == page
+    assert writer.update(page, flips_tables.tables(rows, sizes)) == page
 
 
 def test_tables_count_what_came_out():
@@ -331,7 +331,7 @@ def test_tables_count_what_came_out():
         *3 * [Row("run", found._replace(outcome="masked", kind=""))],
         Row("run", found._replace(memory=True, outcome="told", kind="lost", name="link.store")),
     ]
-    tables = flips_page.tables(rows, [Design("run", 1700, 1000, 14000)])
+    tables = flips_tables.tables(rows, [Design("run", 1700, 1000, 14000)])
     worst = [
         "- Flips of registers with one copy: one of `scan.time` in `run` was silently wrong for 250.0 ms (time).",
         "1 of 4 were silently wrong (4.6 to 69.9 %), 1 of them for more than 5 ms (4.6 to 69.9 %).",

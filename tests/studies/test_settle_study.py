@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from contactfpga.design.circuit import Circuit
-from contactfpga_sim.lab.pages import settle_page, writer
-from contactfpga_sim.lab.settle import breaks, shorted
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.settle import breaks, shorted, tables
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
 
@@ -20,7 +20,7 @@ def section(name):
 
 def test_the_page_has_what_a_new_run_says():
     text = PAGE.read_text(encoding="utf-8")
-    assert writer.update(text, {"shorted": settle_page.shorted_table}) == text
+    assert writer.update(text, {"shorted": tables.shorted_table}) == text
 
 
 def test_the_comparison_on_the_page_is_wide_and_close():

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from sample import sample
 
-from contactfpga_sim.lab.pages import failures_page, tracking_page, writer
-from contactfpga_sim.lab.pages.figures import RECORDINGS
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.failures import tables as failures_tables
+from contactfpga_sim.lab.performance.scans import RECORDINGS
 from contactfpga_sim.lab.tracking import breaks, frames, judge, recorded, scenes, scores, speed
+from contactfpga_sim.lab.tracking import tables as tracking_tables
 from contactfpga_sim.lab.tracking.nearest import Nearest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,7 +105,7 @@ def test_a_row_of_the_scores_is_up_to_date():
 def test_all_scores_are_up_to_date():
     pytest.importorskip("motmetrics")
     text = PAGE.read_text(encoding="utf-8")
-    assert writer.update(text, {"scores": tracking_page.scores_table}) == text
+    assert writer.update(text, {"scores": tracking_tables.scores_table}) == text
 
 
 @pytest.mark.slow
@@ -111,7 +113,7 @@ def test_all_scores_are_up_to_date():
 def test_the_breaks_are_up_to_date(name):
     study = breaks.STUDIES[name]
     lines = PAGE.read_text(encoding="utf-8").splitlines()
-    for row in failures_page.rows(study, study.turn(), False):
+    for row in failures_tables.rows(study, study.turn(), False):
         assert row in lines
 
 

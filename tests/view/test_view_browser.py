@@ -7,7 +7,7 @@ pytest.importorskip("playwright")
 pytest.importorskip("amaranth")
 
 from contactfpga.tools.view import opening
-from contactfpga_sim.lab.pages import browser, view_page
+from contactfpga_sim.lab.view import browser, tables
 
 pytestmark = [
     pytest.mark.campaign,  # the browser draws with the processor
@@ -26,7 +26,7 @@ def seen():
 
 def test_a_click_becomes_a_zone_on_the_screen(seen):
     shown, visitor, requests = seen
-    for click in view_page.clicks(shown, visitor, 3):
+    for click in tables.clicks(shown, visitor, 3):
         assert click.released <= click.touched <= click.read <= click.queued <= click.drawn
         assert 0 < click.gateware_s < 0.01
         assert sum(click.parts_s.values()) == pytest.approx(2 * click.parts_s["all"])

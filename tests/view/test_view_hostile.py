@@ -14,7 +14,7 @@ from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.view import opening
 from contactfpga.tools.view.panel import as_markdown
-from contactfpga_sim.lab.pages import browser
+from contactfpga_sim.lab.view import browser
 
 SCRIPT = "parent.document.title = parent.hostile = 'ran'"
 HOSTILE = [

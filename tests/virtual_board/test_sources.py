@@ -135,7 +135,7 @@ def test_a_file_that_the_gateware_does_not_need_leaves_the_key(copy):
             "py/contactfpga/design/cover/hertz.py",
         ),
         *("py/contactfpga/tools/cli.py", "py/contactfpga/skin/latency.py", "py/contactfpga/zones/zone.py"),
-        *("sim/contactfpga_sim/model/golden/reversal.py", "sim/contactfpga_sim/lab/pages/writer.py"),
+        *("sim/contactfpga_sim/model/golden/reversal.py", "sim/contactfpga_sim/lab/writer.py"),
     ]
     now, changed = keys(copy, BOARD, [copy / name for name in others])
     assert [str(file) for file, key in changed.items() if key != now] == []
@@ -168,7 +168,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
         ),
         ("contactfpga_hdl.board.sizes", ["../../../hdl/contactfpga_hdl/board/" + name for name in SIZING]),
         (
-            "contactfpga_sim.lab.chart.study",
+            "contactfpga_sim.lab.chart.compute",
             [
                 "chart/errors.py",
                 "chart/speed.py",
@@ -176,7 +176,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
                 "../../../py/contactfpga/skin/row_times.py",
             ],
         ),
-        ("contactfpga_sim.lab.fit.measuring", ["fit/sources.py", "chart/study.py", "../model/scenes/shapes.py"]),
+        ("contactfpga_sim.lab.fit.measuring", ["fit/sources.py", "chart/compute.py", "../model/scenes/shapes.py"]),
         ("contactfpga_sim.lab.arm.sweep", ["arm/plant.py", "arm/cases/push.toml", "../model/board/compiled.py"]),
         (
             "contactfpga_sim.verify.mutants.campaign",
@@ -187,7 +187,7 @@ def test_what_a_library_is_compiled_from_changes_its_key(copy):
 def test_what_a_kept_result_is_worked_out_by_changes_its_key(copy, module, files):
     key = f"__import__('contactfpga_sim.lab.kept', fromlist=['']).made_by({module!r})"
     paths = [(copy / "sim/contactfpga_sim/lab" / name).resolve() for name in files]
-    page = copy / "sim/contactfpga_sim/lab/pages/flips_page.py"
+    page = copy / "sim/contactfpga_sim/lab/flips/tables.py"
     now, changed = keys(copy, key, [*paths, page])
     assert [file for file, key in changed.items() if key == now] == [page]
 

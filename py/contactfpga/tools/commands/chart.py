@@ -12,7 +12,7 @@ from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.interrupt import Interrupted
 
 if TYPE_CHECKING:
-    from contactfpga_sim.lab.chart.study import Point, Task
+    from contactfpga_sim.lab.chart.compute import Point, Task
 
 HELP = "Chart what speed costs in accuracy."
 EXTRA = "chart"
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.chart import host, picture
     from contactfpga_sim.lab.chart import numbers as table
-    from contactfpga_sim.lab.chart.study import study
+    from contactfpga_sim.lab.chart.compute import study
 
     tasks = _tasks(args)
     folder = outputs.folder(args.output)
@@ -57,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tasks(args: argparse.Namespace) -> list[Task]:
+    from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Task
     from contactfpga_sim.lab.chart.methods import METHODS
-    from contactfpga_sim.lab.chart.study import FAMILIES_DRAWN, Task
     from contactfpga_sim.model.scenes.families import FAMILIES
 
     skins = METHODS | _own(args)

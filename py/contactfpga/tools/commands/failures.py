@@ -28,8 +28,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from contactfpga_sim.lab import writer
+    from contactfpga_sim.lab.failures import tables as failures_tables
     from contactfpga_sim.lab.failures.catalogue import STUDIES
-    from contactfpga_sim.lab.pages import failures_page, writer
 
     names = flags.known("--study", args.study, list(STUDIES))
     if args.page and args.study:
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         raise Interrupted(_kept(turned, folder)) from None
     if path:
-        writer.write(path, failures_page.tables(turned))
+        writer.write(path, failures_tables.tables(turned))
     else:
         path = _write(turned, folder / "failures.md")
     print(path, flush=True)
@@ -52,9 +53,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(turned: Mapping[str, Mapping[str, Turned]], path: Path) -> Path:
-    from contactfpga_sim.lab.pages import failures_page
+    from contactfpga_sim.lab.failures import tables as failures_tables
 
-    both = failures_page.table(turned), failures_page.unnoticed(turned)
+    both = failures_tables.table(turned), failures_tables.unnoticed(turned)
     write_text(path, "\n\n".join(both) + "\n")
     return path
 

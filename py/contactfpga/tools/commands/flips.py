@@ -32,10 +32,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from contactfpga_sim.lab import pool
+    from contactfpga_sim.lab import pool, writer
     from contactfpga_sim.lab.flips import campaign, picture, summary
+    from contactfpga_sim.lab.flips import tables as flips_tables
     from contactfpga_sim.lab.flips.designs import DESIGNS
-    from contactfpga_sim.lab.pages import flips_page, writer
 
     names = flags.known("--design", args.design, list(DESIGNS))
     if args.page and args.design:
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     if page:
         found = summary.measured(names)
         summary.write(found, folder / "designs.csv")
-        writer.write(page, flips_page.tables(rows, found))
+        writer.write(page, flips_tables.tables(rows, found))
         print(page)
         print(picture.draw(rows, found, outputs.folder(page.parent / "images", "--page") / "flips.svg"))
     return 0

@@ -19,8 +19,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from contactfpga import picture_style as style
+from contactfpga_sim.lab.chart.compute import Point, front
 from contactfpga_sim.lab.chart.picture import LENGTHS_MM, ends, error, markers, reached_us
-from contactfpga_sim.lab.chart.study import Point, front
 
 FAMILY = "fingers"
 ENDS_US, ENDS_MM = (8.0, 10_000.0), (0.3, 40.0)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from contactfpga_sim.lab.chart.study import Point
+from contactfpga_sim.lab.chart.compute import Point
 from contactfpga_sim.model.scenes.families import placements
 
 FRAMES, REPEATS = 20, 50

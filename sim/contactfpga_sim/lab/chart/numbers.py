@@ -9,10 +9,10 @@ from pathlib import Path
 
 from contactfpga.inputs.files import replaced
 from contactfpga.skin import Skin
+from contactfpga_sim.lab.chart.compute import KINDS, Point, Task
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
 from contactfpga_sim.lab.chart.methods import METHODS
 from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.chart.study import KINDS, Point, Task
 
 TIMES = tuple(field.name for field in dataclasses.fields(Speed))
 ENDS = ("", "_low", "_high", "_count")

@@ -16,8 +16,8 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from contactfpga import picture_style as style
 from contactfpga.choices import labellers, scans
 from contactfpga.skin import Skin
+from contactfpga_sim.lab.chart.compute import Point, front
 from contactfpga_sim.lab.chart.methods import METHODS
-from contactfpga_sim.lab.chart.study import Point, front
 
 MARKERS = "so^Dvp"
 """By pitch, the finest first."""

@@ -10,9 +10,9 @@ from typing import Any
 from contactfpga.skin import Skin
 from contactfpga_sim.lab import kept
 from contactfpga_sim.lab.chart import speed
+from contactfpga_sim.lab.chart.compute import Found, compared, intervals
 from contactfpga_sim.lab.chart.errors import Interval
 from contactfpga_sim.lab.chart.speed import Speed
-from contactfpga_sim.lab.chart.study import Found, compared, intervals
 from contactfpga_sim.lab.fit.sources import Source
 from contactfpga_sim.lab.fit.trial import Task
 

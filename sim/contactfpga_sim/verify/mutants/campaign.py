@@ -18,8 +18,7 @@ from pathlib import Path
 
 from contactfpga.skin.several import Several
 from contactfpga.tools.console import interrupt, numbers
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.pages import writer
+from contactfpga_sim.lab import kept, writer
 from contactfpga_sim.verify.mutants import netlist, proof, sheets, stimuli, trial
 from contactfpga_sim.verify.mutants.netlist import STAGES, Design, Mutant
 from contactfpga_sim.verify.mutants.skins import OPTIONS, SEVERAL, SKINS

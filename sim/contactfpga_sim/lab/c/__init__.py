@@ -1,0 +1,1 @@
+"""Memory and code of the C header on microcontrollers."""

@@ -1,0 +1,103 @@
+"""The tables of the chart's page. `make chart-page` writes them."""
+
+from __future__ import annotations
+
+import bisect
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.chart import host, numbers, speed, steady
+from contactfpga_sim.lab.chart.compute import Point, front
+
+NUMBERS = Path("docs/chart/chart.csv")
+"""Of the chart that the page shows."""
+
+SHEETS = (16, 32, 64)
+
+
+def front_table() -> str:
+    """The methods of each family that no other beats in the time and in the share of scenes miscounted."""
+    head = ("family", "method", "touch to zones, median / worst", "miscounted", "barycenter", "area", "LUT4")
+    lines: list[str] = []
+    points = numbers.read(NUMBERS)
+    for family in dict.fromkeys(point.task.family for point in points):
+        some = [point for point in points if point.task.family == family]
+        best = front(
+            [(point.speed.median_us + point.host_us, point.errors["total"]["miscounted"].mean) for point in some]
+        )
+        lines += [_line(some[index]) for index in best]
+    return writer.table(head, lines)
+
+
+def _line(point: Point) -> str:
+    found = point.errors["total"]
+    count, place, area = found["miscounted"], found["barycenter_mm"], found["area"]
+    times = (point.speed.median_us + point.host_us, point.speed.worst_us + point.host_us)
+    cells = (
+        point.task.family,
+        point.task.method,
+        "{:.0f} / {:.0f} us".format(*times),
+        f"{100 * count.mean:.1f} % ({100 * count.low:.1f} to {100 * count.high:.1f})",
+        f"{place.mean:.2f} mm",
+        f"{100 * area.mean:.0f} %",
+        f"{point.luts:,}" if point.luts else "",
+    )
+    return writer.line(cells)
+
+
+def host_table() -> str:
+    """Zones from the board against cells labelled on the host: by sheet and number of touched places."""
+    head = ("sheet", "contacts", "zones from the board", "cells to the host", "labelled there in", "faster")
+    lines = []
+    for size in SHEETS:
+        skin = Skin(rows=size, columns=size, settle_us=9.0 if size == 64 else 5.0)
+        most = min(size * size // 4, Derived(skin).max_items)
+        # Zones take longer the more there are, cells do not.
+        even = bisect.bisect_left(range(1, most + 1), 0.0, key=lambda count: _later(skin, count)) + 1
+        for count in sorted({1, 5, even - 1, even, most} & set(range(1, most + 1))):
+            lines.append(_rival_line(skin, count))
+    return writer.table(head, lines)
+
+
+def _later(skin: Skin, count: int) -> float:
+    """Microseconds by which the zones of this many contacts come later from the board than from the host."""
+    cells = _contacts(skin, count)
+    return _frame(skin, cells)[0] - _frame(skin.replace(report="cells"), cells)[0] - host.label_us([cells], 8)
+
+
+def _rival_line(skin: Skin, count: int) -> str:
+    cells = _contacts(skin, count)
+    board_us, board_bytes = _frame(skin, cells)
+    cells_us, cells_bytes = _frame(skin.replace(report="cells"), cells)
+    label_us = host.label_us([cells], 8)
+    faster = "board" if board_us < cells_us + label_us else "host"
+    times = (f"{board_us:.0f} us, {board_bytes} bytes", f"{cells_us:.0f} us, {cells_bytes} bytes", f"{label_us:.0f} us")
+    return writer.line((f"{skin.rows}x{skin.columns}", str(count), *times, faster))
+
+
+def _contacts(skin: Skin, count: int) -> np.ndarray:
+    """(R, C) bool: switches that do not touch each other, spread over the sheet."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    rows, columns = (skin.rows + 1) // 2, (skin.columns + 1) // 2
+    chosen = np.linspace(0, rows * columns - 1, count).round().astype(int)
+    cells[2 * (chosen // columns), 2 * (chosen % columns)] = True
+    return cells
+
+
+def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
+    """From a frame's first row time to its last byte in us, and its bytes."""
+    _, size = speed.touch(skin, cells, 0.5)
+    return steady.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size
+
+
+TABLES: writer.Tables = {"front": front_table, "host": host_table}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,0 +1,1 @@
+"""Cost of labelling over the seam of a closed sheet."""

@@ -1,0 +1,81 @@
+"""Measures what it takes to join zones over the seam of a closed sheet, and writes it into the page on labelling.
+
+`make closed-page` runs it.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from typing import Any
+
+import numpy as np
+
+from contactfpga.choices.labellers import LABELLERS, Labeller
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt
+from contactfpga_hdl.board import sizes
+from contactfpga_sim.lab import size, writer
+from contactfpga_sim.model.golden import volume
+
+CLOSED = [labeller for labeller in LABELLERS.values() if labeller.closed]
+COLUMNS = 8
+"""Of the sheet whose every last two rows are looked at."""
+AROUND: dict[str, Any] = {"surface": "cylinder", "radius_mm": 30.0, "closed": True}
+
+
+def skin_of(lines: int, connectivity: int, labeller: Labeller, closed: bool) -> Skin:
+    """A sheet with as many rows as columns."""
+    around = AROUND if closed else {}
+    return Skin(rows=lines, columns=lines, connectivity=connectivity, labeller=labeller, settle_us=30.0, **around)
+
+
+def clocks_table() -> str:
+    """The last record of every pair of last rows, and bounds."""
+    head = ("labeller", "connectivity", f"worst of all last rows of {COLUMNS} columns: open", "closed")
+    bounds = [f"bound of {lines} columns" for lines in size.SIZES]
+    rows = [(*names(labeller, connectivity), *worst(labeller, connectivity), *most(labeller, connectivity))
+            for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
+    return writer.table_of([(*head, *bounds), *rows])
+
+
+def size_table() -> str:
+    """LUT4 of the labeller alone."""
+    head = ["labeller", "connectivity", "16x16: open", "closed", "32x32: open", "closed"]
+    rows = [[*names(labeller, connectivity), *luts(labeller, connectivity, 16), *luts(labeller, connectivity, 32)]
+            for labeller in CLOSED for connectivity in (8, 4)]  # fmt: skip
+    return writer.table_of([head, *rows])
+
+
+def names(labeller: Labeller, connectivity: int) -> tuple[str, str]:
+    """The first cells of a line."""
+    return f"`{labeller.title}`", str(connectivity)
+
+
+def worst(labeller: Labeller, connectivity: int) -> list[str]:
+    """Clocks from the last row to the last record, at most over all last two rows, of an open and a closed sheet."""
+    cells = 2 * COLUMNS
+    numbers = np.arange(1 << cells)[:, None] >> np.arange(cells) & 1
+    frames = numbers.astype(bool).reshape(-1, 2, COLUMNS)
+    both = (volume.last_record_clocks(frames, connectivity, labeller, closed).max() for closed in (False, True))
+    return [str(clocks) for clocks in both]
+
+
+def most(labeller: Labeller, connectivity: int) -> list[str]:
+    """What no closed sheet exceeds: the end mark comes a clock later."""
+    skins = (skin_of(lines, connectivity, labeller, True) for lines in size.SIZES)
+    return [str(Derived(skin).label_clocks - 1) for skin in skins]
+
+
+def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
+    """LUT4 on an iCE40UP5K of an open and a closed sheet."""
+    skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
+    return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
+
+
+TABLES: writer.Tables = {"closed": clocks_table, "closed_size": size_table}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,0 +1,1 @@
+"""Formulas for covers of foam against integrals and the paper."""

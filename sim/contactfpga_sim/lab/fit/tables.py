@@ -1,0 +1,46 @@
+"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md: `make fits`."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Callable
+
+from contactfpga.tools.commands.fit import add_flags, asked
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.lab.fit import show
+from contactfpga_sim.lab.fit.search import fit
+
+EXAMPLES = {
+    "bumper": "examples/scenes-bumper.toml --barycenter-mm 3 --latency-us 500",
+    "hands": "examples/scenes-hands.toml --barycenter-mm 3 --latency-us 500",
+    "sole": "examples/scenes-sole.toml --barycenter-mm 3 --latency-us 500",
+}
+"""Arguments by name."""
+
+
+def section(arguments: str) -> str:
+    """The command and what it says, but for the settings that Skin itself refuses."""
+    command = f"contactfpga fit {arguments}"
+    print(command, file=sys.stderr)
+    parser = argparse.ArgumentParser()
+    add_flags(parser)
+    task, tried = asked(parser.parse_args(shlex.split(arguments)))
+    with pool.executor(None, None) as executor, pool.progress() as step:
+        found = fit(task, tried, executor, step)
+    tables = (show.rows(found, impossible=False), show.reported(found))
+    none = f"Skin itself refuses {len(found.impossible)} more settings."
+    return "\n\n".join((f"    {command}", *map(writer.table_of, tables), " ".join((*show.notes(found), none))))
+
+
+def _table(arguments: str) -> Callable[[], str]:
+    return lambda: section(arguments)
+
+
+TABLES = {name: _table(arguments) for name, arguments in EXAMPLES.items()}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,0 +1,120 @@
+"""The tables in docs/flips.md."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.flips import summary
+from contactfpga_sim.lab.flips.campaign import Row
+from contactfpga_sim.lab.flips.summary import Design
+
+DESIGNS = (
+    "design",
+    "LUT4",
+    "bits",
+    "flips",
+    "silently wrong, 95 %",
+    "wrong for, ms: longest / median",
+    "reported",
+)
+MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
+KINDS = ("design", "outcome", "by", "flips")
+LONG_S = 0.005
+"""Longer than any fault that spoils a frame or two."""
+OUTCOMES = {"silent": "silently wrong", "told": "reported"}
+"""In words."""
+
+
+def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
+    """All of them, by name."""
+    return {
+        "worst": lambda: worst_text(rows),
+        "flipped": lambda: designs_table(rows, designs),
+        "modules": lambda: modules_table(rows, designs),
+        "ways": lambda: ways_table(rows, designs),
+    }
+
+
+def worst_text(rows: Sequence[Row]) -> str:
+    """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
+    groups = [
+        (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)
+        for dual in (False, True)
+        for memory in (False, True)
+        if (some := [row for row in rows if row.found.memory == memory and row.design.endswith("dual") == dual])
+    ]
+    groups.sort(key=lambda group: -max(row.found.seconds for row in group[1]))
+    lines = [f"- {name}: {_worst(some)}" for name, some in groups]
+    return "\n".join((*lines, "", "A flip that was not drawn may be worse than all of these."))
+
+
+def _worst(rows: Sequence[Row]) -> str:
+    silent = summary.share(rows)
+    wrong = [row for row in rows if row.found.outcome == "silent"]
+    worst = max(wrong or rows, key=lambda row: row.found.seconds)
+    long = summary.Share(sum(row.found.seconds > LONG_S for row in wrong), len(rows))
+    what = (
+        f"one of `{worst.found.name}` in `{worst.design}` was silently wrong for {1e3 * worst.found.seconds:,.1f} ms "
+        f"({worst.found.kind}). "
+        if silent.hits
+        else ""
+    )
+    return (
+        f"{what}{silent.hits} of {silent.of:,} were silently wrong ({_interval(silent)}), {long.hits} of them for more "
+        f"than {1e3 * LONG_S:g} ms ({_interval(long)})."
+    )
+
+
+def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+    """A row for each design's registers, and one for its memories."""
+    lines = []
+    for design in designs:
+        for memory, bits in ((False, design.registers), (True, design.memories)):
+            some = summary.of(rows, design.name, memory)
+            if not some:
+                continue
+            median, longest = summary.wrong_ms(some)
+            first = ("", "") if memory else (f"`{design.name}`", f"{design.luts:,}")
+            silent, told = summary.share(some), summary.share(some, "told")
+            lines.append(
+                writer.line(
+                    (
+                        *first,
+                        f"{bits:,} of {'memory' if memory else 'registers'}",
+                        f"{len(some):,}",
+                        f"**{100 * silent.hits / silent.of:.1f} %**, {_interval(silent)}",
+                        f"{longest:,.1f} / {median:,.1f}" if silent.hits else "",
+                        f"{100 * told.hits / told.of:.1f} %",
+                    )
+                )
+            )
+    return writer.table(DESIGNS, lines)
+
+
+def _interval(share: summary.Share) -> str:
+    low, high = share.interval
+    return f"{100 * low:.1f} to {100 * high:.1f} %"
+
+
+def modules_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+    """Registers of the plain designs, by module."""
+    plain = [row for row in rows if not row.design.endswith("dual") and not row.found.memory]
+    lines = []
+    for module, some in summary.by(plain, summary.stage).items():
+        counts = [summary.share(some, outcome).hits for outcome in ("silent", "told", "masked")]
+        names = summary.by([row for row in some if row.found.outcome == "silent"], lambda row: row.found.name)
+        listed = ", ".join(f"`{name}` {len(hits)}" for name, hits in list(names.items())[:6])
+        lines.append(writer.line((module, str(len(some)), *map(str, counts), listed)))
+    return writer.table(MODULES, lines)
+
+
+def ways_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+    """What is wrong with each design, or reports the flip."""
+    lines = []
+    for design in designs:
+        some = [row for row in rows if row.design == design.name and row.found.outcome != "masked"]
+        for way, hits in summary.by(some, lambda row: f"{row.found.outcome}|{row.found.kind}").items():
+            outcome, kind = way.split("|")
+            lines.append(writer.line((f"`{design.name}`", OUTCOMES[outcome], kind, str(len(hits)))))
+    return writer.table(KINDS, lines)

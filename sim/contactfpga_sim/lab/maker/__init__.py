@@ -1,0 +1,1 @@
+"""The maker's sheet: diodes, pull-ups, series resistors and the schematic."""

@@ -1,0 +1,137 @@
+"""The tables and the picture of docs/net.md.
+
+python -m contactfpga_sim.lab.net.tables docs/net.md docs/images
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+from contactfpga import picture_style as style
+from contactfpga.robot.net.message import HEAD_BYTES
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.net import load, source
+
+BATCHES_MS = (0.0, 2.0, 10.0)
+LINKS = (1, 4, 16, 64)
+GROWTH_MS = 10.0
+LINE_BYTES = 54 + 12
+"""Of a message below Zenoh: Ethernet, IP and TCP; and Zenoh's own head, roughly."""
+GIGABIT = 1e9 / 8
+
+
+@functools.cache
+def measured(links: int, batch_ms: float, *, full: bool) -> load.Load:
+    """Once per run of this program. ``full`` has no default: the cache takes a call that leaves it out for another."""
+    return load.measure(links, batch_ms / 1000, full)
+
+
+def batch_table() -> str:
+    """One link."""
+    head = ("batch", "messages per second", "latency p50 / p99", "of a bare pair", "ratio p50 / p99")
+    rows: list[tuple[str, ...]] = [(*head, "CPU, all ends")]
+    for batch_ms in BATCHES_MS:
+        found = measured(1, batch_ms, full=False)
+        cells = (f"{batch_ms:g} ms", f"{found.messages:,.0f}", _ms(found.latency), _ms(found.bare), _ratio(found))
+        rows.append((*cells, _percent(sum(found.cpu.values()))))
+    return writer.table_of(rows)
+
+
+def links_table() -> str:
+    """From one link to many."""
+    head = ("links", "frames per second", "of those sent", "lost", "CPU per link: publisher", "router", "reader")
+    rows: list[tuple[str, ...]] = [(*head, "latency p50 / p99", "in times of a bare pair's")]
+    for links, full in (*((count, False) for count in LINKS), (LINKS[-1], True)):
+        found = measured(links, GROWTH_MS, full=full)
+        name = f"{links}" + (f", and one of {load.FULL_HZ:,.0f} Hz" if full else "")
+        cpu = (_percent(used / found.links) for used in _ends(found))
+        rates = (f"{found.frames:,.0f}", f"{100 * found.share:.1f} %", f"{found.lost}")
+        rows.append((name, *rates, *cpu, _ms(found.latency), _ratio(found)))
+    return writer.table_of(rows)
+
+
+def _ends(found: load.Load) -> tuple[float, float, float]:
+    cpu = found.cpu
+    return cpu["publishers"], cpu["router"], cpu["reader"] + cpu["other reader"]
+
+
+def thousand_table() -> str:
+    """What a thousand links would take, from what was measured and computed."""
+    found = measured(LINKS[-1], GROWTH_MS, full=False)
+    publisher, router, reader = (used / found.links for used in _ends(found))
+    frame = len(source.frames(1)[0])
+    messages = 1000 / GROWTH_MS
+    per_link = load.RATE_HZ * frame + messages * (HEAD_BYTES + LINE_BYTES)
+    total = 1000 * per_link
+    rows = [
+        ("of 1,000 links of 1 kHz", "takes", "so"),
+        ("bytes of frames", f"{load.RATE_HZ * frame / 1e3:,.0f} kB/s each", f"{frame} bytes for one zone"),
+        ("bytes on the network", f"{total / 1e6:,.0f} MB/s", f"{100 * total / GIGABIT:.0f} % of a gigabit link"),
+        ("messages", f"{1000 * messages:,.0f} per second", f"batches of {GROWTH_MS:g} ms"),
+        ("routers", f"{1000 * router:.1f} cores", "spread over the machines: a router for each, or for a few"),
+        ("publishers", f"{1000 * publisher:.1f} cores", "on the machines with the boards"),
+        (
+            "readers",
+            f"{1000 * reader:.1f} cores",
+            "**break first**: one Python process reads at most "
+            f"{1 / reader:,.0f} links; split them over processes, or raise the batch",
+        ),
+    ]
+    return writer.table_of(rows)
+
+
+def _ratio(found: load.Load) -> str:
+    return " / ".join(f"{one / bare:.1f}" for one, bare in zip(found.latency, found.bare, strict=True))
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"
+
+
+def _ms(latency: tuple[float, float]) -> str:
+    return " / ".join(f"{1000 * one:.1f}" for one in latency) + " ms"
+
+
+TABLES: writer.Tables = {"batch": batch_table, "links": links_table, "thousand": thousand_table}
+
+
+def draw(folder: Path) -> Path:
+    """Processor time and latency by the number of links."""
+    import matplotlib
+
+    with matplotlib.rc_context(style.SETTINGS):
+        figure = style.new(2.6)
+        cpu, latency = figure.subplots(1, 2)
+        found = [measured(links, GROWTH_MS, full=False) for links in LINKS]
+        names = ("publishers", "router", "readers")
+        for name, values, color in zip(names, zip(*map(_ends, found)), (style.BLUE, style.VERMILLION, style.GREEN)):
+            cpu.plot(LINKS, [100 * value for value in values], marker="o", ms=4, label=name, color=color)
+        cpu.set(xscale="log", yscale="log", ylabel="processor time, % of a core")
+        for place, (name, color) in enumerate((("p50", style.BLUE), ("p99", style.VERMILLION))):
+            latency.plot(LINKS, [1000 * one.latency[place] for one in found], marker="o", ms=4, color=color, label=name)
+            bare = [1000 * one.bare[place] for one in found]
+            latency.plot(LINKS, bare, marker="o", ms=4, ls=style.DASHES[1], color=color, label=f"{name}, bare pair")
+        latency.set(xscale="log", yscale="log", ylabel="latency, ms")
+        for axes in (cpu, latency):
+            axes.set_xticks(LINKS, [str(links) for links in LINKS])
+            axes.minorticks_off()
+            axes.grid(True)
+            axes.legend()
+        figure.supxlabel("links of 1 kHz", fontsize=style.NORMAL)
+        return style.save(figure, folder / "net.svg")
+
+
+def main() -> int:
+    """Write the tables into the page and the picture into the folder named on the command line."""
+    page, folder = writer.page_and_folder("Write the tables and the picture of the page on networks.")
+    writer.write(page, TABLES)
+    print(f"wrote {page}")
+    print(f"drew {draw(folder)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

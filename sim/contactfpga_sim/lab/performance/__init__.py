@@ -1,0 +1,1 @@
+"""Latency, rate and clocks of the gateware."""

@@ -1,0 +1,129 @@
+"""How late the labeller's last record is, in clocks from a frame's last row: over touches at every place, over
+recordings, and over the shapes that break labellers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga_sim.lab import writer
+from contactfpga_sim.model.board.labeller import LabelBench
+from contactfpga_sim.model.golden import volume
+from contactfpga_sim.model.scenes.cells import to_words
+from contactfpga_sim.model.scenes.families import FAMILIES, placements
+from contactfpga_sim.model.scenes.scene import CONTACTS
+from contactfpga_sim.model.scenes.shapes import variants
+
+EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
+
+TOUCHES = 400
+"""Scenes of each family; each has its own place within a cell, angle and size."""
+
+SEED = 20
+
+
+def labeller_table() -> str:
+    """Over touches, over the shapes that break labellers, and the bound."""
+    place, worst = "touches at every place: median / 99 % / worst", "shapes that break labellers, worst"
+    lines = []
+    for size in (16, 32, 64):
+        places = every_place(touches(Skin(rows=size, columns=size, settle_us=15.0)))
+        for labeller in EXACT:
+            for connectivity in (8, 4):
+                skin = Skin(rows=size, columns=size, labeller=labeller, connectivity=connectivity, settle_us=15.0)
+                lines.append(labeller_row(skin, places))
+    head = ("labeller", "cells", "connectivity", place, worst, "bound")
+    return writer.table(head, sorted(lines, key=lambda line: line.split("|")[1]))
+
+
+def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
+    """One line of :func:`labeller_table`; ``places``: of :func:`every_place`."""
+    worst = worst_last_record_clocks(skin)
+    found = f"{spread(*places, skin.connectivity, skin.labeller)} clocks"
+    most = str(bound(skin.columns, skin.connectivity, skin.labeller))
+    sheet = f"{skin.rows}x{skin.columns}"
+    return writer.line((f"`{skin.labeller}`", sheet, str(skin.connectivity), found, f"{worst} clocks", most))
+
+
+def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:
+    """Over all (n, R, C) bool frames of each recording, as if the sheet ended after any of its rows."""
+    lines = []
+    for name, frames in recordings.items():
+        _, rows, columns = frames.shape
+        places = counted(last_rows(frames), columns)
+        for connectivity in (8, 4):
+            found = (
+                f"{spread(*places, connectivity, labeller)}, {bound(columns, connectivity, labeller)}"
+                for labeller in EXACT
+            )
+            lines.append(writer.line((name, f"{rows}x{columns}", str(connectivity), *found)))
+    spreads = (f"`{labeller.name}`: median / 99 % / worst, bound" for labeller in EXACT)
+    return writer.table(("recording", "sheet", "connectivity", *spreads), lines)
+
+
+def bound(columns: int, connectivity: int, labeller: LabellerName | Labeller) -> int:
+    """Clocks from a frame's last row to its last record that no frame exceeds: the end mark comes a clock later."""
+    skin = Skin(rows=16, columns=columns, connectivity=connectivity, labeller=labeller, settle_us=15.0)
+    return Derived(skin).label_clocks - 1
+
+
+def worst_last_record_clocks(skin: Skin) -> int:
+    """At most, over the shapes that break labellers, in the compiled gateware."""
+    with LabelBench(skin) as bench:
+        frames = np.stack([cells for _, cells in variants(skin.rows, skin.columns)])
+        return int(bench.run(frames).last_record_clocks.max())
+
+
+def touches(skin: Skin) -> np.ndarray:
+    """(n, R, C) bool: the built-in contacts, and some scenes of every family."""
+    scenes = [make(skin) for make in CONTACTS.values()]
+    for family in FAMILIES:
+        scenes += placements(family, TOUCHES, SEED, skin)
+    return np.stack([scene.pressed(0.0, skin) for scene in scenes])
+
+
+def last_rows(frames: np.ndarray) -> np.ndarray:
+    """(m, 2) uint64 words: what the last two rows hold if the sheet ends after any row of (n, R, C) bool frames, or one
+    row later; only where a cell is pressed in them. Every zone with a cell there leaves with the last row, so that no
+    other row decides how late the last record is.
+    """
+    words = np.pad(to_words(frames), ((0, 0), (1, 1)))
+    pairs = np.stack([words[:, :-1], words[:, 1:]], axis=-1).reshape(-1, 2)
+    return pairs[pairs.any(axis=1)]
+
+
+def every_place(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The last two rows at every whole-cell offset of these frames, a part may lie off the sheet: (k, 2, C) bool, and
+    how often each comes."""
+    columns = frames.shape[2]
+    sheet = np.uint64((1 << columns) - 1)
+    pairs = last_rows(frames)
+    offsets = np.arange(columns, dtype=np.uint64)
+    shifted = [pairs << offset & sheet for offset in offsets] + [pairs >> offset for offset in offsets[1:]]
+    return counted(np.concatenate(shifted), columns)
+
+
+def counted(pairs: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Each of these words once as (k, 2, C) bool, without those that are empty, and how often it comes."""
+    # One number a pair: unique() by number is many times faster than by rows.
+    pairs = np.ascontiguousarray(pairs[pairs.any(axis=1)])
+    different, count = np.unique(pairs.view([("before", "<u8"), ("last", "<u8")]), return_counts=True)
+    bits = np.arange(columns, dtype=np.uint64)
+    return (different.view("<u8").reshape(-1, 2, 1) >> bits & np.uint64(1)).astype(bool), count
+
+
+def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: LabellerName | Labeller) -> str:
+    """Median, 99 % and worst of the clocks to the last record, each of the (k, 2, C) rows being there ``count`` times.
+
+    The clocks are the golden model's, which the gateware keeps.
+    """
+    clocks = volume.last_record_clocks(rows, connectivity, labeller)
+    order = np.argsort(clocks, kind="stable")
+    reached = np.cumsum(count[order])
+    median, most = (clocks[order[np.searchsorted(reached, share * reached[-1])]] for share in (0.5, 0.99))
+    return f"{median} / {most} / {clocks.max()}"

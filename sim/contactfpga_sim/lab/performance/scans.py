@@ -1,0 +1,231 @@
+"""Measures what the pages state, in clock cycles of the gateware, and writes it there.
+
+`make figures` runs it. Everything here is exact and repeatable; a test compares the tables in the files with a new run.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import Derived
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.performance.labellers import labeller_table, recorded_table
+from contactfpga_sim.lab.performance.reversal import latency_table, sides_table
+from contactfpga_sim.lab.sheets import adaptive_skin
+from contactfpga_sim.lab.units.tables import units_table
+from contactfpga_sim.model.board.compiled import CompiledBoard
+from contactfpga_sim.model.board.received import frames_in
+from contactfpga_sim.model.golden import Timeline
+from contactfpga_sim.model.golden.adaptive import Scanner
+from contactfpga_sim.model.golden.facts import facts
+from contactfpga_sim.model.scenes.recordings import Recording
+from contactfpga_sim.model.scenes.scene import CONTACTS
+
+INSTANTS = 96
+"""Touch instants, spread evenly over a scan."""
+
+RECORDINGS = Path("../shared/data")
+"""Where recordings lie that are no part of the project."""
+
+RECORDED = 100
+"""Frames of a recording that are looked at."""
+
+HELD_SCANS = 4
+"""Scan periods for which a frame is held; a sheet that is recorded a hundred times per second holds it for more."""
+
+SETTINGS = {
+    "reference": Skin(),
+    "reference, 1 Mbaud": Skin(baud=1_000_000),
+    "32x32": Skin(rows=32, columns=32),
+    "64x64": Skin(rows=64, columns=64),
+    "64x64, 74HC595 and 74HC165, 4 us release": Skin(
+        rows=64,
+        columns=64,
+        release_us=4.0,
+        row_drive="74hc595",
+        row_chains=2,
+        column_read="74hc165",
+        column_chains=4,
+    ),
+}
+
+
+REPORTS = ("moments", "barycenter")
+"""Those that report zones."""
+
+
+class Latency(NamedTuple):
+    """Median and worst time in us from a switch closing to an event, over the touch instants."""
+
+    median: float
+    worst: float
+
+    @classmethod
+    def of(cls, cycles: list[int], skin: Skin) -> Latency:
+        us = np.array(cycles) / (skin.clock_hz / 1e6)
+        return cls(float(np.median(us)), float(us.max()))
+
+    def __str__(self) -> str:
+        return f"{self.median:.1f} / {self.worst:.1f}"
+
+
+def one_switch(skin: Skin, row: int) -> np.ndarray:
+    """(R, C) bool: the switch in the middle of a row."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[row, skin.columns // 2] = True
+    return cells
+
+
+def dots_in_last_row(skin: Skin) -> np.ndarray:
+    """(R, C) bool: every other switch of the last row, as many zones as can end in one row with 8-connectivity."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[-1, ::2] = True
+    return cells
+
+
+def touch_latencies(skin: Skin, touched: np.ndarray | None = None) -> dict[str, Latency]:
+    """From switches of one row closing to the pin, and to the first and last byte of their frame; by default that of a
+    single one in the first row, which is the worst place: the rest of the scan follows it.
+    """
+    frame = Derived(skin).frame_clocks
+    touched = one_switch(skin, 0) if touched is None else touched
+    untouched = np.zeros_like(touched)
+    found: dict[str, list[int]] = {"contact": [], "first byte": [], "last byte": []}
+    for instant in range(INSTANTS):
+        start = 8 * frame + instant * frame // INSTANTS
+        with CompiledBoard(skin, capture=("contact",)) as board:
+            board.hold(untouched[None], start)
+            board.hold(touched[None], 4 * frame + 100 * Derived(skin).bit_clocks * 10)
+            found["contact"].append(int(board.take("contact")["cycle"][0]) - start)
+            first, last = _first_frame_with_cells(board, skin)
+        found["first byte"].append(first - start)
+        found["last byte"].append(last - start)
+    return {name: Latency.of(cycles, skin) for name, cycles in found.items()}
+
+
+def _first_frame_with_cells(board: CompiledBoard, skin: Skin) -> tuple[int, int]:
+    """Cycles in which the start bit of a frame's first byte begins and the stop bit of its last one ends."""
+    received = board.take("received")
+    for got in frames_in(skin, zip(received["cycle"].tolist(), received["data"].tolist())):
+        if got.frame.cells:
+            return got.first - 10 * Derived(skin).bit_clocks, got.last
+    raise RuntimeError(f"no frame with the touch came within {len(received)} bytes")
+
+
+def frame_rate(skin: Skin, scans: int = 400) -> tuple[float, int]:
+    """Frames per second that reach the host with one zone on the sheet, and the bytes of such a frame."""
+    cells = np.zeros((skin.rows, skin.columns), bool)
+    cells[1:3, 1:3] = True
+    with CompiledBoard(skin) as board:
+        board.hold(cells[None], scans * Derived(skin).frame_clocks)
+        frames = list(frames_in(skin, enumerate(board.receive())))
+        return len(frames) / (board.cycle / skin.clock_hz), frames[-1].size
+
+
+def reference_table() -> str:
+    """Latency, rate and size on the wire over some settings."""
+    head = ("sheet", "scan", "touch to `contact` pin", "touch to last byte", "frames per second", "bytes, one zone")
+    return writer.table(head, [reference_row(name, skin) for name, skin in SETTINGS.items()])
+
+
+def reference_row(name: str, skin: Skin) -> str:
+    """One setting's row of :func:`reference_table`."""
+    latency = touch_latencies(skin)
+    rate, size = frame_rate(skin)
+    scan = Derived(skin).frame_clocks / (skin.clock_hz / 1e6)
+    times = (f"{scan:g} us", f"{latency['contact']} us", f"**{latency['last byte']} us**")
+    return writer.line((name, *times, f"{rate:,.0f}", str(size)))
+
+
+def report_table() -> str:
+    """What dividing on the board saves on the wire, and what it costs, over some sheets."""
+    head = ("sheet", "report", "bytes per zone", "first row", "last row", "every other switch of the last row")
+    names = ("reference", "32x32", "64x64")
+    return writer.table(
+        head, [report_row(name, SETTINGS[name].replace(report=report)) for name in names for report in REPORTS]
+    )
+
+
+def report_row(name: str, skin: Skin) -> str:
+    """One line of :func:`report_table`."""
+    scenes = (one_switch(skin, 0), one_switch(skin, skin.rows - 1), dots_in_last_row(skin))
+    times = [f"{touch_latencies(skin, touched)['last byte']} us" for touched in scenes]
+    return writer.line((name, f"`{skin.report}`", str(Derived(skin).record_bytes), *times))
+
+
+def gain_table(scenes: Mapping[str, np.ndarray]) -> str:
+    """How long a frame of an adaptive scan takes, and how many times shorter that is than a raster scan.
+
+    ``scenes``: (n, R, C) bool frames by name. Times are the golden model's, which the gateware keeps in every clock.
+    """
+    head = ("scene", "sheet", "clock", "active rows, mean", "raster scan", "adaptive, mean / worst", "gain")
+    return writer.table(head, [gain_row(name, frames) for name, frames in scenes.items()])
+
+
+def gain_row(name: str, frames: np.ndarray) -> str:
+    """One line of :func:`gain_table`. Each frame is held for some scan periods: most of them see a sheet at rest.
+
+    The mean is that of the frame which is under way at an instant picked at random.
+    """
+    _, rows, columns = frames.shape
+    known = facts(adaptive_skin(rows, columns))
+    hold = HELD_SCANS * known.scan_clocks
+    scanner = Scanner(known, Timeline([(index * hold, cells, None) for index, cells in enumerate(frames)]), [])
+    ends: list[int] = []
+    while not ends or ends[-1] < len(frames) * hold:
+        scanner.frame()
+        ends.append(scanner.slots[-1].end)
+    us = np.diff(ends, prepend=0) / known.clocks_per_us
+    scan_us = known.scan_clocks / known.clocks_per_us
+    mean = (us**2).sum() / us.sum()
+    active = frames.any(axis=2).sum(axis=1).mean()
+    times = (f"{scan_us:.0f} us", f"{mean:.1f} / {us.max():.1f} us", f"{scan_us / mean:.1f}")
+    return writer.line((name, f"{rows}x{columns}", f"{known.clocks_per_us} MHz", f"{active:.1f}", *times))
+
+
+def built_in_scenes() -> dict[str, np.ndarray]:
+    """(n, 16, 16) frames of every contact scene: one of those at rest, 50 of the moving one, over half a second."""
+    skin = adaptive_skin(16, 16)
+    times = {name: np.arange(50) / 100 if name == "moving" else [0.0] for name in CONTACTS}
+    return {
+        f"`{name}`": np.stack([make(skin).pressed(float(t), skin) for t in times[name]])
+        for name, make in CONTACTS.items()
+    }
+
+
+def recordings(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
+    """(n, R, C) bool: all frames of each recording in the folder."""
+    return {path.name.partition(".")[0]: Recording.load(path).pressed for path in sorted(folder.glob("*.npz"))}
+
+
+def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
+    """Evenly spaced frames of each recording in the folder."""
+    return {name: frames[:: max(1, len(frames) // RECORDED)][:RECORDED] for name, frames in recordings(folder).items()}
+
+
+TABLES: writer.Tables = {
+    "reference": reference_table,
+    "labeller": labeller_table,
+    "report": report_table,
+    "fast": latency_table,
+    "sides": sides_table,
+    "units": units_table,
+    "gain": lambda: gain_table(built_in_scenes()),
+}
+if RECORDINGS.is_dir():  # else their tables stay as they are
+    TABLES = {
+        **TABLES,
+        "recorded": lambda: gain_table(recorded_scenes()),
+        "labeller_recorded": lambda: recorded_table(recordings()),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

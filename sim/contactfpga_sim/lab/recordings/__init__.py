@@ -1,0 +1,1 @@
+"""Size of recordings, and loss by a killed program."""

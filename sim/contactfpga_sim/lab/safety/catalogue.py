@@ -1,0 +1,221 @@
+"""The electrical faults of docs/safety.md: how each is put into the simulated sheet, at which places, and what it does.
+
+A new one is an entry in :data:`FAULTS`; study and page take it from there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+from contactfpga.design.circuit import Circuit
+from contactfpga.skin import Skin
+from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.model.sheet.line import Line
+
+Places = Callable[[Skin], Mapping[str, Hurt]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Fault:
+    """An electrical fault."""
+
+    title: str
+    effect: str
+    """What goes wrong where nobody notices."""
+    places: Places
+    """By the name of the place."""
+    left: str
+    """What a user can still do; where nothing tells it, why not."""
+    host: str = ""
+    """What is meant for it: ``self_test``, which is run at power-up, or the host's ``Watch``, which is not run here."""
+
+
+def _ends(length: int) -> tuple[int, ...]:
+    """Where a line is cut: at its pin, in the middle, before its last switch."""
+    return 0, length // 2, length - 1
+
+
+def _cut_rows(skin: Skin) -> Mapping[str, Hurt]:
+    ends = _ends(skin.columns)
+    return {f"row {row} at column {end}": Hurt(rows={row: end}) for row in range(skin.rows) for end in ends}
+
+
+def _cut_columns(skin: Skin) -> Mapping[str, Hurt]:
+    ends = _ends(skin.rows)
+    return {f"column {line} at row {end}": Hurt(columns={line: end}) for line in range(skin.columns) for end in ends}
+
+
+def _row_chips(skin: Skin) -> Mapping[str, Hurt]:
+    """Of a connector or a 74HC595: its rows, or all rows after it in the chain too."""
+    firsts = range(0, skin.rows, 8)
+    alone = {f"rows {first} on, 8": _rows(range(first, min(first + 8, skin.rows))) for first in firsts}
+    return alone | {f"rows {first} on, all": _rows(range(first, skin.row_lines)) for first in firsts}
+
+
+def _rows(numbers: range) -> Hurt:
+    return Hurt(rows=dict.fromkeys(numbers, 0))
+
+
+def _column_chips(skin: Skin) -> Mapping[str, Hurt]:
+    firsts = range(0, skin.columns, 8)
+    alone = {f"columns {first} on, 8": _columns(range(first, min(first + 8, skin.columns))) for first in firsts}
+    return alone | {f"columns {first} on, all": _columns(range(first, skin.column_lines)) for first in firsts}
+
+
+def _columns(numbers: range) -> Hurt:
+    return Hurt(columns=dict.fromkeys(numbers, 0))
+
+
+def _selected(skin: Skin) -> Mapping[str, Hurt]:
+    return {f"row {row}": Hurt(selected=(row,)) for row in range(skin.rows)}
+
+
+def _stuck_columns(skin: Skin) -> Mapping[str, Hurt]:
+    return {f"column {column}": Hurt(stuck=(column,)) for column in range(skin.columns)}
+
+
+def _cells(skin: Skin) -> list[tuple[int, int]]:
+    """Corners and a diagonal."""
+    rows, columns = skin.rows - 1, skin.columns - 1
+    corners = [(0, 0), (0, columns), (rows, 0), (rows, columns)]
+    return corners + [(rows * step // 4, columns * step // 4) for step in (1, 2, 3)]
+
+
+def _closed(skin: Skin) -> Mapping[str, Hurt]:
+    return {f"switch {cell}": Hurt(closed=(cell,)) for cell in _cells(skin)}
+
+
+def _dead(skin: Skin) -> Mapping[str, Hurt]:
+    return {f"switch {cell}": Hurt(dead=(cell,)) for cell in _cells(skin)}
+
+
+def _bare(skin: Skin) -> Mapping[str, Hurt]:
+    """Undefined levels are tried both ways."""
+    return {
+        f"switch {cell}, {'released' if released else 'pressed'} wins": Hurt(bare=(cell,), pulls_win=released)
+        for cell in _cells(skin)
+        for released in (False, True)
+    }
+
+
+def _joined_rows(skin: Skin) -> Mapping[str, Hurt]:
+    """Two pins drive against each other: which level a column comes to is tried both ways."""
+    return {
+        f"rows {row} and {row + 1}, {'released' if released else 'pressed'} wins": Hurt(
+            joined_rows=((row, row + 1),), pulls_win=released
+        )
+        for row in range(skin.rows - 1)
+        for released in (False, True)
+    }
+
+
+def _joined_columns(skin: Skin) -> Mapping[str, Hurt]:
+    return {
+        f"columns {line} and {line + 1}": Hurt(joined_columns=((line, line + 1),)) for line in range(skin.columns - 1)
+    }
+
+
+def _slow(skin: Skin) -> Mapping[str, Hurt]:
+    """Lines of ever more capacitance, with pulls that lift them late and with a resistance that lowers them late."""
+    found = {}
+    for picofarad in (464, 1000, 2154, 4642):
+        for name, circuit in (
+            ("40 kΩ pull-up", Circuit(column_pull_ohm=40_000.0)),
+            ("22 kΩ pull-up", Circuit(column_pull_ohm=22_000.0)),
+        ):
+            line = Line.of(
+                circuit.replace(line_pf=float(picofarad)), skin.row_lines, skin.column_lines, skin.diodes, most=4
+            )
+            found[f"{picofarad} pF, {name}"] = Hurt(line=line)
+    return found
+
+
+def _once(**what: bool) -> Places:
+    return lambda skin: {"the board": Hurt(**what)}  # type: ignore[arg-type]
+
+
+METER = "check with a meter before the first power-up"
+
+FAULTS: Mapping[str, Fault] = {
+    "broken row": Fault(
+        "A row is broken, or its driver never selects it",
+        "its switches past the break are dead",
+        _cut_rows,
+        "strain relief",
+    ),
+    "broken column": Fault(
+        "A column is broken, or its input reads released",
+        "its switches past the break are dead",
+        _cut_columns,
+        "strain relief",
+    ),
+    "row connector": Fault(
+        "A connector or 74HC595 of rows is dead, or all after it",
+        "eight rows or more are dead",
+        _row_chips,
+        "locked connectors",
+    ),
+    "column connector": Fault(
+        "A connector or 74HC165 of columns is dead, or all after it",
+        "eight columns or more are dead",
+        _column_chips,
+        "locked connectors",
+    ),
+    "selected row": Fault(
+        "A row is shorted to its selecting level, or its driver is",
+        "pressed switches of it show in all rows",
+        _selected,
+        METER,
+    ),
+    "stuck column": Fault(
+        "A column is shorted to its pressed level, or its input is", "the column reads as empty", _stuck_columns, METER
+    ),
+    "closed switch": Fault(
+        "A switch is stuck closed",
+        "a zone that nobody makes; touches beside it are joined to it",
+        _closed,
+        "list it in `mask`",
+        "Watch",
+    ),
+    "dead switch": Fault(
+        "A switch does not close, or its diode is open or missing",
+        "touches of it alone are not seen",
+        _dead,
+        "press every switch once (`contactfpga doctor --watch`); only a press can tell it from one that nobody presses",
+    ),
+    "shorted diode": Fault(
+        "A diode is shorted", "pressed cells of its column are undefined", _bare, METER, "self_test"
+    ),
+    "shorted rows": Fault(
+        "Two rows are shorted to each other", "touches show in both rows", _joined_rows, METER, "self_test"
+    ),
+    "shorted columns": Fault(
+        "Two columns are shorted to each other", "touches show in both columns", _joined_columns, METER, "self_test"
+    ),
+    "slow columns": Fault(
+        "Columns are slower than the Skin's times",
+        "pressed switches are missed, or show in the next row",
+        _slow,
+        "`contactfpga settle`",
+    ),
+    "dead board": Fault(
+        "The board has no supply, no clock or no configuration",
+        "nothing is reported",
+        _once(running=False),
+        "a deadline for each read, a watchdog at `alive`",
+    ),
+    "broken link": Fault(
+        "USB, its bridge or the UART is broken",
+        "nothing is reported",
+        _once(connected=False),
+        "a deadline for each read; `contact` still works",
+    ),
+    "broken contact": Fault(
+        "The wire of `contact` is broken",
+        "the robot is not stopped by it",
+        _once(contact_connected=False),
+        "take zones as the second way to a stop; test the stop at every start",
+    ),
+}
+"""Every electrical fault by its name."""

@@ -1,0 +1,75 @@
+"""Every fault at every place, in every scene: what tells it, how fast, and what was wrong before."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Mapping
+
+from contactfpga.skin import Skin
+from contactfpga_sim.lab.failures.rig import GUARDED, REFERENCE
+from contactfpga_sim.lab.safety import trial
+from contactfpga_sim.lab.safety.catalogue import FAULTS
+from contactfpga_sim.lab.safety.hurt import Hurt
+from contactfpga_sim.lab.safety.trial import Told
+
+SKINS = {"plain": REFERENCE, "guarded": GUARDED}
+
+PHASES = (0.03, 0.37, 0.71)
+"""Shares of a scan after whose beginning faults come, in turn: the longest time counts."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """A fault at one place, in all scenes."""
+
+    name: str
+    scenes: Mapping[str, Told]
+
+    @property
+    def harmful(self) -> bool:
+        """It makes something wrong that is looked at here."""
+        return any(told.harmful for told in self.scenes.values())
+
+    def us(self, by: str) -> int | None:
+        """How long this takes to tell it: untouched where it can, else in every scene in which something is wrong."""
+        rest = self.scenes["rest"].by.get(by)
+        if rest is not None:
+            return rest
+        times = [told.by.get(by) for told in self.scenes.values() if told.harmful]
+        return None if not times or None in times else max(time for time in times if time is not None)
+
+    @property
+    def wrong(self) -> int:
+        """Frames at most that were wrong and said nothing."""
+        return max(told.wrong for told in self.scenes.values())
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What the first flagged frames say, of all scenes."""
+        return tuple(dict.fromkeys(word for told in self.scenes.values() for word in told.words))
+
+
+def places(skin: Skin, fault: str) -> Iterator[tuple[str, Hurt]]:
+    """The places of a fault on a sheet."""
+    yield from FAULTS[fault].places(skin).items()
+
+
+def at(skin: Skin, hurt: Hurt, name: str = "", phase: float = PHASES[0]) -> Place:
+    """What becomes of a fault at a place."""
+    return Place(
+        name, {scene: trial.run(skin, hurt, touched, phase) for scene, touched in trial.scenes(skin, hurt).items()}
+    )
+
+
+@functools.cache
+def found(skin: str, fault: str) -> tuple[Place, ...]:
+    """All places of a fault, with the Skin of this name."""
+    hurts = list(places(SKINS[skin], fault))
+    return tuple(at(SKINS[skin], hurt, name, PHASES[number % len(PHASES)]) for number, (name, hurt) in enumerate(hurts))
+
+
+def told(skin: str, fault: str, channels: tuple[str, ...]) -> tuple[int, int]:
+    """At how many of the places at which it does harm a fault is told by one of these, and how many these are."""
+    harmful = [place for place in found(skin, fault) if place.harmful]
+    return sum(any(place.us(channel) is not None for channel in channels) for place in harmful), len(harmful)

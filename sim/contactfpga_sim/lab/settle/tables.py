@@ -1,0 +1,155 @@
+"""The tables and pictures of docs/settle.md.
+
+python -m contactfpga_sim.lab.settle.tables docs/settle.md docs/images
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+
+from contactfpga.design.circuit import SILICON, Circuit, needed, patterns, problems
+from contactfpga.design.circuit.times import MARGIN, Time
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.settle import breaks, pictures, shorted
+from contactfpga_sim.model.sheet import agreement, spice
+from contactfpga_sim.model.sheet.agreement import Compared
+
+SHEETS = {
+    "nominal": (16, Circuit()),
+    "silicon diodes": (16, Circuit(diode=SILICON)),
+    "switches of 500 Ω, 100 pF a line": (16, Circuit(switch_ohm=500.0, line_pf=100.0)),
+    "switches of 1 kΩ, 50 pF a line": (16, Circuit(switch_ohm=1000.0, line_pf=50.0)),
+    "10 pF to each neighbor": (16, Circuit(neighbor_pf=10.0)),
+    "5 pF a crossing": (16, Circuit(crossing_pf=5.0)),
+    "keepers of 10 kΩ": (16, Circuit(column_pull_ohm=10_000.0)),
+    "64x64, rows pulled by 27 kΩ": (64, Circuit(row_pull_ohm=27_000.0)),
+    "64x64, keepers of 27 kΩ too": (64, Circuit(row_pull_ohm=27_000.0, column_pull_ohm=27_000.0)),
+}
+
+
+def needs_table() -> str:
+    """Times that sheets need."""
+    rows = [["16x16 unless said", "precharge", "settle", "release", "project rows", "columns", "without precharge"]]
+    for name, (size, circuit) in SHEETS.items():
+        needs = needed(circuit, size, size)
+        times = (needs.precharge, needs.settle, needs.release, needs.project, needs.project_columns)
+        marks = "" if not problems(circuit, size, size, projects=True) else " (cannot work)"
+        rows.append([name + marks, *map(_us, times), _us(needs.pulled_release)])
+    return writer.table_of(rows)
+
+
+def _us(time: Time) -> str:
+    us = time.us(MARGIN)
+    return "never" if us is None else f"{us:.2f}"
+
+
+@functools.cache
+def compared() -> tuple[Compared, ...]:
+    """Every circuit of the comparison."""
+    return tuple(map(agreement.compared, agreement.cases()))
+
+
+def agreement_table() -> str:
+    """Each circuit in both models."""
+    rows = [["phase", "sheet", "pattern", "pF: line, crossing, neighbor", "Ω: drive, switch, column, row", "diode"]]
+    rows[0] += ["ours, ns", "ngspice, ns", "off by"]
+    for one in compared():
+        circuit, network = one.case.circuit, one.case.phase.network
+        rows.append(
+            [
+                one.case.phase.name,
+                f"{network.rows}x{network.columns}",
+                one.case.pattern,
+                f"{circuit.line_pf:g}, {circuit.crossing_pf:g}, {circuit.neighbor_pf:g}",
+                ", ".join(
+                    f"{ohms:,.3g}" if ohms < 1000 else f"{ohms / 1000:.3g}k"
+                    for ohms in (circuit.drive_ohm, circuit.switch_ohm, circuit.column_pull_ohm, circuit.row_pull_ohm)
+                ),
+                "silicon" if circuit.diode == SILICON else "Schottky",
+                f"{1e9 * one.ours_s:,.4g}",
+                f"{1e9 * one.spice_s:,.4g}",
+                f"{100 * one.error:+.2f} %",
+            ]
+        )
+    return writer.table_of(rows)
+
+
+def summary_table() -> str:
+    """The largest difference of each phase."""
+    rows = [["phase", "circuits", "largest difference"]]
+    for name in agreement.PHASES:
+        errors = [abs(one.error) for one in compared() if one.case.phase.name == name]
+        rows.append([name, str(len(errors)), f"{100 * max(errors):.2f} %"])
+    rows.append(["all", str(len(compared())), f"{100 * max(abs(one.error) for one in compared()):.2f} %"])
+    return writer.table_of(rows)
+
+
+def breaks_table() -> str:
+    """Where each knob breaks."""
+    rows = [["knob", "circuit", "holds until", "breaks at", "what breaks", "what helps"]]
+    for name, knob in breaks.KNOBS.items():
+        for number, (run, outcomes) in enumerate(breaks.turned(name).items()):
+            last, first = breaks.edge(knob, outcomes)
+            rows.append(
+                [
+                    f"{knob.title}: {knob.axis}" if not number else "",
+                    run,
+                    "nowhere" if last is None else f"{last:,g}",
+                    "" if first is None else f"**{first:,g}**",
+                    "nothing" if first is None else knob.breaks,
+                    knob.helps if not number else "",
+                ]
+            )
+    return writer.table_of(rows)
+
+
+def shorted_table() -> str:
+    """What flows through shorted diodes."""
+    head = ["shorted diodes in the column", "level of the column", "out of each of their rows' pins"]
+    rows = [[*head, "into the selected row's pin", "for, per scan of 16 rows"]]
+    row = patterns.middle(breaks.SIZE)
+    for count in (0, 1, 2, 3, 7):
+        found = shorted.row_time(shorted.sheet(count))
+        end = found.starts_us.index(found.starts_us[3])
+        last = int((found.seconds * breaks.US <= found.starts_us[end] * (1 - 1e-9)).nonzero()[0][-1])
+        each, into = found.pin_ma(0)[last], -found.pin_ma(row)[last]
+        flows = shorted.flowing_us(found, row) if count else 0.0
+        rows.append(
+            [
+                str(count),
+                f"{found.column[last]:.2f} V",
+                f"{each:.1f} mA",
+                f"{into:.1f} mA",
+                f"{flows:.2f} µs" if count else "",
+            ]
+        )
+    return writer.table_of(rows)
+
+
+TABLES: writer.Tables = {
+    "needs": needs_table,
+    "breaks": breaks_table,
+    "shorted": shorted_table,
+}
+COMPARED: writer.Tables = {"summary": summary_table, "agreement": agreement_table}
+"""Those that need ngspice."""
+
+
+def main() -> int:
+    """Write the tables into the page and the pictures into the folder named on the command line."""
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on settling.")
+    writer.write(page, TABLES)
+    if spice.installed():
+        writer.write(page, COMPARED)
+    else:
+        print("ngspice is not installed: its tables stay as they are")
+    print(f"wrote {page}")
+    for file in pictures.draw(folder):
+        print(f"drew {file}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

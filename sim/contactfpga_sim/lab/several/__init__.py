@@ -1,0 +1,1 @@
+"""Cost of several sheets at one FPGA."""

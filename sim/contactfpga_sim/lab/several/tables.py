@@ -1,0 +1,84 @@
+"""Measures what several sheets at one FPGA cost and how they share the line, and writes it into the page on them.
+
+`make several-page` runs it.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import sys
+
+import numpy as np
+
+from contactfpga.skin import Skin
+from contactfpga.skin.several import Several
+from contactfpga.tools.console import interrupt
+from contactfpga_hdl.board import sizes
+from contactfpga_hdl.several import SeveralTop
+from contactfpga_hdl.top import Top
+from contactfpga_sim.lab import size, writer
+from contactfpga_sim.model.golden import Timeline, predict
+from contactfpga_sim.model.golden.predict import predict_several
+from contactfpga_sim.model.golden.trace import Trace
+from contactfpga_sim.model.scenes.scene import scene
+
+SKIN = Skin(row_drive="74hc595", column_read="74hc165")
+COUNTS = (1, 2, 3, 4, 8)
+BAUDS = (3_000_000, 12_000_000)
+SECONDS = 0.05
+"""Of the board that is looked at, less its hellos."""
+
+
+def size_table() -> str:
+    """LUT4 on an iCE40UP5K."""
+    cores = {1: functools.partial(Top, SKIN)} | {
+        count: functools.partial(SeveralTop, Several((SKIN,) * count)) for count in (2, 3)
+    }
+    counts = {count: size.luts(core, sizes.UP5K) for count, core in cores.items()}
+    rows = [(str(count), f"{luts:,}", f"{luts / counts[1]:.2f}") for count, luts in counts.items()]
+    return writer.table_of([("sheets of 16x16", "LUT4 of 5,280", "times one sheet"), *rows])
+
+
+def line_table() -> str:
+    """How often frames come, and how old they are, of as many sheets as there are, each touched by two fingertips."""
+    rows = [_row(count, baud) for baud in BAUDS for count in COUNTS]
+    return writer.table_of([("baud", "sheets", "frames/s per sheet", "replaced", "longest wait for the line"), *rows])
+
+
+def _row(count: int, baud: int) -> tuple[str, ...]:
+    skin = SKIN.replace(baud=baud, clock_hz=24_000_000 if baud > 6_000_000 else SKIN.clock_hz)
+    cycles = round(SECONDS * skin.clock_hz)
+    timeline = Timeline([(0, np.asarray(scene(skin, "two_fingers")(0.0)), None)])
+    traces = [predict(skin, timeline, cycles)]
+    if count > 1:
+        traces = predict_several([skin] * count, [timeline] * count, cycles)
+    after = max(cycle for trace in traces for cycle, value in trace.bytes[:200] if value == 0 and cycle < cycles // 5)
+    packed = sum(last and cycle > after for cycle, _, last in traces[0].rows)
+    frames = [_frames(trace, after) for trace in traces]
+    per_second = np.mean([len(of_one) for of_one in frames]) / (cycles - after) * skin.clock_hz
+    waits = [_longest_wait(trace, of_one) for trace, of_one in zip(traces, frames, strict=True)]
+    replaced = max(0.0, 1 - np.mean([len(of_one) for of_one in frames]) / packed)
+    longest = max(waits) / skin.clock_hz * 1e6
+    return f"{baud:,}", str(count), f"{per_second:,.0f}", f"{replaced:.0%}", f"{longest:.0f} µs"
+
+
+def _frames(trace: Trace, after: int) -> list[int]:
+    """Cycles in which frames begin on the line after a cycle."""
+    ends = [cycle for cycle, value in trace.bytes if value == 0]
+    begins = {end: cycle for (end, _), (cycle, _) in itertools.pairwise(trace.bytes)}
+    return [begins[end] for end in ends[:-1] if end > after]
+
+
+def _longest_wait(trace: Trace, begins: list[int]) -> int:
+    """Clocks from the last row of the frame that is sent, at most."""
+    rows = np.array([cycle for cycle, _, last in trace.rows if last])
+    newest = np.searchsorted(rows, np.array(begins)) - 1
+    return int(max(np.array(begins) - rows[newest]))
+
+
+TABLES: writer.Tables = {"several_line": line_table, "several_size": size_table}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

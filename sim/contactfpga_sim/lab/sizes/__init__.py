@@ -1,0 +1,1 @@
+"""Size and clock by place and route."""

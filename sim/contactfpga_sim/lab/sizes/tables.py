@@ -1,0 +1,136 @@
+"""Measures by place and route what the performance and boards pages state of size and clock, and writes it there.
+
+`make sizes` runs it: some 160 runs of place and route, an hour and more of one core unless they are kept from before.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.skin import Skin
+from contactfpga.tools.console import interrupt
+from contactfpga_hdl.board import build, sizes
+from contactfpga_hdl.top import Top
+from contactfpga_sim.lab import size, writer
+
+EXAMPLES = {"icebreaker": Path("examples/icebreaker-64x64.toml")}
+"""Sheets that the boards page shows beside the default ones."""
+FAST = Path("examples/fast.toml")
+
+
+FAULTS: dict[str, dict[str, Any]] = {
+    "`guard`": {"guard": True},
+    "`fail_safe`": {"fail_safe": True},
+    "`alive`": {"alive": True},
+    "`guard`, `fail_safe` and `alive`": {"guard": True, "fail_safe": True, "alive": True},
+    "`row_order` and `column_order`": {"row_order": (*range(1, 16), 0), "column_order": (*range(1, 16), 0)},
+}
+"""Options that tell of faults, by their titles."""
+FAST_FAULTS: dict[str, dict[str, Any]] = {
+    "`guard`": {"guard": True},
+    "`self_test`": {"self_test": True},
+    "`guard` and `self_test`": {"guard": True, "self_test": True},
+}
+"""The same of a scan by line reversal."""
+
+WEIGHTS = (
+    (1, 2, 3, -4, 5, 6, 7, 8),
+    (-1, 1, -1, 1, -1, 1, -1, 1),
+    (100, -50, 20, 10, 5, -7, 9, 11),
+    (1, 1, 1, 1, 1, 1, 1, 1),
+)
+"""Of sums, which are cut to the units there are."""
+
+
+def gateware_table() -> str:
+    """The whole design and the labeller alone, by sheet and device."""
+    head = ("design", "device", *(f"{lines}x{lines}" for lines in size.SIZES))
+    rows = (
+        (name, device.title, *(gateware_cell(name, device, lines) for lines in size.SIZES))
+        for name in size.DESIGNS
+        for device in sizes.DEVICES
+    )
+    return writer.table(head, map(writer.line, rows))
+
+
+def gateware_cell(name: str, device: sizes.Device, lines: int) -> str:
+    """LUT4, flip-flops, block RAMs and clock of a design."""
+    print(f"{name}, {device.title}, {lines}x{lines}: {sizes.SEEDS} times place and route", file=sys.stderr)
+    found = size.measure(lambda: size.DESIGNS[name](size.square(lines)), device)
+    return f"{found.luts:,} / {found.flip_flops:,} / {found.block_rams}, {found.fmax_mhz:.0f} MHz"
+
+
+def faults_table() -> str:
+    """The reference Skin and the fast one with the options that tell of faults."""
+    rows = [*_fault_rows(Skin(), "none", FAULTS), *_fault_rows(Skin.load(FAST), f"`{FAST}`", FAST_FAULTS)]
+    return writer.table(("option", "LUT4", "more"), map(writer.line, rows))
+
+
+def _fault_rows(skin: Skin, name: str, table: dict[str, dict[str, Any]]) -> list[tuple[str, str, str]]:
+    reference = size.luts(lambda: Top(skin), sizes.UP5K)
+    rows = [(name, f"{reference:,}", "")]
+    for title, options in table.items():
+        found = size.luts(lambda options=options: Top(skin.replace(**options)), sizes.UP5K)  # type: ignore[misc]
+        rows.append((title, f"{found:,}", f"{found - reference:+}"))
+    return rows
+
+
+def units_table() -> str:
+    """The reference Skin with pressure units and weighted sums of them."""
+    reference = size.luts(lambda: Top(Skin()), sizes.UP5K)
+    rows = []
+    for units, sums in ((1, 0), (3, 1), (6, 0), (6, 4), (8, 4)):
+        skin = Skin(units=units, unit_sums=tuple(row[:units] for row in WEIGHTS[:sums]))
+        found = size.luts(functools.partial(Top, skin), sizes.UP5K)
+        rows.append((str(units), str(sums), f"{found:,}", f"{found - reference:+}"))
+    return writer.table(("units", "sums", "LUT4", "more"), map(writer.line, rows))
+
+
+def boards_table() -> str:
+    """The sheets that the boards page names, each built for its board."""
+    head = ("board", "FPGA", "clock", "sheet", "LUT4", "flip-flops", "block RAMs", "logic cells", "Fmax")
+    lines = []
+    for board in BOARDS.values():
+        lines.append(board_row(board, board.skin))
+        if board.name in EXAMPLES:
+            lines.append(board_row(board, Skin.load(EXAMPLES[board.name])))
+    return writer.table(head, lines)
+
+
+def board_row(board: BoardSpec, skin: Skin) -> str:
+    """What the bitstream of a Skin takes of the board's FPGA."""
+    print(f"{board.title}, {skin.rows}x{skin.columns}: bitstream", file=sys.stderr)
+    with tempfile.TemporaryDirectory(prefix=".sizes-", dir=Path.cwd()) as folder:  # these tools do not see /tmp
+        found = build.build(skin, board, Path(folder))
+    registers = [kind.upper() for kind in (skin.row_drive, skin.column_read) if kind != "direct"]
+    fields = (
+        board.title,
+        board.fpga,
+        f"{skin.clock_hz / 1e6:g} MHz",
+        " ".join((f"{skin.rows}x{skin.columns}", *registers)),
+        "{:,} of {:,}".format(*found.luts),
+        f"{found.flip_flops:,}",
+        "{} of {}".format(*found.block_rams),
+        "{:,} of {:,}".format(*found.logic_cells) if found.logic_cells else "",
+        f"{found.fmax_mhz:.1f} MHz",
+    )
+    return writer.line(fields)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "gateware": gateware_table,
+    "faults": faults_table,
+    "units_size": units_table,
+    "boards": boards_table,
+}
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

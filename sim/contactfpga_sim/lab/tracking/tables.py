@@ -1,0 +1,110 @@
+"""The tables and the picture of docs/tracking.md.
+
+python -m contactfpga_sim.lab.tracking.tables docs/tracking.md docs/images
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from contactfpga import picture_style as style
+from contactfpga.tools.console import interrupt
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.failures import tables as failures_tables
+from contactfpga_sim.lab.performance.scans import RECORDINGS
+from contactfpga_sim.lab.tracking import breaks, reflex, scenes, scores, speed
+
+HEAD = ("tracker", "MOTA, %", "IDF1, %", "id switches per 1,000 frames")
+LOOKS = {"`Tracker`": (style.BLUE, "solid"), "nearest zone": (style.VERMILLION, style.DASHES[1])}
+
+
+def scores_table() -> str:
+    """Random scenes."""
+    rows = [("scenes", "frames per second", *HEAD)]
+    for (family, rate), found in scores.all_scenes().items():
+        for number, (tracker, score) in enumerate(found.items()):
+            first = (f"`{family}`", f"{rate:,g}") if number == 0 else ("", "")
+            rows.append((*first, tracker, *score.cells))
+    return writer.table_of(rows)
+
+
+def recorded_table() -> str:
+    """Recordings."""
+    rows = [("recording", "frames taken", *HEAD)]
+    for path in sorted(RECORDINGS.glob("*.npz")):
+        for every in scores.EVERY:
+            for number, (tracker, score) in enumerate(scores.of_recording(path, every).items()):
+                taken = "all" if every == 1 else f"one of {every}"
+                first = (path.name.partition(".")[0], taken) if number == 0 else ("", "")
+                rows.append((*first, tracker, *score.cells))
+    return writer.table_of(rows)
+
+
+def breaks_table() -> str:
+    """Where ids are lost."""
+    lines = [line for study in breaks.STUDIES.values() for line in failures_tables.rows(study, study.turn(), False)]
+    return writer.table(failures_tables.HEAD, lines)
+
+
+def speed_table() -> str:
+    """On the machine that runs this."""
+    rows = [("contacts", "tracked per second", "decoded per second", "tracking takes, in times of decoding")]
+    for contacts in (1, 2):
+        found = speed.measure(contacts)
+        rows.append((str(contacts), f"{found.tracked:,.0f}", f"{found.decoded:,.0f}", f"{found.ratio:.2f}"))
+    return writer.table_of(rows)
+
+
+def reflex_table() -> str:
+    """On the machine that runs this."""
+    return writer.table_of([reflex.HEAD, reflex.measured().cells])
+
+
+TABLES: writer.Tables = {"breaks": breaks_table}
+"""Those that are the same on each machine and need no more than the simulation."""
+
+JUDGED: writer.Tables = {
+    "scores": scores_table,
+    **({"recorded": recorded_table} if RECORDINGS.is_dir() else {}),  # else it stays as it is
+}
+"""Those that py-motmetrics is needed for."""
+
+MEASURED: writer.Tables = {"speed": speed_table, "reflex": reflex_table}
+"""Those of this machine."""
+
+
+def draw(folder: Path) -> Path:
+    """How often ids are right, by family, rate and tracker."""
+    import matplotlib
+
+    with matplotlib.rc_context(style.SETTINGS):
+        figure = style.new(3.1)
+        panels = figure.subplots(1, len(scenes.FAMILIES), sharey=True)
+        for axes, family in zip(panels, scenes.FAMILIES):
+            for tracker, (color, dashes) in LOOKS.items():
+                values = [100 * scores.of_family(family, rate)[tracker].idf1 for rate in scores.RATES_HZ]
+                name = tracker.replace("`", "")
+                axes.plot(scores.RATES_HZ, values, color=color, ls=dashes, marker="o", ms=4, label=name)
+            axes.set(title=family, xscale="log", ylim=(0, 105), xticks=[30, 100, 300, 1000])
+            axes.set_xticklabels(["30", "", "300", ""])
+            axes.minorticks_off()
+            axes.grid(True)
+        panels[0].set_ylabel("IDF1, %")
+        figure.supxlabel("frames per second", fontsize=style.NORMAL)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+        return style.save(figure, folder / "tracking.svg")
+
+
+def main() -> int:
+    """Write the tables into the page and the picture into the folder named on the command line."""
+    page, folder = writer.page_and_folder("Write the tables and the picture of the page on tracking.")
+    for tables in (MEASURED, TABLES, JUDGED):
+        writer.write(page, tables)
+    print(f"wrote {page}")
+    print(f"drew {draw(folder)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

@@ -1,0 +1,1 @@
+"""Sweep times of pressure units."""

@@ -1,0 +1,1 @@
+"""Delay and load of the view in a browser."""

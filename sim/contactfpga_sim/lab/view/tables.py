@@ -1,0 +1,258 @@
+"""The figures of docs/view.md and the picture of the view, from a browser without a window.
+
+python -m contactfpga_sim.lab.view.tables docs/view.md docs/images
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from contactfpga.driver import driver
+from contactfpga.driver.link import Link
+from contactfpga.skin.sheet import Sheet
+from contactfpga.tools.console import interrupt, outputs
+from contactfpga.tools.view import opening, plot, replayed
+from contactfpga.tools.view.app import View
+from contactfpga.tools.view.opening import Shown
+from contactfpga.zones.batch import Batch
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.view import browser
+
+CLICKS = 20
+PACED_S = 4.0
+WAIT_S = 0.7
+"""Between two clicks: two of them at once would be a drag."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Click:
+    """Moments of one click, in s of ``time.time()``, and what the board and the driver took of it."""
+
+    released: float
+    """In the browser."""
+    touched: float
+    """The finger is on the virtual board."""
+    gateware_s: float
+    """Board time from there to the last byte of the first frame with the zone."""
+    driver_s: float
+    """From bytes to zones."""
+    read: float
+    """The view has the zones."""
+    queued: float
+    """They are on their way to the browser."""
+    drawn: float
+    """In the browser."""
+
+    @property
+    def parts_s(self) -> dict[str, float]:
+        """What the time was spent on."""
+        board = self.read - self.touched
+        return {
+            "browser and viser: from the mouse to the view": self.touched - self.released,
+            "gateware and wire, board time": self.gateware_s,
+            "driver: bytes to zones": self.driver_s,
+            "view: the rest of its moment, and of simulating it": board - self.gateware_s - self.driver_s,
+            "view: what to draw": self.queued - self.read,
+            "viser and browser: until it is drawn": self.drawn - self.queued,
+            "all": self.drawn - self.released,
+        }
+
+
+class Stopwatch:
+    """Notes when a click passes through the view, in :attr:`times`."""
+
+    def __init__(self, shown: Shown):
+        assert shown.hand is not None
+        assert isinstance(shown.view, View)
+        self._stage = shown.view.stage
+        self.times: dict[str, float] = {}
+        self._shown = shown
+        self._virtual: Any = shown.hand.board
+        self._driver_s = 0.0
+
+    @contextlib.contextmanager
+    def running(self) -> Iterator[None]:
+        """While it does, what the click passes through is wrapped."""
+        source = self._shown.source
+        wrapped: list[tuple[Any, str, Callable[..., Any]]] = [
+            (self._virtual, "touch", self._touch),
+            (Link, "_take", self._take),
+            (source, "frames", self._frames),
+            (source, "turn", self._turn),
+            (self._stage, "draw", self._draw),
+        ]
+        with contextlib.ExitStack() as stack:
+            for where, name, noted in wrapped:
+                kept = getattr(where, name)
+                stack.callback(setattr, where, name, kept)
+                setattr(where, name, functools.partial(noted, kept) if where is not Link else _method(noted, kept))
+            yield
+
+    def _touch(self, touch: Any, fingers: Any) -> None:
+        if fingers:
+            self.times = {"touched": time.time(), "clock": self._virtual.clock()}
+        touch(fingers)
+
+    def _take(self, take: Any, link: Any, data: bytes) -> None:
+        started = time.thread_time()
+        take(link, data)
+        self._driver_s += time.thread_time() - started
+
+    def _frames(self, frames: Any, *args: Any) -> Batch:
+        batch: Batch = frames(*args)
+        closed = batch.frames[batch.frames["pressed"] > 0]
+        if len(closed) and "clock" in self.times:
+            self.times.setdefault("arrived", float(closed["arrived_s"][0]))
+        return batch
+
+    def _turn(self, turn: Any) -> Any:
+        self._driver_s = 0.0
+        moment = turn()
+        if moment is not None and len(moment.zones) and "arrived" in self.times and "read" not in self.times:
+            self.times |= {"read": time.time(), "driver": self._driver_s}
+        return moment
+
+    def _draw(self, draw: Any, moment: Any) -> None:
+        draw(moment)
+        if "read" in self.times:
+            self.times.setdefault("queued", time.time())
+
+
+def _method(noted: Any, kept: Any) -> Any:
+    return lambda *args: noted(kept, *args)
+
+
+def sheet_of(shown: Shown) -> Sheet:
+    """What is shown."""
+    assert isinstance(shown.view, View)
+    return shown.view.stage.tiles.sheet
+
+
+def clicks(shown: Shown, visitor: browser.Visitor, count: int = CLICKS) -> list[Click]:
+    """Click cells one after the other, and lift the finger in between."""
+    watch, sheet, found = Stopwatch(shown), sheet_of(shown), []
+    assert shown.hand is not None
+    with watch.running():
+        for index in range(count):
+            row, column = 2 + 5 * index % (sheet.rows - 4), 2 + 7 * index % (sheet.columns - 4)
+            place = column * sheet.pitch_x_mm, row * sheet.pitch_y_mm
+            visitor.watch(*place)
+            visitor.click(*place)
+            released, drawn = visitor.drawn_s()
+            took = watch.times
+            gateware_s = took["arrived"] - took["clock"]
+            found.append(
+                Click(released, took["touched"], gateware_s, took["driver"], took["read"], took["queued"], drawn)
+            )
+            shown.hand.lift()
+            visitor.page.wait_for_timeout(WAIT_S * 1e3)
+    return found
+
+
+def click_table(found: list[Click]) -> str:
+    """Median and worst of each part."""
+    rows = [["from the click to the drawn zone", "median", "worst"]]
+    for name in found[0].parts_s:
+        values = [click.parts_s[name] * 1e3 for click in found]
+        rows.append([name, f"{statistics.median(values):.1f} ms", f"{max(values):.1f} ms"])
+    return writer.table_of(rows)
+
+
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """Processor time per second of board time, all in s."""
+
+    board: float
+    """Simulating the board."""
+    rest: float
+    """Driver and view, without a browser."""
+
+
+def load_of(shown: Shown, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+    """While these fingers press. Processor time does not depend on what else the computer does."""
+    assert shown.hand is not None
+    virtual: Any = shown.hand.board
+    spent, read = [0.0], virtual.read
+
+    def timed(wanted_s: float) -> bytes:
+        started = time.thread_time()
+        data: bytes = read(wanted_s)
+        spent[0] += time.thread_time() - started
+        return data
+
+    for place in fingers:
+        shown.hand.click(*place)
+    virtual.read = timed
+    began_s, began = virtual.clock(), time.thread_time()
+    while virtual.clock() - began_s < seconds:
+        shown.view.turn()
+    passed_s, used = virtual.clock() - began_s, time.thread_time() - began
+    virtual.read = read
+    shown.hand.lift()
+    return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
+
+
+def load_table(shown: Shown) -> str:
+    """Untouched and touched."""
+    rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
+    for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
+        load = load_of(shown, fingers)
+        both = load.board + load.rest
+        rows.append([name, *(f"{share:.0%}".replace("%", " %") for share in (load.board, load.rest, both))])
+    return writer.table_of(rows)
+
+
+def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
+    """Three fingers, one of them on its way."""
+    pitch_mm = sheet_of(shown).pitch_x_mm
+    assert shown.hand is not None
+    shown.hand.resize(radius_mm=1.6 * pitch_mm)
+    visitor.click(3.4 * pitch_mm, 11.3 * pitch_mm)
+    visitor.page.wait_for_timeout(1500)
+    shown.hand.radius_mm = 1.1 * pitch_mm
+    visitor.click(11.2 * pitch_mm, 11.6 * pitch_mm)
+    visitor.page.wait_for_timeout(1500)
+    browser.screenshot(visitor, path, before=lambda: visitor.drag(*((pitch_mm * x, pitch_mm * y) for x, y in WAY)))
+
+
+def plotted(path: Path) -> None:
+    """A finger that circles, recorded and drawn."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "moving.rec"
+        with driver.open("sim://?scene=moving", record=file) as board:
+            while board.clock() < PLOTTED_S:
+                board.next()
+        plot.draw(replayed.load(str(file)), path)
+
+
+PLOTTED_S = 2.0
+
+WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
+"""Of the finger that moves, in pitches."""
+
+
+def main() -> int:
+    """Measure, write the page, take the picture."""
+    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the view.")
+    image, drawn = (outputs.file(folder / name, "folder") for name in ("view.png", "plot.svg"))
+    plotted(drawn)
+    with opening.opened(http_port=0) as shown:
+        loads = load_table(shown)
+    with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
+        found = clicks(shown, visitor)
+        picture(shown, visitor, image)
+    writer.write(page, {"view_load": lambda: loads, "view_clicks": lambda: click_table(found)})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

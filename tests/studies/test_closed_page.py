@@ -1,0 +1,29 @@
+"""What the page on labelling states of closed sheets."""
+
+from pathlib import Path
+
+import pytest
+
+from contactfpga.choices.labellers import LABELLERS
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.closed import tables
+
+PAGE = Path(__file__).resolve().parents[2] / "docs/labelling.md"
+
+
+def test_the_clocks_of_run_are_up_to_date():
+    labeller = LABELLERS["run"]
+    cells = (*tables.names(labeller, 8), *tables.worst(labeller, 8), *tables.most(labeller, 8))
+    assert writer.line(cells) in PAGE.read_text(encoding="utf-8").splitlines()
+
+
+def test_the_bound_of_run_is_the_goal():
+    """C/2 + 5 clocks after the last row."""
+    for columns, bound in zip((8, 16, 32, 64), tables.most(LABELLERS["run"], 8), strict=True):
+        assert int(bound) == columns / 2 + 3
+
+
+@pytest.mark.campaign
+def test_all_tables_are_up_to_date():
+    text = PAGE.read_text(encoding="utf-8")
+    assert writer.update(text, tables.TABLES) == text

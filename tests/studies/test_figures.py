@@ -1,0 +1,51 @@
+"""The figures in the pages are those the gateware gives."""
+
+from pathlib import Path
+
+import pytest
+from sample import sample
+
+from contactfpga.skin import Skin
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.performance import scans
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs/performance.md"
+
+
+def test_the_reference_skins_row_is_up_to_date():
+    assert scans.reference_row("reference", Skin()) in PAGE.read_text().splitlines()
+
+
+@pytest.mark.parametrize("report", sample(scans.REPORTS, quick=["moments"]))
+def test_the_reference_skins_reports_are_up_to_date(report):
+    row = scans.report_row("reference", Skin(report=report))
+    assert row in PAGE.read_text().splitlines()
+
+
+def test_the_reference_skin_keeps_the_promised_latency():
+    """Two scans, the wire and 3 us."""
+    skin = Skin()
+    latency = scans.touch_latencies(skin)
+    wire = 17 * 10 / 3
+    assert latency["last byte"].worst <= 2 * 96 + wire + 3
+    assert latency["contact"].worst <= 96 + 4 / 12
+
+
+def test_the_gains_of_the_adaptive_scan_are_up_to_date():
+    text = PAGE.read_text()
+    assert writer.update(text, {"gain": scans.TABLES["gain"]}) == text
+
+
+def test_the_times_of_pressure_units_are_up_to_date():
+    page = ROOT / "docs/units.md"
+    text = page.read_text(encoding="utf-8")
+    assert writer.update(text, {"units": scans.TABLES["units"]}) == text
+    assert "<!-- figures: units_size -->" in text
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(3600)
+def test_all_tables_are_up_to_date():
+    text = PAGE.read_text()
+    assert writer.update(text, scans.TABLES) == text

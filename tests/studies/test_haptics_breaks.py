@@ -1,0 +1,98 @@
+"""Where force joined to location fails: the breaks that the page states, found again; and end to end."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactfpga.robot.haptics import Plane
+from contactfpga_sim.lab.failures import tables
+from contactfpga_sim.lab.failures.knob import Turned
+from contactfpga_sim.lab.haptics import breaks, felt, felt_tables, pairs
+from contactfpga_sim.lab.haptics.breaks import STUDIES
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "haptics.md").read_text(encoding="utf-8")
+SLOW = ("shape", "skew", "edge")
+ALL = [(name, method) for name, study in STUDIES.items() for method in study.runs]
+QUICK = [
+    ("unseen", "force at the zone"),
+    ("torsion", "center of pressure"),
+    ("clipping", "center of pressure"),
+    ("friction", "interval"),
+]
+
+
+def on_page(name):
+    """The lines of a study in the page's table."""
+    table = re.search(r"<!-- figures: breaks -->\n(.*?)\n<!-- end -->", PAGE, re.DOTALL)[1].splitlines()[2:]
+    starts = [at for at, line in enumerate(table) if line.startswith("| [")] + [len(table)]
+    first = next(at for at in starts if f"(#{name})" in table[at])
+    return table[first : starts[starts.index(first) + 1]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "method"), [pytest.param(*one, marks=[] if one in QUICK else pytest.mark.campaign) for one in ALL]
+)
+def test_each_break_is_where_the_page_says(name, method):
+    study = STUDIES[name]
+    found = Turned(study.values, tuple(map(study.runs[method], study.values)))
+    line = tables.rows(study, {method: found})[0].split(" | ")[2:6]
+    (stated,) = [one.split(" | ")[2:6] for one in on_page(name) if one.split(" | ")[1] == method]
+    assert line == stated
+
+
+def test_what_nothing_disturbs_is_as_stated():
+    """A covariance that is too small or too large by a tenth would show."""
+    trials = breaks._force(breaks.Load())
+    assert 0.91 < np.mean([trial.holds for trial in trials]) < 0.99
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("setting", felt.SETTINGS[1:2])
+def test_a_place_asked_once_is_that_of_asking_again_and_again(setting):
+    """So that the campaign may ask at the end alone, which takes half the time."""
+    last = felt.errors(setting, 3, felt.TIMES_S[-1:])
+    assert {method: [errors[-1]] for method, errors in felt.errors(setting, 3).items()} == last
+
+
+PLACEMENTS = 334
+"""Of each of three tests, which makes 1,000 in all; each takes a minute."""
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(("setting", "most_mm"), list(zip(felt.SETTINGS[1:], (0.15, 0.4))))
+def test_closings_of_many_placements_end_to_end(setting, most_mm):
+    """At 5 mm, with as many switches as close: 0.15 mm without noise, 0.4 mm with it."""
+    errors = felt_tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])
+    assert felt_tables.interval(errors["closings"][:, -1])[2] <= 1e-3 * most_mm
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(1200)
+def test_centers_of_pressure_of_many_placements_end_to_end():
+    """As far off as their covariance predicts. Between two samples, at a share s, noise is sqrt(s^2 + (1 - s)^2) of a
+    sample's, which is sqrt(2 / 3) on average."""
+    setting = felt.SETTINGS[0]
+    errors = felt_tables.found(setting, PLACEMENTS, felt.TIMES_S[-1:])["center of pressure"][:, -1]
+    push = np.array([0, 0, -felt.MOST_N, 0, 0, 0])
+    predicted = Plane().center(setting.cells.wrench(setting.cells.zeros + np.linalg.pinv(setting.cells.matrix) @ push))
+    expected = np.sqrt(2 / 3 * np.trace(predicted.covariance_m2))
+    assert felt_tables.interval(errors)[0] == pytest.approx(expected, rel=0.1)
+
+
+def test_places_limit_the_forces_of_two_fingers():
+    """Not how they are computed: the page says so."""
+    off = {method: np.sqrt(np.mean(errors**2)) for method, errors in pairs.errors(60.0, 50).items()}
+    coarse, mean, known = (off[method] for method in pairs.METHODS)
+    assert mean == pytest.approx(coarse, rel=0.15)
+    assert known < 0.8 * coarse
+
+
+@pytest.mark.campaign  # which has a board of its own to compile
+def test_two_contacts_60_mm_apart_are_felt_apart():
+    found = felt.two(60.0, 0)
+    assert found.zones == 2
+    assert np.sqrt(np.mean(np.square(found.off_n))) < 1.2  # 0.6 N over many

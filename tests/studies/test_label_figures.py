@@ -1,0 +1,100 @@
+"""What the pages state of the labeller's last record: touches at every place, recordings, bounds."""
+
+import itertools
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sample import sample
+
+from contactfpga.skin import Skin
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.performance import labellers as label_figures
+from contactfpga_sim.lab.performance import scans
+from contactfpga_sim.model.board.labeller import LabelBench
+from contactfpga_sim.model.golden import volume
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs/performance.md").read_text()
+SQUARE = Skin(settle_us=15.0)
+
+
+@pytest.fixture(scope="module")
+def places():
+    return label_figures.every_place(label_figures.touches(SQUARE))
+
+
+@pytest.mark.parametrize("labeller", label_figures.EXACT)
+@pytest.mark.parametrize("connectivity", [8, 4])
+def test_the_last_two_rows_alone_decide_how_late_the_last_record_is(labeller, connectivity):
+    rng = np.random.default_rng(3)
+    frames = rng.random((500, 9, 16)) < rng.choice([0.1, 0.3, 0.6, 0.9], (500, 1, 1))
+    whole = volume.last_record_clocks(frames, connectivity, labeller)
+    assert np.array_equal(volume.last_record_clocks(frames[:, -2:], connectivity, labeller), whole)
+
+
+def test_every_place_is_every_offset_of_the_frame():
+    """Counted with the frame moved about on a sheet, a cell at a time."""
+    frame = np.zeros((4, 5), bool)
+    frame[1, 1:4] = frame[2, 2] = True
+    padded = np.pad(frame, ((4, 4), (5, 5)))
+    expected = {}
+    for down in range(1, 8):
+        for right in range(1, 10):
+            last = padded[down : down + 4, right : right + 5][-2:]
+            if last.any():
+                expected[last.tobytes()] = expected.get(last.tobytes(), 0) + 1
+    rows, count = label_figures.every_place(frame[None])
+    assert {row.tobytes(): number for row, number in zip(rows, count.tolist())} == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("labeller", "connectivity"),
+    sample(itertools.product(label_figures.EXACT, (8, 4)), quick=[(label_figures.EXACT[0], 8)]),
+)
+def test_the_gateware_is_as_late_as_the_page_says(places, labeller, connectivity):
+    """The worst touch goes through the compiled labeller; the row of the table is that of a new run."""
+    skin = SQUARE.replace(labeller=labeller, connectivity=connectivity)
+    assert label_figures.labeller_row(skin, places) in PAGE.splitlines()
+    rows, _ = places
+    clocks = volume.last_record_clocks(rows, connectivity, labeller)
+    worst = np.zeros((1, 16, 16), bool)
+    worst[0, -2:] = rows[clocks.argmax()]
+    with LabelBench(skin) as bench:
+        assert bench.run(worst).last_record_clocks[0] == clocks.max()
+
+
+def test_no_line_of_the_tables_is_above_its_bound():
+    lines = re.findall(r"\| (\d+) / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", PAGE)
+    lines += [
+        (*found, found[2], limit) for *found, limit in re.findall(r"\| (\d+) / (\d+) / (\d+), (\d+)(?= \|)", PAGE)
+    ]
+    assert len(lines) >= 12 + 10
+    for line in lines:
+        values = list(map(int, line))
+        assert values == sorted(values)
+
+
+def test_the_text_says_what_the_tables_say():
+    text = " ".join(PAGE.split())
+    (run,) = re.findall(r"\| `run` \| 16x16 \| 8 \| \d+ / (\d+) / (\d+) clocks \| (\d+) clocks \| (\d+) \|", PAGE)
+    (serial,) = re.findall(r"\| `serial` \| 16x16 \| 8 \| \d+ / (\d+) / (\d+) clocks \| (\d+) clocks", PAGE)
+    assert f"its last record at most {run[3]} clocks after the last row;" in text
+    assert f"to break labellers take {run[2]}." in text
+    assert f"at every place, take {run[0]} or fewer in 99 % and {run[1]} at worst." in text
+    assert (
+        f"Touches take {serial[0]} clocks or fewer in 99 % and {serial[1]} at worst, the worst shape {serial[2]}."
+        in text
+    )
+    recorded = re.findall(r"\| 8 \| \d+ / (\d+) / (\d+), \d+ \|", PAGE)
+    most, worst = (max(map(int, column)) for column in zip(*recorded))
+    assert f"recordings on five sheets take {most} or fewer in 99 % and up to {worst}," in text
+
+
+@pytest.mark.skipif(not (ROOT / scans.RECORDINGS).is_dir(), reason="no recordings")
+def test_the_recordings_table_is_up_to_date():
+    recordings = scans.recordings(ROOT / scans.RECORDINGS)
+    text = writer.update(PAGE, {"labeller_recorded": lambda: label_figures.recorded_table(recordings)})
+    assert text == PAGE

@@ -1,0 +1,48 @@
+"""The maker's page: its tables, its schematic, and its Skin, which the circuit model takes."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from sample import sample
+
+from contactfpga.design.circuit import load_checked, needed
+from contactfpga.skin import Skin
+from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.maker import schematic, tables
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = DOCS / "maker.md"
+
+
+@pytest.mark.parametrize("name", sample(tables.TABLES, quick=["diodes"]))
+def test_tables_are_up_to_date(name):
+    text = PAGE.read_text(encoding="utf-8")
+    assert f"<!-- figures: {name} -->" in text
+    assert writer.update(text, {name: tables.TABLES[name]}) == text
+
+
+def test_the_schematic_is_the_one_that_is_drawn(tmp_path):
+    drawn = schematic.draw(tmp_path / "schematic.svg").read_text(encoding="utf-8")
+    assert drawn == (DOCS / "images" / "schematic.svg").read_text(encoding="utf-8")
+
+
+def test_the_schematic_shows_the_values_of_the_tables():
+    drawn = (DOCS / "images" / "schematic.svg").read_text(encoding="utf-8")
+    circuit = tables.PULLED
+    for ohm in (circuit.column_pull_ohm, circuit.row_pull_ohm):
+        assert f"{ohm / 1000:g} kΩ" in drawn
+    assert f"{circuit.series_ohm:g} Ω" in drawn
+
+
+def test_the_pages_skin_works_with_its_circuit(tmp_path):
+    (text,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    file = tmp_path / "skin.toml"
+    file.write_text(text, encoding="utf-8")
+    assert tomllib.loads(text)["circuit"]["column_pull_ohm"] == tables.PULLED.column_pull_ohm
+    skin = Skin.load(file)
+    circuit = load_checked(file, skin)
+    needs = needed(circuit, skin.rows, skin.columns)
+    assert needs.pulled_release.us(1.3) <= skin.release_us
+    assert needs.settle.us(1.3) <= skin.settle_us
