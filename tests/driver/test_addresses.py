@@ -7,9 +7,9 @@ import pytest
 from slow_skin import SLOW
 
 import contactfpga
-from contactfpga.driver import recording, sim_address
+from contactfpga.driver import recording
+from contactfpga.driver.address import Sim, parse
 from contactfpga.driver.ports import Candidate
-from contactfpga.driver.sim_address import SimAddress
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.tools import cli
@@ -20,17 +20,17 @@ from contactfpga_sim.model.board.pty_board import PtyBoard
 @pytest.mark.parametrize(
     ("address", "meant"),
     [
-        ("sim://", SimAddress()),
-        ("sim:", SimAddress()),
-        ("sim://?scene=palm&skin=a/b.toml", SimAddress("palm", "a/b.toml")),
-        ("sim://?skin=a+b#c=d.toml", SimAddress(skin="a+b#c=d.toml")),
-        ("sim://?skin=50%25%26more%2B.toml", SimAddress(skin="50%&more+.toml")),
-        ("sim://?skin=%C3%BC%20.toml", SimAddress(skin="ü .toml")),
-        ("sim://?scene=a.npy&threshold=-1.5", SimAddress("a.npy", None, -1.5)),
+        ("sim://", Sim()),
+        ("sim:", Sim()),
+        ("sim://?scene=palm&skin=a/b.toml", Sim("palm", "a/b.toml")),
+        ("sim://?skin=a+b#c=d.toml", Sim(skin="a+b#c=d.toml")),
+        ("sim://?skin=50%25%26more%2B.toml", Sim(skin="50%&more+.toml")),
+        ("sim://?skin=%C3%BC%20.toml", Sim(skin="ü .toml")),
+        ("sim://?scene=a.npy&threshold=-1.5", Sim("a.npy", None, -1.5)),
     ],
 )
 def test_an_address_has_one_reading(address, meant):
-    assert sim_address.parse(address) == meant
+    assert parse(address) == meant
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_an_address_has_one_reading(address, meant):
 )
 def test_what_is_no_address_is_told(address, message):
     with pytest.raises(PortNotFound) as caught:
-        sim_address.parse(address)
+        parse(address)
     assert message in str(caught.value)
     assert str(caught.value).startswith(address)
 

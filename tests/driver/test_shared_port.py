@@ -11,6 +11,7 @@ from model_board import DirectPort
 import contactfpga
 from contactfpga import ContactFPGAError, PortLost, PortNotFound, Skin
 from contactfpga.driver import finding, sheets
+from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
 from contactfpga.driver.ports import Candidate
 from contactfpga.tools.cli import main
@@ -77,7 +78,7 @@ def line():
 
 
 def opened(line, number, baud=3_000_000):
-    board = Board(sheets.share("fake", number, baud, lambda port, baud: line))
+    board = Board(sheets.share(SheetOf("fake", number), baud, lambda port, baud: line))
     try:
         board.greet(1.0)
     except ContactFPGAError:
@@ -198,7 +199,7 @@ def test_noise_without_an_end_is_noise_and_is_not_kept(line):
     line.read = lambda seconds, read=line.read: (read(seconds), setattr(line, "seconds", line.seconds + 0.01))[0]
     with pytest.raises(contactfpga.OnlyNoise):
         opened(line, 0)
-    port = Board(sheets.share("fake", 0, 3_000_000, lambda port, baud: line))
+    port = Board(sheets.share(SheetOf("fake", 0), 3_000_000, lambda port, baud: line))
     with pytest.raises(contactfpga.ReadTimeout):
         port.read(1.0)
     assert len(port._link.transport._shared._sorter._rest) < 100_000
@@ -255,10 +256,10 @@ def test_sheets_at_a_serial_port(capsys):
 
 
 def test_numbers_of_sheets_end_a_port():
-    assert sheets.split("/dev/ttyUSB0#1") == ("/dev/ttyUSB0", 1)
-    assert sheets.split("sim://?skin=a#b.toml") is None
+    assert SheetOf.parse("/dev/ttyUSB0#1") == SheetOf("/dev/ttyUSB0", 1)
+    assert SheetOf.parse("sim://?skin=a#b.toml") is None
     with pytest.raises(PortNotFound, match="port#16: sheets have the numbers 0 to 15"):
-        sheets.split("port#16")
+        SheetOf.parse("port#16")
     with pytest.raises(PortNotFound, match="port#1#0: it names two sheets; give one number, as in port#0"):
         contactfpga.open("port#1#0")
 
@@ -283,7 +284,7 @@ def test_a_search_listens_to_a_port_whose_sheets_are_open(line, monkeypatch):
     with opened(line, 0):
         for number, board in enumerate(line.boards):
             line.say(number, board.hello())
-        monkeypatch.setattr(finding, "connect", lambda name, baud: sheets.share(*sheets.split(name), baud, None))
+        monkeypatch.setattr(finding, "connect", lambda name, baud: sheets.share(SheetOf.parse(name), baud))
         line.said_unasked = b"".join(
             numbered(board.hello().strip(b"\0"), number) + b"\0" for number, board in enumerate(line.boards)
         )

@@ -14,6 +14,7 @@ from wire import check
 
 from contactfpga import PortNotFound, Skin
 from contactfpga.driver import sheets
+from contactfpga.driver.address import SheetOf
 
 SKINS = (Skin(name="chest"), Skin(name="back", rows=9, columns=7), Skin(name="arm", columns=3, report="cells"))
 PREFIXES = [DirectPort(skin).wire.prefix for skin in SKINS]
@@ -172,7 +173,7 @@ def test_each_sheet_gets_its_packets_and_no_others(seed):
             line.say()
         if number not in ports:
             if rng.random() < 0.1:
-                ports[number] = sheets.share("fake", number, 3_000_000, lambda port, baud: line)
+                ports[number] = sheets.share(SheetOf("fake", number), 3_000_000, lambda port, baud: line)
                 got[number], oracle.sessions[number], oracle.alone = [], [], False
         elif rng.random() < 0.02:
             compared += close(number)
@@ -206,7 +207,7 @@ def test_threads_that_read_open_and_close_get_theirs():
         packets.append((number, packet[:-1]))
         line.out += packet
     expected = [[wanted(packet, of) for of, packet in packets if of == number] for number in range(len(SKINS))]
-    stays = [sheets.share("fake", number, 3_000_000, lambda port, baud: line) for number in range(len(SKINS))]
+    stays = [sheets.share(SheetOf("fake", number), 3_000_000, lambda port, baud: line) for number in range(len(SKINS))]
     found, stretches, failures = [[], [], []], [], []
 
     def follow(number):
@@ -216,7 +217,7 @@ def test_threads_that_read_open_and_close_get_theirs():
     def visit(number, seed):
         order = random.Random(seed)
         while line.out:
-            port = sheets.share("fake", number, 3_000_000, lambda port, baud: line)
+            port = sheets.share(SheetOf("fake", number), 3_000_000, lambda port, baud: line)
             items = [item for _ in range(order.randrange(20)) for item in items_in(port.read(0.001), number)]
             port.close()
             stretches.append((number, items))

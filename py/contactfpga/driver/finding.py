@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from contactfpga.driver import ports, sheets
+from contactfpga.driver.address import NAME, USB, SheetOf
 from contactfpga.driver.conversation import Conversation
 from contactfpga.driver.ports import Candidate
 from contactfpga.driver.transport import connect
@@ -20,9 +21,6 @@ from contactfpga.inputs.values import visible
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe
-
-NAME, USB = "name:", "usb:"
-"""What the ports begin with that have to be searched."""
 
 LISTEN_S = 1.2
 """How long a port may take to say hello; boards do so every 0.5 s."""
@@ -52,8 +50,8 @@ def searched(port: object) -> bool:
 
 def find(port: str | None, skin: Skin | None, baud: int) -> str:
     """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
-    if port is not None and (sheet := sheets.split(port)) is not None:
-        return f"{find(sheet[0], None, baud)}#{sheet[1]}"
+    if port is not None and (sheet := SheetOf.parse(port)) is not None:
+        return f"{find(sheet.port, None, baud)}#{sheet.number}"
     found = ports.candidates()
     if port is not None and port.startswith(USB):
         found = _with_number(port.removeprefix(USB), found)

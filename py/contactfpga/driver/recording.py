@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import math
 import os
 import re
 import stat
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
-from urllib.parse import unquote
 
 from contactfpga.driver import forks
+from contactfpga.driver.address import REPLAY_FORM, Replay
 from contactfpga.driver.mcap_bytes import McapStream
 from contactfpga.driver.mcap_part import files_of
 from contactfpga.driver.mcap_records import MAGIC
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.files import open_regular, told
-from contactfpga.inputs.values import number_in
 
 if TYPE_CHECKING:
     from contactfpga.driver.board import Board
 
-SCHEME = "replay://"
-_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
-"""Where they begin; a path may have other question marks."""
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
 """What looks like options that there are not."""
-_KNOWN = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
 
 
 class Recorded(Protocol):
@@ -91,54 +84,10 @@ class FileTap:
         return ContactFPGAError(f"{self._path} cannot be written: {reason}; make room, then record again")
 
 
-@dataclasses.dataclass(frozen=True)
-class ReplayAddress:
-    """What ``replay://FILE?pace=1&start=2.5&link=NAME`` asks for."""
-
-    path: Path
-    pace: float | None = None
-    """How many times as fast as it was recorded; None: as fast as it is read."""
-    start_s: float = 0.0
-    """Of an MCAP file: from the hello on that came last before this time since its beginning."""
-    link: str | None = None
-    """Of an MCAP file with several."""
-
-
-def parse(name: str) -> ReplayAddress:
-    """Read an address; raises :class:`PortNotFound` that says what is wrong."""
-    path, *rest = _OPTIONS.split(name.removeprefix(SCHEME), maxsplit=1)
-    found: dict[str, str] = {}
-    for part in rest[0].split("&") if rest else ():
-        key, equals, value = part.partition("=")
-        if not equals or key not in ("pace", "start", "link"):
-            raise PortNotFound(f"{name}: {part!r} is no option; there are {_KNOWN}")
-        if key in found:
-            raise PortNotFound(f"{name}: {key} is given twice")
-        found[key] = value
-    pace = _number(name, "pace", found.get("pace"), "a positive number, 1 for the time of the recording")
-    start = _number(name, "start", found.get("start"), "a number of seconds, 0 or more")
-    if pace == 0:
-        raise PortNotFound(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
-    link = unquote(found["link"]) if "link" in found else None
-    try:
-        return ReplayAddress(Path(path).expanduser(), pace, start or 0.0, link)
-    except RuntimeError as error:  # ~nobody
-        raise PortNotFound(f"{name} cannot be opened: {error}") from None
-
-
-def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
-    if text is None:
-        return None
-    value = number_in(text)
-    if not 0 <= value < math.inf:
-        raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
-    return value
-
-
 def open_recorded(name: str) -> Recorded:
     """The file that ``replay://FILE`` names, open for reading. Raises :class:`PortNotFound`."""
     try:
-        asked = parse(name)
+        asked = Replay.parse(name)
         file = open_regular(files_of(asked.path)[0])
         if file.read(len(MAGIC)) == MAGIC:
             file.close()
@@ -146,7 +95,7 @@ def open_recorded(name: str) -> Recorded:
         file.seek(0)
     except OSError as error:
         reason = error.strerror or told(error)
-        hint = f"the options are {_KNOWN}" if _UNKNOWN.search(name) else "is the path right?"
+        hint = f"the options are {REPLAY_FORM}" if _UNKNOWN.search(name) else "is the path right?"
         raise PortNotFound(f"{name} cannot be opened: {reason}; {hint}") from None
     except ValueError as error:  # a path with a zero byte
         raise PortNotFound(f"{name} cannot be opened: {error}") from None

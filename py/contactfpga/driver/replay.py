@@ -6,6 +6,7 @@ import math
 import time
 
 from contactfpga.driver import recording
+from contactfpga.driver.address import Replay
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.skin.widths import LONGEST_PACKET
@@ -19,7 +20,7 @@ class ReplayTransport:
 
     def __init__(self, name: str):
         self.name = name
-        pace = recording.parse(name).pace
+        pace = Replay.parse(name).pace
         self._pace = None if pace is None else _Pace(name, pace)
         self._file = recording.open_recorded(name)
 

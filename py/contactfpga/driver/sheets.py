@@ -7,25 +7,21 @@ as to one. The port itself is opened once, for as long as one of its sheets is o
 from __future__ import annotations
 
 import contextlib
-import re
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from contactfpga.driver import forks
+from contactfpga.driver.address import SheetOf
 from contactfpga.driver.conversation import Conversation
+from contactfpga.driver.transport import Transport, connect
 from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.skin.several import MOST_SHEETS
 from contactfpga.skin.widths import LONGEST_PACKET
 from contactfpga.wire import framing
 from contactfpga.wire.framing import PacketError
 from contactfpga.wire.hello import Hello, HelloReader
 from contactfpga.wire.hellos import begins_hello
 from contactfpga.wire.numbered import NUMBER_BYTES, numbered_requests, sheet_of, unnumbered
-
-if TYPE_CHECKING:
-    from contactfpga.driver.transport import Transport
 
 TURN_S = 0.05
 """How long a sheet reads for all at a time."""
@@ -35,18 +31,6 @@ MOST_WAIT = 16_384
 
 _DAMAGED = b"\x01\x00"
 """In place of a packet that does not say whose it is: every sheet counts it as damaged."""
-
-
-def split(name: str) -> tuple[str, int] | None:
-    """The port and the number of a sheet's name; None: it names no sheet. Raises :class:`PortNotFound`."""
-    found = re.fullmatch(r"(.*)#(\d{1,4})", name)
-    if found is None:
-        return None
-    if int(found[2]) >= MOST_SHEETS:
-        raise PortNotFound(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
-    if (once := re.fullmatch(r"(.*?)(#\d{1,4})+", found[1])) is not None:
-        raise PortNotFound(f"{name}: it names two sheets; give one number, as in {once[1]}#{int(found[2])}")
-    return found[1], int(found[2])
 
 
 class Sorter:
@@ -220,8 +204,9 @@ def _begin_anew() -> None:
     _open.clear()
 
 
-def share(port: str, number: int, baud: int, connect: Callable[[str, int], Transport]) -> SheetPort:
-    """Sheet ``number`` at a port, which is opened by ``connect`` unless it is open."""
+def share(address: SheetOf, baud: int, connect: Callable[[str, int], Transport] = connect) -> SheetPort:
+    """A sheet at a port, which is opened by ``connect`` unless it is open."""
+    port, number = address.port, address.number
     with _lock:
         shared = _open.get(port)
         if shared is None or shared.failure is not None:

@@ -10,7 +10,8 @@ import weakref
 from importlib import import_module
 from typing import Any, Protocol
 
-from contactfpga.driver import forks, recording, sheets
+from contactfpga.driver import forks, recording
+from contactfpga.driver.address import Replay, Serial, SheetOf, Sim, parse
 from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
 from contactfpga.inputs.values import shown
@@ -20,6 +21,7 @@ SCHEMES = {
     "sim": "contactfpga_sim.model.board.virtual:board_at",
     "replay": "contactfpga.driver.replay:ReplayTransport",
     "zenoh": "contactfpga.robot.net.port:ZenohPort",
+    "sheet": "contactfpga.driver.sheets:share",
 }
 """What opens the addresses of a scheme, loaded when it is used first: a function of the address, "module:attribute".
 It returns a :class:`Transport`; ``sim`` a :class:`SimulatedPort`."""
@@ -214,17 +216,16 @@ def connect(name: str | SimulatedPort, baud: int) -> Transport:
         if not hasattr(name, "read"):
             raise TypeError(f"port is {shown(name)}; it must be a port's name or a virtual board")
         return SimTransport("the virtual board", name)
-    if (sheet := sheets.split(name)) is not None:
-        return sheets.share(*sheet, baud, connect)
-    if name.startswith("sim:"):
+    address = parse(name)
+    if isinstance(address, Serial):
+        return SerialTransport(name, baud)
+    if isinstance(address, Sim):
         return SimTransport(name, virtual_board(name))
-    for scheme in ("replay:", "zenoh://"):
-        if name.startswith(scheme):
-            transport: Transport = _opener(scheme.partition(":")[0])(name)
-            return transport
-    if (reason := _no_port(name)) is not None:
-        raise PortNotFound(reason)
-    return SerialTransport(name, baud)
+    if isinstance(address, SheetOf):
+        transport: Transport = _opener("sheet")(address, baud)
+    else:
+        transport = _opener("replay" if isinstance(address, Replay) else "zenoh")(name)
+    return transport
 
 
 def virtual_board(name: str, skin: Skin | None = None) -> SimulatedPort:
@@ -240,20 +241,6 @@ def _opener(scheme: str) -> Any:
         return getattr(import_module(module), attribute)
     except ModuleNotFoundError as error:
         raise MissingExtra(f"{scheme}:// ({error})", scheme) from None
-
-
-def _no_port(name: str) -> str | None:
-    """What to say of a name that can be no serial port; None: it may be one."""
-    if not name:
-        return "the port has no name; leave it out to take the board that is plugged in"
-    scheme, colon, _ = name.partition("://")
-    if colon:
-        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE and zenoh://KEY"
-    if not os.path.isfile(name):
-        return None
-    if name.endswith(".toml"):
-        return f"{name} is a file; for the boards of a robot there is: contactfpga body {shlex.quote(name)}"
-    return f"{name} is a file; to play a recording name {shlex.quote(f'replay://{name}')} as the port"
 
 
 def _reason(error: Exception) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from contactfpga import surfaces
 from contactfpga.choices.choice import trusting
-from contactfpga.driver import sheets, sim_address
+from contactfpga.driver.address import SheetOf, Sim
 from contactfpga.driver.mcap_part import MAX_NAME
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
@@ -146,7 +146,7 @@ def _port(values: dict[str, Any], skin_path: Path) -> str | None:
     if "port" not in values:
         return None
     port = text(values, "port")
-    if port.startswith("sim:") and sheets.split(port) is None and sim_address.parse(port).skin is None:
+    if port.startswith("sim:") and SheetOf.parse(port) is None and Sim.parse(port).skin is None:
         return f"{port}{'&' if '?' in port else '?'}skin={quote(str(skin_path))}"
     return port
 

@@ -1,9 +1,8 @@
-"""What ``zenoh://KEY?connect=ENDPOINT`` asks for, and which endpoints are this machine alone."""
+"""Keys of boards, and which endpoints are this machine alone."""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import ipaddress
 import os
 import re
@@ -11,51 +10,13 @@ import stat
 import sys
 import tempfile
 from pathlib import Path
-from urllib.parse import unquote
 
-from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.inputs.values import number_in
+from contactfpga.errors import ContactFPGAError
 
-SCHEME = "zenoh://"
 LOOPBACK = "tcp/127.0.0.1:7447"
 """An endpoint that every user of this machine reaches."""
 _MOST_PATH = 100
 """Most bytes of a socket's path; operating systems take 103 or 107."""
-_FORM = "it reads zenoh://KEY, with ?connect=ENDPOINT, &config=FILE and &wait=SECONDS where wanted"
-
-
-@dataclasses.dataclass(frozen=True)
-class Address:
-    """The options, decoded."""
-
-    key: str
-    connect: str | None = None
-    config: str | None = None
-    wait_s: float = 0.5
-    """How long a publisher that is gone may take to come back before the port counts as lost."""
-
-
-def parse(name: str) -> Address:
-    """Read an address; raises :class:`PortNotFound` that says what is wrong."""
-    head, _, query = name.removeprefix(SCHEME).partition("?")
-    found: dict[str, str] = {}
-    for part in query.split("&") if query else ():
-        option, _, value = part.partition("=")
-        if option not in ("connect", "config", "wait") or not value or option in found:
-            raise PortNotFound(f"{name}: {part!r} is no option, or given twice; {_FORM}")
-        found[option] = unquote(value)
-    try:
-        key = checked_key(head)
-    except ValueError as error:
-        raise PortNotFound(f"{name}: {error}; {_FORM}") from None
-    return Address(key, found.get("connect"), found.get("config"), _seconds(name, found.get("wait", "0.5")))
-
-
-def checked_key(key: str) -> str:
-    """A key that names one board; raises ValueError."""
-    if not re.fullmatch(r"[\w.@:+-]+(/[\w.@:+-]+)*", key) or len(key) > 200:
-        raise ValueError(f"key is {key!r}; it must be names of letters, digits and . _ - + : @ with / between them")
-    return key
 
 
 def key_of(name: str, fingerprint: bytes) -> str:
@@ -103,10 +64,3 @@ def is_loopback(endpoint: str) -> bool:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def _seconds(name: str, text: str) -> float:
-    value = number_in(text)
-    if not 0 <= value <= 86_400:
-        raise PortNotFound(f"{name}: wait is {text!r}; it must be a number of seconds from 0 to 86400")
-    return value

@@ -8,10 +8,10 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
+from contactfpga.driver.address import Net
 from contactfpga.driver.stats import NetCounters, refused
 from contactfpga.errors import ContactFPGAError, MissingExtra, PortLost, PortNotFound, VersionMismatch
 from contactfpga.robot.net import session
-from contactfpga.robot.net.address import parse
 from contactfpga.robot.net.message import QUIET_S, VERSION, Stream, token
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class ZenohPort:
     def __init__(self, name: str):
         self.name = name
         self.counters = NetCounters()
-        self._address = address = parse(name)
+        self._address = address = Net.parse(name)
         self._changed = threading.Condition()
         self._pieces: collections.deque[tuple[bytes, bool]] = collections.deque()
         self._waiting = 0

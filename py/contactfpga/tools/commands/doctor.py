@@ -6,7 +6,8 @@ import argparse
 import json
 from collections.abc import Iterable
 
-from contactfpga.driver import driver, finding, health, ports, sheets
+from contactfpga.driver import driver, finding, health, ports
+from contactfpga.driver.address import SheetOf
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
@@ -122,7 +123,8 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
             skin = Skin.load(args.skin) if args.skin else None
             port = finding.find(port, skin, args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
         if port is not None and "://" not in port:
-            device, _ = sheets.split(port) or (port, None)
+            sheet = SheetOf.parse(port)
+            device = port if sheet is None else sheet.port
             report.add(health.rights(device))
             report.add(health.ftdi(device))
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:

@@ -12,7 +12,8 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NoReturn
 
-from contactfpga.driver import driver, sheets
+from contactfpga.driver import driver
+from contactfpga.driver.address import NET, SheetOf, checked_key
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
 from contactfpga.robot.net import address
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.robot.net import session
     from contactfpga.robot.net.publisher import Publisher
 
-    key = None if args.key is None else address.checked_key(args.key)
+    key = None if args.key is None else checked_key(args.key)
     boards = _look(args, key)
     here = args.connect or args.listen
     batch_s, block = args.batch_ms / 1000, args.congestion == "block"
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
             publishers[Publisher(transport, network, of, **options)] = transport
         for of in boards:
-            print(f"{address.SCHEME}{of}" + (f"?connect={here}" if here else ""), flush=True)
+            print(f"{NET}{of}" + (f"?connect={here}" if here else ""), flush=True)
         _warn(args)
         return _publish(publishers)
 
@@ -84,7 +85,7 @@ def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int
     """Device and baud rate of each board, by its key."""
     found: dict[str, tuple[str, int]] = {}
     for port in args.ports or [None]:
-        if port is not None and port.startswith(("replay:", address.SCHEME)):
+        if port is not None and port.startswith(("replay:", NET)):
             raise ContactFPGAError(f"port is {port!r}; publish a board, not a recording or what is published already")
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
             of = key or address.key_of(board.hello.name, board.hello.fingerprint)
@@ -103,7 +104,8 @@ def _refuse(first: str, second: str, of: str) -> NoReturn:
 
 def _place(port: str) -> tuple[str, int | None]:
     """The device behind a name and the number of the sheet; each ``sim://`` without one is a board of its own."""
-    name, number = sheets.split(port) or (port, None)
+    sheet = SheetOf.parse(port)
+    name, number = (port, None) if sheet is None else (sheet.port, sheet.number)
     virtual = name.startswith("sim:")
     if virtual and number is None:
         return "sim", None

@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contactfpga.driver import driver, sheets, sim_address, transport
+from contactfpga.driver import driver, transport
+from contactfpga.driver.address import SheetOf, Sim
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
@@ -117,7 +118,7 @@ def _source(named: Named) -> tuple[Source | BodySource | BodyPlayer, Hand | None
         if isinstance(recorded, LinkRecording) and not recorded.named and holds_robot(recorded.recording):
             return BodyPlayer(recorded.recording), None
         return Player(recorded), None
-    if named.port is not None and (not _is_virtual(named.port) or sheets.split(named.port) is not None):
+    if named.port is not None and (not _is_virtual(named.port) or SheetOf.parse(named.port) is not None):
         cells = _cells(named)
         board = driver.open(named.port, named.skin, baud=named.baud, timeout=named.timeout)
         return BoardSource(board, named.port, cells=cells, simulated=_is_virtual(named.port)), None
@@ -135,7 +136,7 @@ def _cells(named: Named) -> LoadCells | None:
     """Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
     path = named.units
     if path is None and named.port is not None and _is_virtual(named.port):
-        path = sim_address.parse(named.port).units
+        path = Sim.parse(named.port).units
     return None if path is None else LoadCells.load(path)
 
 

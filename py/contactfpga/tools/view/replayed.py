@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from contactfpga.driver import driver, recording
+from contactfpga.driver import driver
+from contactfpga.driver.address import REPLAY, Replay
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.mcap_part import SUFFIX, files_of
@@ -50,7 +51,7 @@ def silent(done: int, of: int) -> None:
 
 def is_recording(name: str) -> bool:
     """Whether a name is of one, and of no port: ``replay://FILE``, or a file."""
-    return name.startswith(recording.SCHEME) or name.endswith(SUFFIX) or Path(name).is_file()
+    return name.startswith(REPLAY) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
 def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Reading = silent) -> Recorded:
@@ -60,13 +61,13 @@ def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Read
     Raises :class:`~contactfpga.ContactFPGAError`, and :class:`~contactfpga.MissingExtra` for an MCAP file where
     ``[record]`` is absent.
     """
-    port = name if name.startswith(recording.SCHEME) else f"{recording.SCHEME}{name}"
-    asked = recording.parse(port)
+    port = name if name.startswith(REPLAY) else f"{REPLAY}{name}"
+    asked = Replay.parse(port)
     link = link or asked.link
     if not _is_mcap(asked.path):
         if link is not None:
             raise ContactFPGAError(f"{asked.path} holds one board; --link is for files of `contactfpga record`")
-        return ByteRecording(f"{recording.SCHEME}{asked.path}", timeout, reading)
+        return ByteRecording(f"{REPLAY}{asked.path}", timeout, reading)
     from contactfpga.tools.recordings import Recording
 
     return LinkRecording(Recording(asked.path), link)
@@ -112,7 +113,7 @@ class ByteRecording:
         self._pieces: list[_Piece] = []
         with self._opened() as board:
             self.sheet: Sheet = board.sheet
-            size = recording.parse(port).path.stat().st_size
+            size = Replay.parse(port).path.stat().st_size
             for piece in _pieces(board):
                 self._pieces.append(piece)
                 reading(board.stats.bytes, size)

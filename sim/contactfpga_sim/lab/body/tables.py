@@ -16,7 +16,7 @@ import numpy as np
 
 from contactfpga import examples
 from contactfpga import picture_style as style
-from contactfpga.driver import sim_address
+from contactfpga.driver.address import Sim
 from contactfpga.robot.body import Body, LinkState
 from contactfpga.robot.body.contact import on_link
 from contactfpga.robot.body.plan import Plan
@@ -110,7 +110,7 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
     cells = np.array([pose.apply(np.array(plan.place(*place)[0])) for place in zip(x.ravel(), y.ravel())])
     axes.plot(cells[:, across], cells[:, 2], ".", ms=1.2, color=style.SKY)
     axes.plot([], [], "s", ms=5, color=style.SKY, label="cells of the sheets")
-    asked = sim_address.parse(plan.port or "sim://").scene
+    asked = Sim.parse(plan.port or "sim://").scene
     zones = folding.frame_of(scene(skin, asked)(0.0), skin.replace(report="cells"))
     for one in on_link(plan, LinkState(zones, 0.0, "ok", "", 0.0)):
         contact = one.moved(pose, "base")

@@ -10,7 +10,7 @@ import numpy as np
 from contactfpga.choices import converters
 from contactfpga.design.circuit import Circuit, load_checked
 from contactfpga.design.cover import Cover, load_cover
-from contactfpga.driver import sim_address
+from contactfpga.driver.address import Sim
 from contactfpga.errors import PortNotFound
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
@@ -152,7 +152,7 @@ class VirtualBoard:
 def board_at(name: str, skin: Skin | None = None) -> VirtualBoard | VirtualSheets:
     """The board that ``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE`` asks for; ``skin``: where it names no
     file. Raises :class:`~contactfpga.PortNotFound`, and as the files that it names do."""
-    address = sim_address.parse(name)
+    address = Sim.parse(name)
     cover, circuit, units = None, None, None
     several = Several.load(address.sheets) if address.sheets is not None else None
     if address.skin is not None:

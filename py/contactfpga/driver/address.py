@@ -1,0 +1,234 @@
+"""What a port's name asks for: a serial port, a virtual board, a recording, a board on the network, one of several
+sheets."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from contactfpga.errors import PortNotFound
+from contactfpga.inputs.values import number_in
+from contactfpga.skin.several import MOST_SHEETS
+
+NAME, USB = "name:", "usb:"
+"""What the names begin with of boards that have to be searched (:mod:`contactfpga.driver.finding`)."""
+SIM, REPLAY, NET = "sim:", "replay://", "zenoh://"
+"""What the other addresses begin with."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Serial:
+    """The device of a serial port."""
+
+    device: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Sim:
+    """``sim://?scene=NAME&skin=FILE&threshold=NUMBER&units=FILE&sheets=FILE``, decoded."""
+
+    scene: str | None = None
+    skin: str | None = None
+    threshold: float | None = None
+    """Above which a recording's numbers count as pressed."""
+    units: str | None = None
+    """File of the pressure units that the scene presses on."""
+    sheets: str | None = None
+    """File of several sheets at one FPGA, in place of a Skin; the scene touches each of them."""
+
+    @classmethod
+    def parse(cls, name: str) -> Sim:
+        """Read an address. ``%`` and two hex digits stand for a byte of UTF-8; all else but ``&`` stands for itself,
+        ``+`` and ``#`` too. Raises :class:`PortNotFound` that says what is wrong."""
+        head, _, query = name.partition("?")
+        if head not in ("sim://", "sim:"):
+            raise PortNotFound(f"{name}: {_SIM_FORM}")
+        found: dict[str, Any] = {}
+        for part in query.split("&") if query else ():
+            key, equals, value = part.partition("=")
+            if key not in SIM_OPTIONS or not equals:
+                raise PortNotFound(f"{name}: {part!r} is no option; {_SIM_FORM}; {_ESCAPES}")
+            if key in found:
+                raise PortNotFound(f"{name}: {key} is given twice")
+            found[key] = _decoded(name, value)
+            if not found[key]:
+                raise PortNotFound(f"{name}: {key} is empty; {_SIM_FORM}")
+        if "threshold" in found:
+            found["threshold"] = _threshold(name, found["threshold"])
+        if "sheets" in found and (other := {"skin", "threshold", "units"} & set(found)):
+            raise PortNotFound(
+                f"{name}: with sheets there is no {min(other)}; their Skins are in the file of the sheets"
+            )
+        return cls(**found)
+
+
+SIM_OPTIONS = tuple(field.name for field in dataclasses.fields(Sim))
+_SIM_FORM = "it reads sim://, with ?scene=NAME, &skin=FILE, &threshold=NUMBER and &units=FILE where wanted"
+_ESCAPES = "a % that is meant is written %25, a & %26"
+
+
+def _decoded(name: str, text: str) -> str:
+    if odd := re.search(r"%(?![0-9a-fA-F]{2}).{0,2}", text):
+        raise PortNotFound(f"{name}: {odd[0]!r} is no % with two hex digits; {_ESCAPES}")
+    try:
+        return unquote(text, errors="strict")
+    except UnicodeDecodeError:
+        raise PortNotFound(f"{name}: {text!r} is no UTF-8 once its % are decoded") from None
+
+
+def _threshold(name: str, text: str) -> float:
+    value = number_in(text)
+    if not math.isfinite(value):
+        raise PortNotFound(f"{name}: threshold is {text!r}; it must be a finite number")
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """``replay://FILE?pace=1&start=2.5&link=NAME``, decoded."""
+
+    path: Path
+    pace: float | None = None
+    """How many times as fast as it was recorded; None: as fast as it is read."""
+    start_s: float = 0.0
+    """Of an MCAP file: from the hello on that came last before this time since its beginning."""
+    link: str | None = None
+    """Of an MCAP file with several."""
+
+    @classmethod
+    def parse(cls, name: str) -> Replay:
+        """Read an address; raises :class:`PortNotFound` that says what is wrong."""
+        path, *rest = _REPLAY_OPTIONS.split(name.removeprefix(REPLAY), maxsplit=1)
+        found: dict[str, str] = {}
+        for part in rest[0].split("&") if rest else ():
+            key, equals, value = part.partition("=")
+            if not equals or key not in ("pace", "start", "link"):
+                raise PortNotFound(f"{name}: {part!r} is no option; there are {REPLAY_FORM}")
+            if key in found:
+                raise PortNotFound(f"{name}: {key} is given twice")
+            found[key] = value
+        pace = _number(name, "pace", found.get("pace"), "a positive number, 1 for the time of the recording")
+        start = _number(name, "start", found.get("start"), "a number of seconds, 0 or more")
+        if pace == 0:
+            raise PortNotFound(f"{name}: pace is '0'; it must be a positive number, 1 for the time of the recording")
+        link = unquote(found["link"]) if "link" in found else None
+        try:
+            return cls(Path(path).expanduser(), pace, start or 0.0, link)
+        except RuntimeError as error:  # ~nobody
+            raise PortNotFound(f"{name} cannot be opened: {error}") from None
+
+
+_REPLAY_OPTIONS = re.compile(r"\?(?=(?:pace|start|link)=)")
+"""Where they begin; a path may have other question marks."""
+REPLAY_FORM = "?pace=1, ?start=SECONDS and ?link=NAME, with & between"
+
+
+def _number(name: str, key: str, text: str | None, wanted: str) -> float | None:
+    if text is None:
+        return None
+    value = number_in(text)
+    if not 0 <= value < math.inf:
+        raise PortNotFound(f"{name}: {key} is {text!r}; it must be {wanted}")
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Net:
+    """``zenoh://KEY?connect=ENDPOINT&config=FILE&wait=SECONDS``, decoded."""
+
+    key: str
+    connect: str | None = None
+    config: str | None = None
+    wait_s: float = 0.5
+    """How long a publisher that is gone may take to come back before the port counts as lost."""
+
+    @classmethod
+    def parse(cls, name: str) -> Net:
+        """Read an address; raises :class:`PortNotFound` that says what is wrong."""
+        head, _, query = name.removeprefix(NET).partition("?")
+        found: dict[str, str] = {}
+        for part in query.split("&") if query else ():
+            option, _, value = part.partition("=")
+            if option not in ("connect", "config", "wait") or not value or option in found:
+                raise PortNotFound(f"{name}: {part!r} is no option, or given twice; {_NET_FORM}")
+            found[option] = unquote(value)
+        try:
+            key = checked_key(head)
+        except ValueError as error:
+            raise PortNotFound(f"{name}: {error}; {_NET_FORM}") from None
+        return cls(key, found.get("connect"), found.get("config"), _wait(name, found.get("wait", "0.5")))
+
+
+_NET_FORM = "it reads zenoh://KEY, with ?connect=ENDPOINT, &config=FILE and &wait=SECONDS where wanted"
+
+
+def checked_key(key: str) -> str:
+    """A key that names one board; raises ValueError."""
+    if not re.fullmatch(r"[\w.@:+-]+(/[\w.@:+-]+)*", key) or len(key) > 200:
+        raise ValueError(f"key is {key!r}; it must be names of letters, digits and . _ - + : @ with / between them")
+    return key
+
+
+def _wait(name: str, text: str) -> float:
+    value = number_in(text)
+    if not 0 <= value <= 86_400:
+        raise PortNotFound(f"{name}: wait is {text!r}; it must be a number of seconds from 0 to 86400")
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class SheetOf:
+    """``PORT#NUMBER``: one sheet of a board that serves several."""
+
+    port: str
+    number: int
+
+    @classmethod
+    def parse(cls, name: str) -> SheetOf | None:
+        """None where the name is of no sheet. Raises :class:`PortNotFound`."""
+        found = re.fullmatch(r"(.*)#(\d{1,4})", name)
+        if found is None:
+            return None
+        if int(found[2]) >= MOST_SHEETS:
+            raise PortNotFound(f"{name}: sheets have the numbers 0 to {MOST_SHEETS - 1}")
+        if (once := re.fullmatch(r"(.*?)(#\d{1,4})+", found[1])) is not None:
+            raise PortNotFound(f"{name}: it names two sheets; give one number, as in {once[1]}#{int(found[2])}")
+        return cls(found[1], int(found[2]))
+
+
+Address = Serial | Sim | Replay | Net | SheetOf
+
+
+def parse(name: str) -> Address:
+    """Read a port's name. Raises :class:`PortNotFound` that says what is wrong, for a file that is no port as well."""
+    if (sheet := SheetOf.parse(name)) is not None:
+        return sheet
+    if name.startswith(SIM):
+        return Sim.parse(name)
+    if name.startswith("replay:"):
+        return Replay.parse(name)
+    if name.startswith(NET):
+        return Net.parse(name)
+    if (reason := _no_port(name)) is not None:
+        raise PortNotFound(reason)
+    return Serial(name)
+
+
+def _no_port(name: str) -> str | None:
+    """What to say of a name that can be no serial port; None: it may be one."""
+    if not name:
+        return "the port has no name; leave it out to take the board that is plugged in"
+    scheme, colon, _ = name.partition("://")
+    if colon:
+        return f"{name}: {scheme}:// is not known; there are sim://, replay://FILE and zenoh://KEY"
+    if not os.path.isfile(name):
+        return None
+    if name.endswith(".toml"):
+        return f"{name} is a file; for the boards of a robot there is: contactfpga body {shlex.quote(name)}"
+    return f"{name} is a file; to play a recording name {shlex.quote(f'replay://{name}')} as the port"
