@@ -37,8 +37,8 @@ def one(wrenches: Floats, points: Floats, noise: Noise | None = None) -> Floats:
     if noise is None:
         return wrenches[:, :3].copy()
     exerts = _exerts(points[:, None])
-    turned = exerts.transpose(0, 2, 1) @ noise.information
-    return np.asarray(np.linalg.solve(turned @ exerts, turned @ wrenches[:, :, None])[:, :, 0])
+    weighted = exerts.transpose(0, 2, 1) @ noise.information
+    return np.asarray(np.linalg.solve(weighted @ exerts, weighted @ wrenches[:, :, None])[:, :, 0])
 
 
 def two(
@@ -89,11 +89,11 @@ def _least_norm(wrenches: Floats, points: Floats, along: Floats, noise: Noise | 
     else:
         weight = np.broadcast_to(noise.information, (len(points), 6, 6))
     exerts = _exerts(points)
-    turned = exerts.transpose(0, 2, 1) @ weight
-    normal = turned @ exerts
+    weighted = exerts.transpose(0, 2, 1) @ weight
+    normal = weighted @ exerts
     null = np.concatenate([along, -along], axis=1) / np.sqrt(2)
     normal += normal[:, :1, :1] * null[:, :, None] * null[:, None]
-    return np.asarray(np.linalg.solve(normal, turned @ wrenches[:, :, None]).reshape(-1, 2, 3))
+    return np.asarray(np.linalg.solve(normal, weighted @ wrenches[:, :, None]).reshape(-1, 2, 3))
 
 
 def _allowed(starts: Floats, sides: Floats, push: Floats, more: Floats, friction: float) -> tuple[Floats, Floats]:

@@ -37,9 +37,9 @@ class Calibration:
 def rank_of(loads: Floats, length_m: float) -> tuple[int, Floats]:
     """Rank of (m, 6) wrenches, and (6 - rank, 6) directions that none has; moments count over ``length_m``."""
     scaled = np.atleast_2d(loads) / np.array([1, 1, 1, length_m, length_m, length_m])
-    _, values, turned = np.linalg.svd(scaled)
+    _, values, right = np.linalg.svd(scaled)
     rank = int((values > SEEN * values[0]).sum())
-    return rank, turned[rank:]
+    return rank, right[rank:]
 
 
 def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
@@ -73,9 +73,9 @@ def calibrate(cells: LoadCells, readings: Floats, loads: Floats) -> Calibration:
 def _correction(cells: LoadCells, deviations: Floats, rest: Floats) -> Floats:
     """(6, n): the smallest change of the matrix that explains the rest; what only noise moved changes nothing."""
     sigma = np.array([unit.sigma_n / abs(unit.gain_n) for unit in cells.units])
-    left, values, turned = np.linalg.svd(deviations / sigma, full_matrices=False)
+    left, values, right = np.linalg.svd(deviations / sigma, full_matrices=False)
     moved = values > NOISE * np.sqrt(len(deviations))
-    return np.asarray((left[:, moved].T @ rest / values[moved, None]).T @ turned[moved] / sigma)
+    return np.asarray((left[:, moved].T @ rest / values[moved, None]).T @ right[moved] / sigma)
 
 
 def _named(wrench: Floats) -> list[str]:

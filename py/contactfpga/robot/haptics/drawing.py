@@ -10,29 +10,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contactfpga import picture_style as style
-from contactfpga.robot.haptics.rate import ALONG, TURNS, Rating, Task
+from contactfpga.robot.haptics.rate import ALONG, AROUND, Rating, Requirements
 from contactfpga.robot.haptics.values import Floats
 from contactfpga.robot.haptics.wrench import Cylinder
 
 
-def draw(path: Path, task: Task, ratings: list[Rating]) -> Path:
+def draw(path: Path, needs: Requirements, ratings: list[Rating]) -> Path:
     """The best arrangement, the smallest force it sees everywhere, and all others beside it."""
     with matplotlib.rc_context(style.SETTINGS):
         figure = style.new(5.6)
         grid = figure.add_gridspec(2, 2, width_ratios=(2, 3))
-        _units(figure.add_subplot(grid[0, 0], projection="3d"), task, ratings[0])
-        _seen(figure, figure.add_subplot(grid[0, 1]), task, ratings[0].seen)
-        _map(figure, figure.add_subplot(grid[1, 1]), task, 1e3 * ratings[0].errors_m, "error of the place, mm")
+        _units(figure.add_subplot(grid[0, 0], projection="3d"), needs, ratings[0])
+        _seen(figure, figure.add_subplot(grid[0, 1]), needs, ratings[0].seen)
+        _map(figure, figure.add_subplot(grid[1, 1]), needs, 1e3 * ratings[0].errors_m, "error of the place, mm")
         others = figure.add_subplot(grid[1, 0])
         _all(others, ratings)
         figure.legend(*others.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         return style.save(figure, path)
 
 
-def _units(place: Axes, task: Task, rating: Rating) -> None:
+def _units(place: Axes, needs: Requirements, rating: Rating) -> None:
     """Where the units stand, and how each pushes."""
     length = 0.35 * max(float(np.ptp([unit.point_m for unit in rating.layout.cells.units], axis=0).max()), 0.02)
-    points = np.array([point for point, _ in task.places()])
+    points = np.array([point for point, _ in needs.places()])
     place.plot(*(1e3 * points.T), ".", ms=2, color=style.PRESSED)
     for unit in rating.layout.cells.units:
         start = 1e3 * np.array(unit.point_m)
@@ -45,10 +45,10 @@ def _units(place: Axes, task: Task, rating: Rating) -> None:
     place.locator_params(nbins=3)
 
 
-def _map(figure: Figure, place: Axes, task: Task, values: Floats, name: str) -> None:
-    first, second = task.size_m
-    if isinstance(task.surface, Cylinder):
-        shown, extent = values.reshape(ALONG, TURNS), (0.0, 360.0, 1e3 * first, 1e3 * second)
+def _map(figure: Figure, place: Axes, needs: Requirements, values: Floats, name: str) -> None:
+    first, second = needs.size_m
+    if isinstance(needs.surface, Cylinder):
+        shown, extent = values.reshape(ALONG, AROUND), (0.0, 360.0, 1e3 * first, 1e3 * second)
         place.set(xlabel="around the link, degrees", ylabel="along it, mm")
     else:
         shown, extent = values.reshape(ALONG, ALONG), (-500 * first, 500 * first, -500 * second, 500 * second)
@@ -58,13 +58,13 @@ def _map(figure: Figure, place: Axes, task: Task, values: Floats, name: str) -> 
     place.set_title(name, loc="left")
 
 
-def _seen(figure: Figure, place: Axes, task: Task, seen: Floats) -> None:
+def _seen(figure: Figure, place: Axes, needs: Requirements, seen: Floats) -> None:
     """By place; around a cylinder that makes no difference, so there by direction instead."""
-    first, second = task.size_m
-    if not isinstance(task.surface, Cylinder) or seen.shape[1] == 1:
-        _map(figure, place, task, seen.max(axis=1), "smallest force seen, N")
+    first, second = needs.size_m
+    if not isinstance(needs.surface, Cylinder) or seen.shape[1] == 1:
+        _map(figure, place, needs, seen.max(axis=1), "smallest force seen, N")
         return
-    shown = seen.reshape(ALONG, TURNS, -1).max(axis=1)[:, 1:]
+    shown = seen.reshape(ALONG, AROUND, -1).max(axis=1)[:, 1:]
     extent = (0.0, 360.0, 1e3 * first, 1e3 * second)
     image = place.imshow(shown, origin="lower", extent=extent, aspect="auto", cmap="cividis")
     figure.colorbar(image, ax=place)

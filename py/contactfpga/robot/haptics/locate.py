@@ -275,10 +275,10 @@ class Locator:
         cut = _cut({column for _, column in cells}, columns)
         moved = [(row, (column - cut) % columns) for row, column in cells]
         then = [dataclasses.replace(one, column=(one.column - cut) % columns) for one in closings]
-        found = self._locate(moved, force_n, then, None if center is None else self._turned(center, -cut))
-        return self._turned(found, cut)
+        found = self._locate(moved, force_n, then, None if center is None else self._around_sheet(center, -cut))
+        return self._around_sheet(found, cut)
 
-    def _turned(self, place: Place, columns: int) -> Place:
+    def _around_sheet(self, place: Place, columns: int) -> Place:
         """The same place, moved around the sheet by this many columns."""
         return dataclasses.replace(
             place, x_m=(place.x_m + columns * self._pitch_x) % (self._sheet.columns * self._pitch_x)

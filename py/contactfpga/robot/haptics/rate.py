@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from contactfpga.robot.haptics.units import LoadCells, Unit
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, cross, number, positive, turning
+from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, cross, number, positive, skew
 from contactfpga.robot.haptics.wrench import ALARM, Cylinder, Noise, Surface, Wrench
 
 
@@ -76,7 +76,7 @@ def on_plane(radius_m: float, height_m: float) -> list[Layout]:
     return [Layout("3 on a plane", tripod(radius_m)), *tilts]
 
 
-TURNS = 24
+AROUND = 24
 """Places around a cylinder."""
 ALONG = 9
 """Places along it, and along each side of a plane."""
@@ -85,7 +85,7 @@ SLANTS = 12
 
 
 @dataclasses.dataclass(frozen=True)
-class Task:
+class Requirements:
     """A link's surface and the loads that it must bear."""
 
     surface: Surface
@@ -123,7 +123,7 @@ class Task:
         first, second = self.size_m
         if isinstance(self.surface, Cylinder):
             round_m = 2 * math.pi * self.surface.radius_m
-            flat = [(round_m * turn / TURNS, z) for z in np.linspace(first, second, ALONG) for turn in range(TURNS)]
+            flat = [(round_m * step / AROUND, z) for z in np.linspace(first, second, ALONG) for step in range(AROUND)]
         else:
             across = np.linspace(-0.5, 0.5, ALONG)
             flat = [(first * x, second * y) for y in across for x in across]
@@ -171,39 +171,39 @@ class Rating:
     """``place_m`` by place."""
 
 
-def compared(task: Task, radius_m: float) -> list[Rating]:
+def compared(needs: Requirements, radius_m: float) -> list[Rating]:
     """Every arrangement on rings of this radius that can bear the loads, best place first."""
     positive("the ring's radius", radius_m, "m")
-    if isinstance(task.surface, Cylinder):
-        layouts = on_cylinder(radius_m, *task.size_m)
+    if isinstance(needs.surface, Cylinder):
+        layouts = on_cylinder(radius_m, *needs.size_m)
     else:
-        layouts = on_plane(radius_m, task.surface.height_m)
-    found = [rating for rating in (rate(task, layout) for layout in layouts) if rating is not None]
+        layouts = on_plane(radius_m, needs.surface.height_m)
+    found = [rating for rating in (rate(needs, layout) for layout in layouts) if rating is not None]
     return sorted(found, key=lambda rating: rating.place_m)
 
 
-def rate(task: Task, layout: Layout) -> Rating | None:
+def rate(needs: Requirements, layout: Layout) -> Rating | None:
     """The rating of an arrangement; None where the units cannot hold the loads."""
     cells = layout.cells
     sees_friction = cells.rank == 6
-    places = task.places()
-    pushes = _wrenches(places, 0.0 if not sees_friction else task.friction)
-    borne = task.force_n * np.linalg.pinv(cells.geometry, rcond=1e-9) @ pushes.T
-    if not np.allclose(cells.geometry @ borne, task.force_n * pushes.T, atol=1e-6 * task.force_n):
+    places = needs.places()
+    pushes = _wrenches(places, 0.0 if not sees_friction else needs.friction)
+    borne = needs.force_n * np.linalg.pinv(cells.geometry, rcond=1e-9) @ pushes.T
+    if not np.allclose(cells.geometry @ borne, needs.force_n * pushes.T, atol=1e-6 * needs.force_n):
         return None
     bears = float(np.abs(borne).max())
-    sigma = task.noise * bears
-    noise = Noise(sigma**2 * cells.geometry @ cells.geometry.T + _weight(task, sees_friction))
-    errors = np.sqrt(((task.slopes @ noise.covariance) * task.slopes).sum(axis=(1, 2)))
+    sigma = needs.noise * bears
+    noise = Noise(sigma**2 * cells.geometry @ cells.geometry.T + _weight(needs, sees_friction))
+    errors = np.sqrt(((needs.slopes @ noise.covariance) * needs.slopes).sum(axis=(1, 2)))
     seen = _seen(pushes, noise).reshape(len(places), -1)
     force = _force_n(noise, places, sees_friction)
     return Rating(layout, bears, sigma, float(errors.max()), force, float(seen.max()), seen, errors)
 
 
-def _weight(task: Task, sees_friction: bool) -> Floats:
+def _weight(needs: Requirements, sees_friction: bool) -> Floats:
     """(6, 6): what is not known of the bumper's weight."""
-    carried = np.concatenate([np.eye(3), turning(task.middle_m)])
-    spread = (task.mass_kg * task.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
+    carried = np.concatenate([np.eye(3), skew(needs.middle_m)])
+    spread = (needs.mass_kg * needs.acceleration_sigma_m_s2) ** 2 * carried @ carried.T
     if not sees_friction:  # guides take what units along z do not
         kept = np.zeros(6)
         kept[2:5] = 1.0
@@ -217,8 +217,10 @@ def _wrenches(places: list[tuple[Vector, Vector]], friction: float) -> Floats:
     # Around a cylinder, and then along it.
     first = np.cross(np.where(np.abs(normals[:, 2:]) > 0.5, [[1.0, 0, 0]], [[0, 0, 1.0]]), normals)
     second = np.cross(normals, first)
-    turns = [2 * math.pi * step / SLANTS for step in range(SLANTS)] if friction else []
-    forces = [-normals] + [-normals + friction * (math.cos(turn) * first + math.sin(turn) * second) for turn in turns]
+    angles = [2 * math.pi * step / SLANTS for step in range(SLANTS)] if friction else []
+    forces = [-normals] + [
+        -normals + friction * (math.cos(angle) * first + math.sin(angle) * second) for angle in angles
+    ]
     stacked = np.stack([np.concatenate([force, np.cross(points, force)], axis=1) for force in forces], axis=1)
     return np.asarray(stacked.reshape(-1, 6))
 
@@ -231,7 +233,7 @@ def _seen(pushes: Floats, noise: Noise) -> Floats:
 
 
 def _force_n(noise: Noise, places: list[tuple[Vector, Vector]], sees_friction: bool) -> float:
-    exerts = np.array([np.concatenate([np.eye(3), turning(point)]) for point, _ in places])
+    exerts = np.array([np.concatenate([np.eye(3), skew(point)]) for point, _ in places])
     if not sees_friction:
         exerts = exerts @ np.array([normal for _, normal in places])[:, :, None]
     spread = np.linalg.inv(exerts.transpose(0, 2, 1) @ noise.information @ exerts)

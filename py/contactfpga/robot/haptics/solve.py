@@ -168,9 +168,9 @@ def _at_point(wrench: Wrench, touch: Touch) -> tuple[Vector, float | None]:
     force, point = wrench.force_n, touch.point_m
     if wrench.noise is None:
         return force, None
-    turned = cross(point, force)
+    exerted = cross(point, force)
     moment = wrench.moment_nm
-    rest = (moment[0] - turned[0], moment[1] - turned[1], moment[2] - turned[2])
+    rest = (moment[0] - exerted[0], moment[1] - exerted[1], moment[2] - exerted[2])
     ff, fm, mm = wrench.noise.blocks
     # Rows: covariances of the force's x, y, z, and then of the moment's, with the moment about the point.
     with_rest = [_less(fm[axis], cross(point, ff[axis])) for axis in range(3)]
@@ -219,9 +219,9 @@ def _about_line(
 
 def _split(force: Vector, moment: Vector, middle: Vector, along: Vector, length: float) -> tuple[Vector, Vector]:
     """Two forces without squeeze: half of the sum each, and what turns about the middle."""
-    turned = cross(middle, force)
-    turns = cross((moment[0] - turned[0], moment[1] - turned[1], moment[2] - turned[2]), along)
-    x, y, z = turns[0] / length, turns[1] / length, turns[2] / length
+    exerted = cross(middle, force)
+    couple = cross((moment[0] - exerted[0], moment[1] - exerted[1], moment[2] - exerted[2]), along)
+    x, y, z = couple[0] / length, couple[1] / length, couple[2] / length
     fx, fy, fz = force[0] / 2, force[1] / 2, force[2] / 2
     return (fx + x, fy + y, fz + z), (fx - x, fy - y, fz - z)
 
@@ -338,8 +338,8 @@ class _Line:
         """Squeezes at which the contact does not pull."""
         if abs(self.more) <= ROUNDING:
             return (-math.inf, math.inf) if self.push >= 0 else None
-        turn = -self.push / self.more
-        return (turn, math.inf) if self.more > 0 else (-math.inf, turn)
+        start = -self.push / self.more
+        return (start, math.inf) if self.more > 0 else (-math.inf, start)
 
     def within(self, friction: float) -> Range | None:
         """Squeezes at which the force lies in friction's cone: |f|^2 <= (1 + mu^2) push^2, a quadratic."""

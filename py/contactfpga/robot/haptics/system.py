@@ -15,7 +15,7 @@ import numpy as np
 
 from contactfpga.errors import MissingExtra
 from contactfpga.robot.haptics.contact import PURE_FORCE, PURE_FORCE_WITH_KNOWN_DIRECTION, Interval, Solution, Touch
-from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, turning
+from contactfpga.robot.haptics.values import Floats, HapticsError, Vector, skew
 from contactfpga.robot.haptics.wrench import ALARM, Wrench
 from contactfpga.surfaces.shapes import vector
 
@@ -87,7 +87,7 @@ class System:
         """A matrix to wrenches with moments about the contacts' barycenter and over their distance, for its rank."""
         x, y, z = np.mean(self.points, axis=0)
         moved = np.array(matrix)
-        moved[3:] -= turning((x, y, z)) @ moved[:3]
+        moved[3:] -= skew((x, y, z)) @ moved[:3]
         moved[3:] /= self.length_m
         return moved
 
@@ -174,8 +174,8 @@ def _along_normals(system: System) -> list[Vector]:
 
 def _few(matrix: Floats, system: System) -> list[float]:
     """The best one or two amounts, none below 0."""
-    turned = matrix.T @ system.weight
-    gram, wanted = (turned @ matrix).tolist(), (turned @ system.wrench).tolist()
+    weighted = matrix.T @ system.weight
+    gram, wanted = (weighted @ matrix).tolist(), (weighted @ system.wrench).tolist()
     alone = [max(0.0, want / gram[at][at]) if gram[at][at] > 0 else 0.0 for at, want in enumerate(wanted)]
     if len(alone) == 1:
         return alone
@@ -202,12 +202,12 @@ def _suffice(system: System, forces: list[Vector]) -> bool:
 
 def _along_edges(system: System) -> list[Vector]:
     edges, owners = [], []
-    turns = [2 * math.pi * step / EDGES for step in range(EDGES)]
+    angles = [2 * math.pi * step / EDGES for step in range(EDGES)]
     for number, touch in enumerate(system.touches):
         inward, first, second = _frame(touch.normal).T
         directions = [inward]
         if touch.friction:
-            sideways = [math.cos(turn) * first + math.sin(turn) * second for turn in turns]
+            sideways = [math.cos(angle) * first + math.sin(angle) * second for angle in angles]
             directions += [inward + touch.friction * each for each in sideways]
         edges += directions
         owners += [number] * len(directions)
@@ -254,9 +254,9 @@ def _solution(system: System, forces: list[Vector], model: str, frictionless: bo
 
 def _spaces(system: System, matrix: Floats) -> tuple[int, Floats]:
     """Rank, and the null space as columns."""
-    _, values, turned = np.linalg.svd(system.centered(matrix))
+    _, values, right = np.linalg.svd(system.centered(matrix))
     rank = int((values > 1e-9 * values[0]).sum())
-    return rank, turned[rank:].T
+    return rank, right[rank:].T
 
 
 def _rank(system: System, matrix: Floats) -> int:
@@ -287,9 +287,9 @@ def _intervals(system: System, forces: Sequence[Vector], frictionless: bool) -> 
     """The least and largest push in N of each contact, over all forces in the cones that exert the same wrench as
     ``forces``, which lie in them, and so in the interval. None: no largest one."""
     basis, firsts = _basis(system.touches, frictionless)
-    _, values, turned = np.linalg.svd(system.centered(system.matrix() @ basis))
+    _, values, right = np.linalg.svd(system.centered(system.matrix() @ basis))
     rank = int((values > 1e-9 * values[0]).sum())
-    fixed, free = turned[:rank], turned[rank:].T
+    fixed, free = right[:rank], right[rank:].T
     start = basis.T @ np.ravel(forces)
     size = max(1e-12, float(np.abs(start).max()))
     solver = None

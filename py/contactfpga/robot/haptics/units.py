@@ -22,7 +22,7 @@ from contactfpga.robot.haptics.values import (
     matrix,
     number,
     positive,
-    turning,
+    skew,
     vector,
 )
 from contactfpga.robot.haptics.wrench import SURFACES, Bumper, Motion, Noise, Surface, Wrench, read_surface
@@ -158,7 +158,7 @@ class LoadCells:
         """Left singular vectors about the units' barycenter with moments over their distance; rank; place; distance."""
         x, y, z = np.mean([unit.point_m for unit in self.units], axis=0).tolist()
         moved = np.array(self.matrix)
-        moved[3:] -= turning((x, y, z)) @ moved[:3]
+        moved[3:] -= skew((x, y, z)) @ moved[:3]
         spread = np.array([unit.point_m for unit in self.units]) - (x, y, z)
         length = float(np.sqrt((spread**2).sum() / len(spread))) or 1.0
         moved[3:] /= length
@@ -177,7 +177,7 @@ class LoadCells:
         vectors, rank, place, length = self._seen
         lost = np.array(vectors[:, rank:])
         lost[3:] /= length
-        lost[:3] += turning(place) @ lost[3:]
+        lost[:3] += skew(place) @ lost[3:]
         lost[np.abs(lost) < 1e-12] = 0.0
         return np.asarray((lost / np.linalg.norm(lost, axis=0)).T)
 
@@ -190,7 +190,7 @@ class LoadCells:
         """Standard deviations (3,) in N of the force of a single contact at a known point, along x, y and z."""
         if self.rank < 6:
             raise HapticsError(f"the units see {self.rank} of 6 components; not all of a force is known at any point")
-        exerts = np.concatenate([np.eye(3), turning(point_m)])
+        exerts = np.concatenate([np.eye(3), skew(point_m)])
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(exerts.T @ self.noise.information @ exerts))))
 
     def lifting_n(self, point_m: Vector, along: Vector) -> float:

@@ -85,7 +85,7 @@ def minus(vector: Vector) -> Vector:
     return -vector[0], -vector[1], -vector[2]
 
 
-def turning(point: Sequence[float]) -> Floats:
+def skew(point: Sequence[float]) -> Floats:
     """The matrix (3, 3) from a force in N at the point in m to its moment in Nm about the origin."""
     x, y, z = point
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

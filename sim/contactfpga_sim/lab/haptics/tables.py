@@ -9,13 +9,13 @@ import math
 import sys
 
 from contactfpga.robot.haptics import Cylinder, drawing
-from contactfpga.robot.haptics.rate import Rating, Task, compared
+from contactfpga.robot.haptics.rate import Rating, Requirements, compared
 from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.haptics import coverage, felt_tables
 from contactfpga_sim.lab.haptics.coverage import Case
 
-LINK = Task(Cylinder(0.038), (-0.075, 0.075))
+LINK = Requirements(Cylinder(0.038), (-0.075, 0.075))
 RING_M = 0.03
 CONTACTS = 1000
 """Of each line of the table of places."""

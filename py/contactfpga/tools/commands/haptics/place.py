@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from contactfpga.robot.haptics import Cylinder, LoadCells, Plane
-from contactfpga.robot.haptics.rate import Layout, Rating, Task, compared, rate
+from contactfpga.robot.haptics.rate import Layout, Rating, Requirements, compared, rate
 from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
 from contactfpga.tools.console import numbers, outputs
@@ -57,18 +57,18 @@ def run(args: argparse.Namespace) -> int:
     surface, size, ring = _link(args)
     picture = _picture(args.picture)
     loads = (args.force, args.friction, args.noise, args.at, args.mass, args.acceleration_sigma)
-    task = Task(surface, size, *loads)
-    ratings = compared(task, args.ring or ring)
+    needs = Requirements(surface, size, *loads)
+    ratings = compared(needs, args.ring or ring)
     if args.units:
-        ratings = sorted([*ratings, _own(task, args.units)], key=lambda rating: rating.place_m)
+        ratings = sorted([*ratings, _own(needs, args.units)], key=lambda rating: rating.place_m)
     if args.json:
         print(json.dumps({"layouts": [_answer(rating) for rating in ratings]}, allow_nan=False))
     else:
-        _show(task, ratings if args.all else _best(ratings))
+        _show(needs, ratings if args.all else _best(ratings))
     if picture is not None:
         from contactfpga.robot.haptics import drawing
 
-        drawing.draw(picture, task, ratings)
+        drawing.draw(picture, needs, ratings)
     return 0
 
 
@@ -95,8 +95,8 @@ def _picture(path: str | None) -> Path | None:
     return outputs.file(path, "--picture")
 
 
-def _own(task: Task, path: str) -> Rating:
-    rating = rate(task, Layout(Path(path).name, LoadCells.load(path)))
+def _own(needs: Requirements, path: str) -> Rating:
+    rating = rate(needs, Layout(Path(path).name, LoadCells.load(path)))
     if rating is None:
         raise HapticsError(f"{path}: these units cannot hold the loads; they see too few components of a wrench")
     return rating
@@ -116,13 +116,13 @@ def _answer(rating: Rating) -> dict[str, Any]:
     return {"name": rating.layout.name, **numbers_of, "rank": rating.layout.cells.rank, "units": units}
 
 
-def _show(task: Task, ratings: list[Rating]) -> None:
+def _show(needs: Requirements, ratings: list[Rating]) -> None:
     from contactfpga.tools.console import tables
 
     head = [
         "units",
         "a unit bears, N",
-        f"error of the place at {task.at_n:g} N, mm",
+        f"error of the place at {needs.at_n:g} N, mm",
         "of the force, N",
         "smallest force seen, N",
     ]
