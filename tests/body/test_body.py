@@ -13,9 +13,8 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units
 
 import contactfpga
 from contactfpga.robot.body import Body, BodyError, JointHistory, NoJoints
-from contactfpga.robot.body.contact import forces_of, on_link
-from contactfpga.robot.body.pose import Pose
-from contactfpga.robot.body.snapshot import Snapshot
+from contactfpga.robot.body.kinematics import Pose
+from contactfpga.robot.body.snapshot import Snapshot, forces_of, on_link
 from contactfpga.robot.body.state import LinkState
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.wire.protocol import Frame

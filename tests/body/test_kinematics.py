@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from contactfpga.robot.body import urdf
-from contactfpga.robot.body.answer import BodyError, NoJoints
 from contactfpga.robot.body.joints import JointHistory
-from contactfpga.robot.body.kinematics import Kinematics
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.kinematics import Kinematics, Pose
+from contactfpga.robot.body.state import BodyError, NoJoints
 
 JVRC = "package://jvrc_description/urdf/jvrc1.urdf"
 

@@ -12,7 +12,7 @@ from two_links import Plugged
 
 import contactfpga
 from contactfpga.robot.body import Body, NoJoints, NoLinkData, OpenBody
-from contactfpga.robot.body.known import States
+from contactfpga.robot.body.reader import States
 
 
 def test_joints_that_fail_say_so_where_angles_are_needed(patient):
@@ -89,8 +89,8 @@ def test_a_snapshot_that_waited_tells_of_its_moment_and_is_made_when_it_is_looke
     with OpenBody(Body.load(patient), opened=plugged.opened) as body:
         body.read()
         with body.subscribe() as queue:
-            changes = body._changes
-            wait_until(lambda: body._changes > changes + 20)
+            changes = body._changes.count
+            wait_until(lambda: body._changes.count > changes + 20)
             assert made == []
             waited = queue.next()
             plugged.ports["b"].mute = True

@@ -12,8 +12,8 @@ from wire import Wire
 
 import contactfpga
 from contactfpga.robot.body import BodyError, registration
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import read
-from contactfpga.robot.body.pose import Pose
 from contactfpga.robot.body.registration import Press
 from contactfpga.tools import cli
 from contactfpga.wire.protocol import Frame

@@ -9,13 +9,13 @@ from two_links import FLAT, ROBOT, ROUND
 
 import contactfpga
 from contactfpga.robot.body import Body, OpenBody
-from contactfpga.robot.body.together import LAG_S, STEP_S, Together
+from contactfpga.robot.body.reader import LAG_S, STEP_S, SharedClock
 
 
 def test_no_board_leaves_another_one_behind_or_is_ahead_of_real_time(rng):
     """Boards run for as long as they may, or for longer, as where one is asked; the clock stands still and leaps."""
     now = [50.0]
-    together = Together(lambda: now[0])
+    together = SharedClock(lambda: now[0])
     boards, own = {}, {}  # where each is on the common clock, as it should be, and what its own clock adds to that
     for _ in range(3000):
         now[0] += rng.choice([0.0, 0.0, 1e-4, 2e-3, 0.3])
@@ -43,7 +43,7 @@ def test_no_board_leaves_another_one_behind_or_is_ahead_of_real_time(rng):
 
 def test_what_a_slow_computer_missed_is_not_made_up_for():
     now = [0.0]
-    together = Together(lambda: now[0])
+    together = SharedClock(lambda: now[0])
     together.join("a", 0.0)
     now[0] = 10.0
     board_s = 0.0

@@ -257,7 +257,7 @@ def test_a_body_in_a_child_is_closed(tmp_path):
     program = """
 from two_links import Plugged
 from contactfpga.robot.body import Body
-from contactfpga.robot.body.open_body import OpenBody
+from contactfpga.robot.body import OpenBody
 body = OpenBody(Body.load(port), opened=Plugged().opened)
 snapshots = body.subscribe()
 body.read()

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.surfaces import Cylinder, Mesh, SurfaceError
 from contactfpga.surfaces.laying import Laid, Triangles
 from contactfpga.tools import cli

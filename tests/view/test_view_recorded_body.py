@@ -11,7 +11,7 @@ from two_links import FLAT, ROBOT, ROUND, state_of, with_units, write_robot
 pytest.importorskip("viser")
 
 from contactfpga.robot.body import Body, BodyError, packed
-from contactfpga.robot.body.contact import on_link
+from contactfpga.robot.body.snapshot import on_link
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view import playback as playing

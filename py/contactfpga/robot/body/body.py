@@ -1,25 +1,33 @@
-"""A robot with a sheet on each of several links, as `robot.toml` has it."""
+"""A robot with a sheet on each of several links, as `robot.toml` has it; and open: a thread per link, and snapshots of
+all."""
 
 from __future__ import annotations
 
+import asyncio
+import collections
 import dataclasses
-from collections.abc import Mapping
+import threading
+import time
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import Any
 
 from contactfpga.choices.choice import trusted
+from contactfpga.driver import forks
 from contactfpga.driver.mcap_part import MAX_LINKS
+from contactfpga.driver.subscription import checked, checked_span
+from contactfpga.errors import BoardClosed, ReadTimeout
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import shown
 from contactfpga.robot.body import plan
 from contactfpga.robot.body import urdf as urdf_file
-from contactfpga.robot.body.answer import BodyError
 from contactfpga.robot.body.joints import Joints
 from contactfpga.robot.body.kinematics import Kinematics
 from contactfpga.robot.body.plan import Plan
-
-if TYPE_CHECKING:
-    from contactfpga.robot.body.open_body import OpenBody
+from contactfpga.robot.body.reader import RETRY_S, LinkReader, OpenBoard, SharedClock, States, open_board
+from contactfpga.robot.body.snapshot import BodyStats, Snapshot, SnapshotBatch
+from contactfpga.robot.body.state import BodyError
 
 KEYS = ("urdf", "links")
 
@@ -71,8 +79,6 @@ class Body:
             timeout: seconds for a board's hello.
             period_s: how often at most a link's newest frame is taken.
         """
-        from contactfpga.robot.body.open_body import OpenBody
-
         if joints is not None and not callable(joints):
             raise TypeError(f"joints is {shown(joints)}; it must be a function of a time, such as a JointHistory")
         return OpenBody(self, joints, timeout=timeout, period_s=period_s)
@@ -95,3 +101,267 @@ def _by_name(plans: list[Plan], kinematics: Kinematics | None) -> dict[str, Plan
             raise BodyError(f"link {shown(one.name)}: its folds are of joint {shown(one.folds.joint)}; there is none")
         found[one.name] = one
     return found
+
+
+class OpenBody:
+    """Every link's board, read until it is closed: a context manager that iterates snapshots.
+
+    Made by :meth:`Body.open`. No link's failure raises: its state says so, the others go on, and it is opened again as
+    soon as it can be.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        joints: Joints | None = None,
+        *,
+        timeout: float = 1.0,
+        period_s: float = 0.002,
+        opened: Callable[[Plan], OpenBoard] | None = None,
+    ):
+        self.body = body
+        self._joints = joints
+        self._timeout, self._period_s = checked(timeout), period_s
+        self._changes = _Changes()
+        self._given = 0  # the last change that next() has returned
+        forks.watch(self)
+        opener, shared_clock = opened or self._open_board, SharedClock(self.clock)
+        self._readers = {name: LinkReader(plan, opener, self.clock, shared_clock) for name, plan in body.links.items()}
+        self._threads = [
+            threading.Thread(target=self._read, args=(reader,), name=f"reader of link {name}", daemon=True)
+            for name, reader in self._readers.items()
+        ]
+        for thread in self._threads:
+            thread.start()
+        self._changes.wait_for(lambda: all(reader.tried for reader in self._readers.values()))
+
+    def _open_board(self, plan: Plan) -> OpenBoard:
+        return open_board(plan, self._timeout)
+
+    @staticmethod
+    def clock() -> float:
+        """Seconds on the body's clock, ``time.monotonic``; virtual boards' frames are put on it, too."""
+        return time.monotonic()
+
+    def _read(self, reader: LinkReader) -> None:
+        before = None
+        while not self._changes.closed.is_set():
+            pause_s = max(reader.step(), self._period_s)
+            state = reader.state()
+            now = (state.status, state.frame_s)
+            if now != before or not reader.tried:
+                before = now
+                self._changes.announce(self._snapshot)
+            self._changes.closed.wait(min(pause_s, RETRY_S))
+
+    def _snapshot(self) -> Snapshot:
+        observed = {name: reader.observe() for name, reader in self._readers.items()}
+        now = self.clock()
+        return Snapshot(self.body, now, States(self.body.links, observed, now), self._joints)
+
+    # ---- snapshots
+
+    def latest(self, timeout: float = 1.0) -> Snapshot:
+        """All links as they are now; waits for nothing."""
+        checked(timeout)
+        self._changes.check_open()
+        return self._snapshot()
+
+    def read(self, timeout: float = 1.0) -> Snapshot:
+        """All links, each with a frame that was scanned after this call; those of which none came within ``timeout``
+        seconds as they are then, which their state and age say."""
+        timeout = checked(timeout)
+        self._changes.check_open()
+        asked = {name: reader.ask() for name, reader in self._readers.items()}
+
+        def settled() -> bool:
+            return all(
+                self._readers[name].answered >= number or self._readers[name].state().status in ("lost", "mismatch")
+                for name, number in asked.items()
+            )
+
+        self._changes.wait_for(settled, timeout)
+        return self.latest()
+
+    def next(self, timeout: float = 1.0) -> Snapshot:
+        """The newest snapshot in which a link has a newer frame or another state than in the last one that this method
+        returned. Raises :class:`ReadTimeout` where nothing changes for ``timeout`` seconds, as when every link is
+        lost."""
+        timeout = checked(timeout)
+        with self._changes.condition:
+            if not self._changes.wait_for(lambda: self._changes.count > self._given, timeout):
+                raise ReadTimeout(f"no link has changed within {timeout:g} s: {self._snapshot()}")
+            self._given = self._changes.count
+        return self.latest()
+
+    def batch(self, max_s: float = 0.01, timeout: float = 1.0) -> SnapshotBatch:
+        """All snapshots of the next ``max_s`` seconds, with their frames as arrays; the first one is waited for, for
+        ``timeout`` seconds."""
+        max_s = checked_span(max_s)
+        with self.subscribe() as queue:
+            found = [queue.next(timeout)]
+            end_s = self.clock() + max_s
+            while (left_s := end_s - self.clock()) > 0:
+                try:
+                    found.append(queue.next(left_s))
+                except ReadTimeout:
+                    break
+        return SnapshotBatch(found)
+
+    def subscribe(self, maxsize: int = 1024) -> SnapshotQueue:
+        """A queue of its own for the snapshot at each change from now on."""
+        return self._changes.subscribe(maxsize)
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        """The newest snapshot again and again, forever, at every change or once per second."""
+        while True:
+            yield self._newest()
+
+    async def __aiter__(self) -> AsyncIterator[Snapshot]:
+        """The same in ``async for``."""
+        while True:
+            yield await asyncio.to_thread(self._newest)
+
+    def _newest(self) -> Snapshot:
+        try:
+            return self.next()
+        except ReadTimeout:
+            return self.latest()
+
+    @property
+    def stats(self) -> BodyStats:
+        """Counters since the body was opened."""
+        return BodyStats.of({name: reader.stats for name, reader in self._readers.items()})
+
+    def forked(self) -> None:
+        """In a child process all ports are closed; its parent goes on."""
+        self._changes.forked()
+        self._threads, self._readers = [], {}
+
+    # ---- its end
+
+    def __enter__(self) -> OpenBody:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give all ports back; may be called twice."""
+        self._changes.close()
+        for thread in self._threads:
+            thread.join()
+        for reader in self._readers.values():
+            reader.close()
+
+
+class SnapshotQueue:
+    """Snapshots from a moment on; at most ``maxsize`` wait, beyond, the oldest are dropped and counted."""
+
+    def __init__(self, changes: _Changes, maxsize: int):
+        if isinstance(maxsize, bool) or not isinstance(maxsize, int) or maxsize < 1:
+            raise ValueError(f"maxsize is {maxsize!r}; it must be a whole number of snapshots, 1 or more")
+        self._changes = changes
+        self._waiting: collections.deque[Snapshot] = collections.deque(maxlen=maxsize)
+        self.dropped = 0
+        """Snapshots that were not taken in time."""
+
+    def put(self, snapshot: Snapshot) -> None:
+        """Add one; the condition of the body's changes is held."""
+        self.dropped += len(self._waiting) == self._waiting.maxlen
+        self._waiting.append(snapshot)
+
+    def next(self, timeout: float = 1.0) -> Snapshot:
+        """The next one, in order. Raises :class:`ReadTimeout`, :class:`BoardClosed`."""
+        with self._changes.condition:
+            self._wait(checked(timeout))
+            return self._waiting.popleft()
+
+    def _wait(self, timeout: float) -> None:
+        """Until one waits."""
+        with self._changes.condition:
+            self._changes.wait_for(lambda: self._waiting, timeout)
+            self._changes.check_open()
+            if not self._waiting:
+                raise ReadTimeout(f"no link has changed within {timeout:g} s")
+
+    def close(self) -> None:
+        """Take no more."""
+        self._changes.unsubscribe(self)
+
+    def __enter__(self) -> SnapshotQueue:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        while True:
+            yield self.next()
+
+    async def __aiter__(self) -> AsyncIterator[Snapshot]:
+        while True:
+            await asyncio.to_thread(self._wait, 1.0)
+            yield self.next()  # which waits for nothing now, and takes none if we were canceled above
+
+
+class _Changes:
+    """Changes of an open body, for the threads that wait for one; after its end nothing is waited for."""
+
+    def __init__(self) -> None:
+        self.condition = threading.Condition()
+        self.closed = threading.Event()  # beside the condition: no change of a link wakes the other links' threads
+        self.count = 0
+        """Changes so far."""
+        self._queues: list[SnapshotQueue] = []
+        self._inherited = False
+
+    def announce(self, snapshot: Callable[[], Snapshot]) -> None:
+        """Count a change; every queue gets the snapshot, which is taken only where there is one."""
+        with self.condition:
+            self.count += 1
+            taken = snapshot() if self._queues else None
+            for queue in self._queues:
+                assert taken is not None
+                queue.put(taken)
+            self.condition.notify_all()
+
+    def wait_for(self, happened: Callable[[], object], timeout: float | None = None) -> bool:
+        """Wait until this has happened or the body is closed; False after ``timeout`` seconds without either."""
+        with self.condition:
+            return bool(self.condition.wait_for(lambda: self.closed.is_set() or happened(), timeout))
+
+    def check_open(self) -> None:
+        """Raises :class:`BoardClosed`."""
+        if self._inherited:
+            raise BoardClosed(f"this body {forks.ELSEWHERE}")
+        if self.closed.is_set():
+            raise BoardClosed("this body was closed; open it again")
+
+    def subscribe(self, maxsize: int) -> SnapshotQueue:
+        """A new queue. Raises :class:`BoardClosed`."""
+        self.check_open()
+        queue = SnapshotQueue(self, maxsize)
+        with self.condition:
+            self._queues.append(queue)
+        return queue
+
+    def unsubscribe(self, queue: SnapshotQueue) -> None:
+        """Give this queue no more snapshots."""
+        with self.condition:
+            if queue in self._queues:
+                self._queues.remove(queue)
+
+    def close(self) -> None:
+        """The body's end."""
+        with self.condition:
+            self.closed.set()
+            self.condition.notify_all()
+
+    def forked(self) -> None:
+        """In a child process: closed, with locks that no thread of the parent holds."""
+        self.condition, self.closed = threading.Condition(), threading.Event()
+        self.closed.set()
+        self._inherited = True

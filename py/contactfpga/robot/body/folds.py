@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from contactfpga.inputs.files import read_small, write_text
 from contactfpga.inputs.values import is_finite, shown, whole
-from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.state import BodyError
 from contactfpga.zones import around, labels
 from contactfpga.zones.zone import Zone, Zones
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Collection, Mapping
 
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.robot.body.answer import BodyError, NoJoints
+from contactfpga.robot.body.state import BodyError, NoJoints
 
 Joints = Callable[[float], Mapping[str, float]]
 """From a time on the host's clock, in s, to the angles then, in rad, of prismatic joints in m."""

@@ -1,16 +1,92 @@
-"""From joint angles to poses of links and to Jacobians."""
+"""A robot's links and joints, and from joint angles to poses of links and to Jacobians."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.robot.body.answer import BodyError, NoJoints
-from contactfpga.robot.body.pose import Pose, turn
-from contactfpga.robot.body.urdf import MOVING, Joint, Robot
-from contactfpga.surfaces.shapes import Floats
+from contactfpga.robot.body.state import BodyError, NoJoints
+from contactfpga.surfaces.shapes import Floats, Vector
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pose:
+    """A rotation, then a shift: ``apply`` takes points of the inner frame to the outer one."""
+
+    rotation: Floats
+    """(3, 3)."""
+    point_m: Floats
+    """(3,): the inner frame's origin."""
+
+    @classmethod
+    def of(cls, point_m: Vector = (0.0, 0.0, 0.0), rpy_rad: Vector = (0.0, 0.0, 0.0)) -> Pose:
+        """From an origin, and roll, pitch and yaw about the outer frame's x, y and z axes, as in URDF."""
+        roll, pitch, yaw = rpy_rad
+        rotation = rotation_about((0, 0, 1), yaw) @ rotation_about((0, 1, 0), pitch) @ rotation_about((1, 0, 0), roll)
+        return cls(rotation, np.array(point_m, float))
+
+    @property
+    def rpy_rad(self) -> Vector:
+        """Roll, pitch and yaw; at a pitch of 90 degrees the yaw is 0."""
+        r = self.rotation
+        pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
+        if math.hypot(r[0, 0], r[1, 0]) < 1e-9:
+            return math.atan2(-r[1, 2], r[1, 1]), pitch, 0.0
+        return math.atan2(r[2, 1], r[2, 2]), pitch, math.atan2(r[1, 0], r[0, 0])
+
+    def __matmul__(self, inner: Pose) -> Pose:
+        """The pose of what lies at ``inner`` in this one's frame."""
+        return Pose(self.rotation @ inner.rotation, self.apply(inner.point_m))
+
+    def apply(self, points_m: Floats) -> Floats:
+        """(..., 3) points of the inner frame in the outer one."""
+        return np.asarray(points_m @ self.rotation.T + self.point_m)
+
+    def turn(self, vectors: Floats) -> Floats:
+        """(..., 3) directions of the inner frame in the outer one."""
+        return np.asarray(vectors @ self.rotation.T)
+
+
+def rotation_about(axis: Vector | Floats, angle_rad: float) -> Floats:
+    """(3, 3): the rotation about a unit vector, by Rodrigues."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], float)
+    return np.asarray(np.eye(3) + math.sin(angle_rad) * cross + (1 - math.cos(angle_rad)) * (cross @ cross))
+
+
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint between two links."""
+
+    name: str
+    kind: str
+    """One of :data:`MOVING`, or ``fixed``."""
+    parent: str
+    child: str
+    origin: Pose
+    """Of the child's frame in the parent's, at an angle of 0."""
+    axis: Floats
+    """(3,): unit vector in the child's frame; 0 where it is fixed."""
+    mimic: tuple[str, float, float] | None = None
+    """The joint that it follows, by which factor, and from which offset on."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Robot:
+    """What a URDF says of frames."""
+
+    name: str
+    links: tuple[str, ...]
+    joints: dict[str, Joint]
+    root: str
+    """The link that is no joint's child: the base frame."""
 
 
 class Kinematics:
@@ -105,4 +181,4 @@ class Kinematics:
         value = factor * float(value) + offset
         if joint.kind == "prismatic":
             return Pose(np.eye(3), value * joint.axis)
-        return Pose(turn(joint.axis, value), np.zeros(3))
+        return Pose(rotation_about(joint.axis, value), np.zeros(3))

@@ -10,8 +10,8 @@ from typing import Any
 
 from contactfpga.inputs import tomlfile
 from contactfpga.robot.body import urdf as urdf_file
-from contactfpga.robot.body.answer import BodyError
 from contactfpga.robot.body.body import Body
+from contactfpga.robot.body.state import BodyError
 
 ROBOT = "robot"
 """Name of the texts in a recording."""

@@ -18,9 +18,9 @@ from contactfpga.driver.mcap_part import MAX_NAME
 from contactfpga.driver.silence import longest_pause_s
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.robot.body.answer import BodyError
 from contactfpga.robot.body.folds import Folds
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.kinematics import Pose
+from contactfpga.robot.body.state import BodyError
 from contactfpga.robot.haptics.units import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.surfaces import Cone, Cylinder, Mesh, Mirrored, Plane, Surface

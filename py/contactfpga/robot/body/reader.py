@@ -1,4 +1,4 @@
-"""One link's board: opened, read, and opened again when it was lost."""
+"""One link's board: opened, read, and opened again when it was lost; and what is known of the link by then."""
 
 from __future__ import annotations
 
@@ -6,25 +6,175 @@ import contextlib
 import dataclasses
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from typing import Protocol
 
+from contactfpga.driver import driver, finding
+from contactfpga.driver.board import Board
 from contactfpga.driver.stats import Stats, total
-from contactfpga.errors import (
-    BoardClosed,
-    BoardSilent,
-    OnlyNoise,
-    ReadTimeout,
-    SkinMismatch,
-    VersionMismatch,
-)
+from contactfpga.errors import BoardClosed, BoardSilent, OnlyNoise, ReadTimeout, SkinMismatch, VersionMismatch
 from contactfpga.inputs.values import shown
-from contactfpga.robot.body.known import Known, Seen
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.state import LinkState
-from contactfpga.robot.body.together import Together
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
+
+
+def open_board(plan: Plan, timeout: float = 1.0) -> Board:
+    """The board of a link; ``timeout``: seconds for its hello. Raises what :func:`contactfpga.open` does."""
+    with _lock(plan.port):
+        return driver.open(plan.port, plan.skin, timeout=timeout, trust=plan.trust)
+
+
+def _lock(port: str | None) -> contextlib.AbstractContextManager[None]:
+    if finding.searched(port):
+        return _PORTS.exclusive()
+    elsewhere = port is not None and "://" in port  # virtual, or on the network: no search opens it
+    return contextlib.nullcontext() if elsewhere else _PORTS.shared()
+
+
+class _PortLock:
+    """A search listens to every port that nobody has: meanwhile no other link can open its own, nor search."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._shared = self._waiting = 0
+        self._alone = False
+
+    @contextlib.contextmanager
+    def shared(self) -> Iterator[None]:
+        """For links with a port. A search that waits goes first, or it might wait forever."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._alone and not self._waiting)
+            self._shared += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._shared -= 1
+                self._changed.notify_all()
+
+    @contextlib.contextmanager
+    def exclusive(self) -> Iterator[None]:
+        """For a search."""
+        with self._changed:
+            self._waiting += 1
+            self._changed.wait_for(lambda: not self._alone and not self._shared)
+            self._waiting -= 1
+            self._alone = True
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._alone = False
+                self._changed.notify_all()
+
+
+_PORTS = _PortLock()
+
+
+STEP_S = 0.005
+"""None of them is ahead of another one by more simulated time."""
+LAG_S = 0.02
+"""Where the computer is too slow for real time, no more than this is made up for."""
+
+
+class SharedClock:
+    """Says how much simulated time may pass for each board: as much as real time does, and no board leaves another one
+    behind. Safe for several threads."""
+
+    def __init__(self, clock: Callable[[], float]):
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._began_s = clock()
+        self._joined_s: dict[str, float] = {}  # by link, what to add to a board's clock for the common one
+        self._now_s: dict[str, float] = {}  # on the common clock, of each board
+
+    def join(self, link: str, board_s: float) -> None:
+        """A board is there whose own clock says this; for it the common time begins where the others are."""
+        with self._lock:
+            now_s = min(self._now_s.values(), default=self._clock() - self._began_s)
+            self._joined_s[link], self._now_s[link] = now_s - board_s, now_s
+
+    def leave(self, link: str) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            self._joined_s.pop(link, None)
+            self._now_s.pop(link, None)
+
+    def due_s(self, link: str, board_s: float) -> float:
+        """How many seconds may pass now for this board, whose clock says ``board_s``; 0 or less: none."""
+        with self._lock:
+            mine_s = self._now_s[link] = self._joined_s[link] + board_s
+            last_s = min(self._now_s.values())
+            real_s = self._clock() - self._began_s
+            lag_s = real_s - last_s - LAG_S
+            if lag_s > 0:
+                self._began_s += lag_s
+                real_s -= lag_s
+            return min(real_s, last_s + STEP_S) - mine_s
+
+
+NO_TRACKS = Tracks(0, (), ())
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class LinkMemory:
+    """What holds from one event of a link to the next."""
+
+    opened: bool = False
+    """There is an open board."""
+    open_s: float = -math.inf
+    """When it was opened."""
+    zones: Zones | None = None
+    tracks: Tracks = NO_TRACKS
+    frame_s: float = -math.inf
+    """When the newest frame was scanned that ever came, on the body's clock."""
+    came_s: float = -math.inf
+    """The same on that board's own clock."""
+    down: str = "lost"
+    """Its status where no board is open."""
+    reason: str = "it was not tried yet"
+    """Why none is."""
+
+    def state(self, plan: Plan, now: float, board_s: float | None) -> LinkState:
+        """The state at that moment; ``board_s``: the same on the clock of a virtual board, None for any other."""
+        age_s = None if self.frame_s == -math.inf else now - self.frame_s
+        if not self.opened:
+            return LinkState(None, age_s, self.down, self.reason)
+        waited_s = now - max(self.frame_s, self.open_s)
+        if board_s is not None:  # nothing happens on the sheet while its time does not pass
+            waited_s = board_s - self.came_s
+            age_s = None if self.zones is None else waited_s
+        if waited_s > plan.silent_s:
+            return LinkState(None, age_s, "silent", f"no frame for {waited_s:.3f} s")
+        if self.zones is None or age_s is None:
+            return LinkState(None, age_s, "late", "no frame since the port was opened")
+        status = "ok" if age_s <= plan.late_s else "late"
+        return LinkState(self.zones, age_s, status, "", self.frame_s, self.tracks)
+
+
+Observation = tuple[LinkMemory, float | None]
+"""What is known, and what a virtual board's clock said then."""
+
+
+class States(Mapping[str, LinkState]):
+    """The states of all links at a moment."""
+
+    def __init__(self, plans: Mapping[str, Plan], observed: Mapping[str, Observation], now: float):
+        self._plans, self._observed, self._now = plans, observed, now
+
+    def __getitem__(self, name: str) -> LinkState:
+        known, board_s = self._observed[name]
+        return known.state(self._plans[name], self._now, board_s)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._observed)
+
+    def __len__(self) -> int:
+        return len(self._observed)
+
 
 RETRY_S = 0.5
 """From a failure to open a board to the next try."""
@@ -64,11 +214,11 @@ class LinkReader:
         plan: Plan,
         opened: Callable[[Plan], OpenBoard],
         clock: Callable[[], float],
-        together: Together | None = None,
+        shared_clock: SharedClock | None = None,
     ):
-        """``together``: has virtual boards run on one clock."""
+        """``shared_clock``: has virtual boards run on one clock."""
         self.plan = plan
-        self._together = together if plan.virtual else None
+        self._shared_clock = shared_clock if plan.virtual else None
         self.tried = False
         """It was tried to open the board, with or without success."""
         self.answered = 0
@@ -78,7 +228,7 @@ class LinkReader:
         self._asked = 0
         self._board: OpenBoard | None = None
         self._retry_at = -math.inf
-        self._known = Known()
+        self._known = LinkMemory()
         self._tracker = Tracker()
         self._before = Stats()  # of all boards that were closed
 
@@ -96,14 +246,14 @@ class LinkReader:
                 return wait_s
             self._open()
             return 0.0
-        due_s = WAIT_S if self._together is None else self._together.due_s(self.plan.name, self._board.clock())
+        due_s = WAIT_S if self._shared_clock is None else self._shared_clock.due_s(self.plan.name, self._board.clock())
         asked = self._asked
         if asked == self.answered and due_s <= 0:
             return 0.0
         try:
             if asked > self.answered:
                 self._take(self._board.read(WAIT_S))
-            elif self._together is None:
+            elif self._shared_clock is None:
                 self._take(self._board.latest(due_s))
             else:
                 self._let_pass(due_s)
@@ -133,7 +283,7 @@ class LinkReader:
         now_s = self._board.clock()
         sampled_s = now_s if zones.host_time_s is None else min(zones.host_time_s, now_s)
         frame_s = self._clock() - (now_s - sampled_s)
-        self._known = Known(True, self._known.open_s, zones, tracks, frame_s, sampled_s)
+        self._known = LinkMemory(True, self._known.open_s, zones, tracks, frame_s, sampled_s)
 
     def _open(self) -> None:
         try:
@@ -146,9 +296,9 @@ class LinkReader:
             self._fail("lost", error)
         else:
             known = dataclasses.replace(self._known, opened=True, open_s=self._clock())
-            if self._together is not None:
+            if self._shared_clock is not None:
                 known = dataclasses.replace(known, came_s=board.clock())
-                self._together.join(self.plan.name, known.came_s)
+                self._shared_clock.join(self.plan.name, known.came_s)
             with self._lock:
                 self._board, self._known = board, known
         self.tried = True
@@ -170,8 +320,8 @@ class LinkReader:
         return total([self._before] if self._board is None else [self._before, self._board.stats])
 
     def _fail(self, status: str, error: Exception) -> None:
-        if self._together is not None:
-            self._together.leave(self.plan.name)
+        if self._shared_clock is not None:
+            self._shared_clock.leave(self.plan.name)
         with self._lock:
             self._before = self._total()
             self._board = None
@@ -183,14 +333,14 @@ class LinkReader:
         """Give the port back; the thread that calls :meth:`step` has ended."""
         self._drop("lost", BoardClosed("the body was closed"))
 
-    def seen(self) -> Seen:
+    def observe(self) -> Observation:
         """What is known now, from which :class:`States` are made."""
-        if self._together is None:
+        if self._shared_clock is None:
             return self._known, None
         with self._lock:  # a board that is open stays so meanwhile
             return self._known, None if self._board is None else self._board.clock()
 
     def state(self) -> LinkState:
         """The state now."""
-        known, board_s = self.seen()
+        known, board_s = self.observe()
         return known.state(self.plan, self._clock(), board_s)

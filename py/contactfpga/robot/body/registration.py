@@ -12,9 +12,9 @@ import numpy as np
 
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
-from contactfpga.robot.body.answer import BodyError
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.state import BodyError
 from contactfpga.surfaces import Surface
 from contactfpga.surfaces.shapes import Floats, Vector
 from contactfpga.zones.around import across

@@ -1,11 +1,33 @@
-"""The state of a link: its newest frame, and whether it still says what touches the link."""
+"""The state of a link: its newest frame, and whether it still says what touches the link; and the errors of a body."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
+from contactfpga.errors import ContactFPGAError, NoData
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
+
+
+class BodyError(ContactFPGAError, ValueError):
+    """A robot, link, joint or place that cannot be; the message names the value and the limit."""
+
+
+class NoJoints(ContactFPGAError):
+    """The joint angles at a frame's time are not known, so its contacts have no place in the base frame."""
+
+
+class NoLinkData(NoData):
+    """Links that were asked for contacts have no data: nobody knows whether something touches them."""
+
+    def __init__(self, links: Mapping[str, LinkState]):
+        listed = "; ".join(f"{name}: {state}" for name, state in links.items())
+        super().__init__(
+            f"no data of {listed}; ask for the links that have data: contacts(links=snapshot.answering)", None
+        )
+        self.links = dict(links)
+        """Those without data."""
 
 
 @dataclasses.dataclass(frozen=True)

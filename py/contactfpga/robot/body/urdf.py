@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
 import math
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy as np
 from contactfpga.inputs import xmlfile
 from contactfpga.inputs.files import read_small
 from contactfpga.inputs.values import number_in, shown
-from contactfpga.robot.body.answer import BodyError
-from contactfpga.robot.body.pose import Pose
-from contactfpga.surfaces.shapes import Floats, Vector
+from contactfpga.robot.body.kinematics import MOVING, Joint, Pose, Robot
+from contactfpga.robot.body.state import BodyError
+from contactfpga.surfaces.shapes import Vector
 
 if TYPE_CHECKING:
     from xml.etree import ElementTree
@@ -24,35 +23,6 @@ MAX_BYTES = 20_000_000
 MAX_LINKS = 1000
 """And as many joints."""
 PACKAGE = "package://"
-MOVING = ("revolute", "continuous", "prismatic")
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Joint:
-    """A joint between two links."""
-
-    name: str
-    kind: str
-    """One of :data:`MOVING`, or ``fixed``."""
-    parent: str
-    child: str
-    origin: Pose
-    """Of the child's frame in the parent's, at an angle of 0."""
-    axis: Floats
-    """(3,): unit vector in the child's frame; 0 where it is fixed."""
-    mimic: tuple[str, float, float] | None = None
-    """The joint that it follows, by which factor, and from which offset on."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Robot:
-    """What a URDF says of frames."""
-
-    name: str
-    links: tuple[str, ...]
-    joints: dict[str, Joint]
-    root: str
-    """The link that is no joint's child: the base frame."""
 
 
 def located(urdf: str, folder: Path) -> Path:

@@ -99,7 +99,7 @@ def _add(session: Session, args: argparse.Namespace, body: Body | None) -> None:
 
 def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
     """What says the forces at contacts of a link with pressure units."""
-    from contactfpga.robot.body.contact import forces_of
+    from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
 

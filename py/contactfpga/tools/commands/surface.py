@@ -6,7 +6,7 @@ import argparse
 
 import numpy as np
 
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.skin import Skin
 from contactfpga.surfaces.laying import Laid, Triangles
 from contactfpga.tools.console import numbers, outputs, terminal

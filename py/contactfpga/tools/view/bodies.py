@@ -12,10 +12,10 @@ import numpy as np
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
 from contactfpga.robot.body import Body, Contact
-from contactfpga.robot.body.contact import on_link
-from contactfpga.robot.body.open_body import OpenBody
-from contactfpga.robot.body.opening import open_board
+from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
+from contactfpga.robot.body.reader import open_board
+from contactfpga.robot.body.snapshot import on_link
 from contactfpga.robot.body.state import LinkState
 from contactfpga.tools.view import picture
 from contactfpga.tools.view.fingers import Hand, Touchable

@@ -13,8 +13,8 @@ from contactfpga import picture_style
 from contactfpga.inputs.values import shown
 from contactfpga.robot.body import Body, BodyError
 from contactfpga.robot.body import urdf as urdf_file
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan
-from contactfpga.robot.body.pose import Pose
 from contactfpga.surfaces import SurfaceError, mesh_file
 from contactfpga.tools.view.picture import rgb
 from contactfpga.tools.view.stage import Stage, light

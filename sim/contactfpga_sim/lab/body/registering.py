@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from contactfpga.robot.body import BodyError, registration
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan, read
-from contactfpga.robot.body.pose import Pose
 from contactfpga.robot.body.registration import Press
 from contactfpga.skin import Skin
 from contactfpga_sim.model.scenes import contacts

@@ -18,9 +18,9 @@ from contactfpga import examples
 from contactfpga import picture_style as style
 from contactfpga.driver.address import Sim
 from contactfpga.robot.body import Body, LinkState
-from contactfpga.robot.body.contact import on_link
+from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan
-from contactfpga.robot.body.pose import Pose
+from contactfpga.robot.body.snapshot import on_link
 from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.body import folding, outages, registering

@@ -12,7 +12,7 @@ import numpy as np
 
 from contactfpga.inputs.values import number_in, shown
 from contactfpga.robot.body import Body, folds
-from contactfpga.robot.body.open_body import OpenBody
+from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.tools.commands.body.register import link
 from contactfpga.tools.console import numbers, outputs, terminal
