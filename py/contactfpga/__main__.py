@@ -8,7 +8,7 @@ from contactfpga.tools.console import signals
 def main() -> int:
     """Run the command; a signal ends it quietly also while it is still being loaded."""
     signals.end_all_at_once()
-    from contactfpga.tools import cli  # and numpy with it, half a second
+    from contactfpga.tools import cli
 
     return cli.main()
 

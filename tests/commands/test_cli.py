@@ -1,6 +1,5 @@
 """The command line: what each command prints, how it fails, and how light it starts."""
 
-import argparse
 import json
 import os
 import re
@@ -26,17 +25,15 @@ def test_help_names_every_command(capsys, monkeypatch):
         cli.main(["--help"])
     assert caught.value.code == 0
     said = capsys.readouterr().out
-    for name, command in cli.COMMANDS.items():
-        assert re.search(rf"\n    {name} +{re.escape(command.HELP)}", said)
+    for name, text in cli.COMMANDS.items():
+        assert re.search(rf"\n    {name} +{re.escape(text)}", said)
 
 
 def parsers(parser, name="contactfpga"):
     """The parsers of all commands and of their topics, by what is typed."""
     yield name, parser
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for word, below in action.choices.items():
-                yield from parsers(below, f"{name} {word}")
+    for word, below in parser.topics.items():
+        yield from parsers(below, f"{name} {word}")
 
 
 PARSERS = dict(parsers(cli._parser()))
@@ -99,9 +96,33 @@ def test_every_command_has_a_file_of_its_own():
     folder = Path(commands.__file__).parent
     files = {path.stem if path.is_file() else path.name for path in folder.iterdir()} - {"__init__", "__pycache__"}
     assert files == set(cli.COMMANDS)
-    assert {command.__name__ for command in cli.COMMANDS.values()} == {
-        f"contactfpga.tools.commands.{name}" for name in files
-    }
+
+
+TOY = """
+EXTRA = None
+
+
+def add_flags(parser):
+    parser.add_argument("--times", type=int, default=1, help="How often.")
+
+
+def run(args):
+    print("hello " * args.times)
+    return 0
+"""
+
+
+def test_a_command_is_a_module_and_a_line_of_the_table(tmp_path, monkeypatch, run, capsys):
+    (tmp_path / "toy.py").write_text(TOY)
+    monkeypatch.setattr(commands, "__path__", [*commands.__path__, str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "contactfpga.tools.commands.toy", raising=False)
+    monkeypatch.setitem(cli.COMMANDS, "toy", "Say hello.")
+    assert run("toy", "--times", 2) == (0, "hello hello \n", "")
+    with pytest.raises(SystemExit):
+        run("toy", "--help")
+    said = capsys.readouterr().out
+    assert "Say hello." in said
+    assert "--trust" in said
 
 
 def test_without_a_command_help_is_shown(capsys):
@@ -130,6 +151,14 @@ def test_import_needs_numpy_alone():
 
 def test_help_loads_nothing_heavy():
     assert loaded("from contactfpga.tools import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass") == ""
+
+
+def test_help_loads_no_command():
+    code = "import sys\nfrom contactfpga.tools import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass\n"
+    result = python(code + "print(*(name for name in sys.modules if name.startswith('contactfpga')))")
+    names = result.stdout.splitlines()[-1].split()
+    assert not [name for name in names if name.startswith("contactfpga.tools.commands.")]
+    assert len(names) < 30
 
 
 def test_json_needs_no_display(board):

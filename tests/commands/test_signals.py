@@ -146,6 +146,21 @@ def test_a_signal_that_others_make_something_of(how, number):
     assert (done.returncode, done.stderr) == (STATUSES[number], "")
 
 
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_while_python_runs_a_text(number, tmp_path):
+    """As it does to make a dataclass, with which `python -m` ended by SIGINT."""
+    body = f"def body():\n    exec('import os; os.kill(os.getpid(), {int(number)}); [0 for _ in range(100)]')\n"
+    (tmp_path / "started.py").write_text(STARTS.replace("WORK", body))
+    done = subprocess.run(
+        [sys.executable, "-m", "started"],
+        capture_output=True,
+        text=True,
+        timeout=25,
+        env=environment(PYTHONPATH=os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])),
+    )
+    assert (done.returncode, done.stderr) == (STATUSES[number], "")
+
+
 def test_what_fails_after_the_usual_end_is_told(capsys):
     def body():
         with interrupt.usual_end():

@@ -3,51 +3,52 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from typing import Protocol
 
 from contactfpga import __version__
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
-from contactfpga.tools.commands import (
-    arm,
-    board,
-    body,
-    build,
-    chart,
-    cover,
-    doctor,
-    export,
-    failures,
-    fit,
-    flash,
-    flips,
-    haptics,
-    latency,
-    plot,
-    publish,
-    record,
-    recover,
-    replay,
-    ros,
-    settle,
-    surface,
-    view,
-    wire,
-    zones,
-)
+from contactfpga.tools import commands
 from contactfpga.tools.console import interrupt
 from contactfpga.tools.console.parser import Parser
 
+COMMANDS = {
+    "zones": "Show the contact zones live.",
+    "body": "Show the contacts on all links of a robot in one coordinate frame.",
+    "view": "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse.",
+    "wire": "Show the pressed cells live, to check wiring, bounce and settle times.",
+    "board": "Run the virtual board on a pseudo-terminal.",
+    "doctor": "Find out what is wrong between this computer and the board.",
+    "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
+    "build": "Build a bitstream for a board; print its wiring.",
+    "flash": "Write a bitstream to a board.",
+    "replay": "Send recorded frames through the compiled gateware.",
+    "latency": "Measure the time from a touch to the last byte that reports it, on the simulated gateware.",
+    "record": "Record a board, or all boards of a robot, into an MCAP file.",
+    "recover": "Repair a recording whose program was killed or whose disk was full.",
+    "export": "Write a recording as a table: Parquet, NPZ or CSV.",
+    "ros": "Publish contacts as ROS 2 topics, with no ROS installed.",
+    "plot": "Draw a recording: where, when and how large it was touched.",
+    "settle": "Compute the times that the circuit of a sheet needs.",
+    "surface": "Lay a sheet on a mesh: a table of point and normal per cell.",
+    "cover": "Compute the soft cover: impact, sensitivity and design.",
+    "haptics": "Compute forces at contacts from pressure units; set their zeros and thresholds.",
+    "chart": "Chart what speed costs in accuracy.",
+    "fit": "Find the cheapest Skin that is good enough for given scenes.",
+    "failures": "Turn one knob after another until something breaks.",
+    "flips": "Flip bits of the running gateware one by one and see what the host notices.",
+    "arm": "Run the robot arm into a human arm and see what force results.",
+}
+"""Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
+:class:`Command` or a :class:`Group`; it is imported when the command is called."""
+
 
 class Command(Protocol):
-    """A file of :mod:`contactfpga.tools.commands`. It loads with the host alone; what else ``run`` needs, it
-    imports."""
-
-    @property
-    def HELP(self) -> str:  # noqa: N802
-        """A sentence."""
+    """A command, or a topic of one. Its module loads with the host alone; what else ``run`` needs, it imports."""
 
     @property
     def EXTRA(self) -> str | None:  # noqa: N802
@@ -60,33 +61,19 @@ class Command(Protocol):
         """Run the command; returns the exit status."""
 
 
-COMMANDS: dict[str, Command] = {
-    "zones": zones,
-    "body": body,
-    "view": view,
-    "wire": wire,
-    "board": board,
-    "doctor": doctor,
-    "publish": publish,
-    "build": build,
-    "flash": flash,
-    "replay": replay,
-    "latency": latency,
-    "record": record,
-    "recover": recover,
-    "export": export,
-    "ros": ros,
-    "plot": plot,
-    "settle": settle,
-    "surface": surface,
-    "cover": cover,
-    "haptics": haptics,
-    "chart": chart,
-    "fit": fit,
-    "failures": failures,
-    "flips": flips,
-    "arm": arm,
-}
+class Group(Protocol):
+    """A command of several topics: a package in which each topic is a module, a :class:`Command`."""
+
+    @property
+    def TOPICS(self) -> dict[str, str]:  # noqa: N802
+        """Help of each topic."""
+
+    @property
+    def USUAL(self) -> tuple[str, str] | None:  # noqa: N802
+        """The topic that need not be named, and what its usage shows in place of the name."""
+
+    def run(self, topic: Callable[[], int]) -> int:
+        """Run a topic; handles the errors that all topics have in common."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -96,27 +83,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
-    args = parser.parse_args(_with_usual_topic(sys.argv[1:] if arguments is None else list(arguments)))
+    args = parser.parse_args(arguments)
     if args.command is None:
         parser.print_help(sys.stderr)
         return 2
-    command = COMMANDS[args.command]
     try:
         with trusted(args.trust):
-            return command.run(args)
+            status: int = args.run(args)
+            return status
     except ModuleNotFoundError as error:
-        return interrupt.failed(_missing(args.command, command.EXTRA, error))
+        return interrupt.failed(_missing(args.command, args.extra, error))
     except MissingExtra as error:  # of a part that does not know which command it serves
-        return interrupt.failed(MissingExtra(error.what, command.EXTRA) if command.EXTRA else error)
+        return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
     except ValueError as error:
         return interrupt.failed(error)
-
-
-def _with_usual_topic(arguments: list[str]) -> list[str]:
-    """`contactfpga body ROBOT.toml` is short for a topic of that command."""
-    if arguments[:1] == ["body"] and arguments[1:2] not in ([], ["-h"], ["--help"], *([name] for name in body.TOPICS)):
-        return ["body", body.USUAL_TOPIC, *arguments[1:]]
-    return arguments
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:
@@ -125,28 +105,54 @@ def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> Mis
     return MissingExtra(f"`contactfpga {command}` ({error})", "cluster" if package == "distributed" else usual)
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> Parser:
     parser = Parser(
         prog="contactfpga",
         description="Contact zones of a switch-matrix skin.",
         epilog="Without a board, try: contactfpga zones sim://",
     )
     parser.add_argument("--version", action="version", version=__version__)
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    for name, command in COMMANDS.items():
-        command.add_flags(commands.add_parser(name, help=command.HELP, description=command.HELP))
-    for leaf in leaves(parser):
-        leaf.add_argument("--trust", action="store_true", help="Import, and so run, modules that Skin files name.")
+    listed = parser.add_subparsers(dest="command", metavar="COMMAND")
+    for name, said in COMMANDS.items():
+        listed.add_parser(name, help=said, description=said, add=functools.partial(_add_command, name))
     return parser
 
 
-def leaves(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+def _add_command(name: str, parser: Parser) -> None:
+    """Give the parser of a command its topics, or its flags."""
+    module = import_module(f"{commands.__name__}.{name}")
+    if hasattr(module, "TOPICS"):
+        _add_topics(module, module.__name__, parser)
+    else:
+        _add_flags(module, parser, module.run)
+
+
+def _add_topics(group: Group, package: str, parser: Parser) -> None:
+    if group.USUAL is not None:
+        parser.usual_topic, instead = group.USUAL
+        parser.usage = f"%(prog)s {instead} ...\n       %(prog)s {{{','.join(group.TOPICS)}}} ..."
+    topics = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC", prog=parser.prog)
+    for name, said in group.TOPICS.items():
+        add = functools.partial(_add_topic, group, f"{package}.{name}")
+        topics.add_parser(name, help=said, description=said, add=add)
+
+
+def _add_topic(group: Group, module: str, parser: Parser) -> None:
+    topic: Command = import_module(module)
+    _add_flags(topic, parser, lambda args: group.run(lambda: topic.run(args)))
+
+
+def _add_flags(command: Command, parser: Parser, run: Callable[[argparse.Namespace], int]) -> None:
+    command.add_flags(parser)
+    parser.add_argument("--trust", action="store_true", help="Import, and so run, modules that Skin files name.")
+    parser.set_defaults(run=run, extra=command.EXTRA)
+
+
+def leaves(parser: Parser) -> Iterator[Parser]:
     """The parsers of commands without topics, and of topics."""
-    topics = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    for action in topics:
-        for topic in action.choices.values():
-            yield from leaves(topic)
-    if not topics:
+    for topic in parser.topics.values():
+        yield from leaves(topic)
+    if not parser.topics:
         yield parser
 
 

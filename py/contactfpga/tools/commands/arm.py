@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from contactfpga_sim.lab.arm.case import Case
     from contactfpga_sim.lab.arm.sweep import Point, Task
 
-HELP = "Run the robot arm into a human arm and see what force results."
 EXTRA = "sim"
 
 

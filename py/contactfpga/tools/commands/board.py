@@ -9,7 +9,6 @@ from contactfpga.design.cover import load_cover
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags
 
-HELP = "Run the virtual board on a pseudo-terminal."
 EXTRA = "sim"
 
 

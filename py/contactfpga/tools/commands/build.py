@@ -17,7 +17,6 @@ from contactfpga.skin.several import Several, sheets_of
 from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.wiring import Table
 
-HELP = "Build a bitstream for a board; print its wiring."
 EXTRA = "boards"
 
 BOARD = f"One of {', '.join(BOARDS)}, or module:attribute of your own BoardSpec."

@@ -14,7 +14,6 @@ from contactfpga.tools.console.interrupt import Interrupted
 if TYPE_CHECKING:
     from contactfpga_sim.lab.chart.compute import Point, Task
 
-HELP = "Chart what speed costs in accuracy."
 EXTRA = "chart"
 
 

@@ -14,7 +14,6 @@ from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.tools.console import flags, numbers, self_testing, terminal, watching
 
-HELP = "Find out what is wrong between this computer and the board."
 EXTRA = None
 
 COUNTED_S = 1.0

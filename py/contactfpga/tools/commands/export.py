@@ -6,7 +6,6 @@ import argparse
 
 from contactfpga.tools.console import outputs, terminal
 
-HELP = "Write a recording as a table: Parquet, NPZ or CSV."
 EXTRA = "analysis"
 
 

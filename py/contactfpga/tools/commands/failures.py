@@ -14,7 +14,6 @@ from contactfpga.tools.console.interrupt import Interrupted
 if TYPE_CHECKING:
     from contactfpga_sim.lab.failures.knob import Turned
 
-HELP = "Turn one knob after another until something breaks."
 EXTRA = "sim"
 
 

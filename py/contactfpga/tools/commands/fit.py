@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from contactfpga_sim.lab.fit.candidates import Candidate
     from contactfpga_sim.lab.fit.trial import SoFar, Task
 
-HELP = "Find the cheapest Skin that is good enough for given scenes."
 EXTRA = "chart"
 
 PERCENT = numbers.number(0, 100, "%", above=True)

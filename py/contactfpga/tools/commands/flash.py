@@ -12,7 +12,6 @@ from contactfpga.boards.spec import bitstream_path
 from contactfpga.errors import ContactFPGAError, MissingTool
 from contactfpga.tools.commands.build import BOARD, default_folder
 
-HELP = "Write a bitstream to a board."
 EXTRA = None
 
 

@@ -8,7 +8,6 @@ import functools
 from contactfpga.tools.console import flags, numbers, outputs
 from contactfpga.tools.console.interrupt import Interrupted
 
-HELP = "Flip bits of the running gateware one by one and see what the host notices."
 EXTRA = "chart"
 
 

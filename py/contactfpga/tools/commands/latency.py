@@ -10,7 +10,6 @@ import re
 from contactfpga.skin import Skin
 from contactfpga.tools.console import numbers, terminal
 
-HELP = "Measure the time from a touch to the last byte that reports it, on the simulated gateware."
 EXTRA = "sim"
 
 CELLS = re.compile(r"([1-9][0-9]?)x([1-9][0-9]?)")

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from contactfpga.tools.console import outputs, reading, terminal
 
-HELP = "Draw a recording: where, when and how large it was touched."
 EXTRA = "view"
 
 ENDINGS = (".png", ".svg")

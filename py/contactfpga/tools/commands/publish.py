@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from contactfpga.driver.transport import Transport
     from contactfpga.robot.net.publisher import Publisher
 
-HELP = "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one."
 EXTRA = "net"
 
 PORTS = (

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from contactfpga.robot.ros.feed import Felt
     from contactfpga.tools.recordings.session import Session
 
-HELP = "Record a board, or all boards of a robot, into an MCAP file."
 EXTRA = "record"
 
 SHOWN_S = 0.5

@@ -6,7 +6,6 @@ import argparse
 
 from contactfpga.tools.console import terminal
 
-HELP = "Repair a recording whose program was killed or whose disk was full."
 EXTRA = "record"
 
 

@@ -9,7 +9,6 @@ import time
 from contactfpga.skin import limits
 from contactfpga.tools.console import numbers, terminal
 
-HELP = "Send recorded frames through the compiled gateware."
 EXTRA = "sim"
 
 

@@ -8,7 +8,6 @@ from contactfpga.robot.haptics import WithReadings
 from contactfpga.tools.console import flags, interrupt, numbers, terminal
 from contactfpga.tools.console.forces import Forces
 
-HELP = "Publish contacts as ROS 2 topics, with no ROS installed."
 EXTRA = "ros"
 
 

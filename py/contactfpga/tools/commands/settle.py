@@ -16,7 +16,6 @@ from contactfpga.errors import UNSOLVED
 from contactfpga.skin import Skin, limits
 from contactfpga.tools.console import numbers, terminal
 
-HELP = "Compute the times that the circuit of a sheet needs."
 EXTRA = None
 
 WORDS = {

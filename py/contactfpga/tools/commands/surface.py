@@ -11,7 +11,6 @@ from contactfpga.skin import Skin
 from contactfpga.surfaces.laying import Laid, Triangles
 from contactfpga.tools.console import numbers, outputs, terminal
 
-HELP = "Lay a sheet on a mesh: a table of point and normal per cell."
 EXTRA = "surface"
 
 _LENGTH = numbers.number(-1e5, 1e5, "mm")

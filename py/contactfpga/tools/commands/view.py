@@ -9,7 +9,6 @@ import sys
 
 from contactfpga.tools.console import flags, interrupt, numbers, reading, terminal
 
-HELP = "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse."
 EXTRA = "view"
 
 WHAT = (

@@ -8,7 +8,6 @@ from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
 from contactfpga.tools.console import bouncing, flags, numbers, settling
 
-HELP = "Show the pressed cells live, to check wiring, bounce and settle times."
 EXTRA = None
 
 

@@ -19,7 +19,6 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     from contactfpga.tools.console.live import Frames  # which needs rich
 
-HELP = "Show the contact zones live."
 EXTRA = None
 
 

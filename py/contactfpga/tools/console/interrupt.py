@@ -63,6 +63,9 @@ def guarded(body: Callable[[], int | None]) -> int:
 
 def _cut_short(said: str = "") -> int:
     number = signal.SIGINT if _came is None else _came
+    # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by SIGINT,
+    # whatever the status, unless another text is run to its end.
+    exec("")
     if threading.current_thread() is threading.main_thread():
         signals.end_all_at_once()  # should it be told twice
     if said:

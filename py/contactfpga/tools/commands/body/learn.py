@@ -18,7 +18,7 @@ from contactfpga.tools.commands.body.register import link
 from contactfpga.tools.console import numbers, outputs, terminal
 from contactfpga.zones.zone import Zones
 
-HELP = "Learn which cells the folding cover presses over a joint's range, while nobody touches it."
+EXTRA = None
 MAX_LINE = 200
 
 

@@ -15,7 +15,7 @@ from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.registration import Press, Registration
 from contactfpga.tools.console import numbers, terminal
 
-HELP = "Find where a sheet sits on its link, by pressing a few known points."
+EXTRA = None
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from contactfpga.robot.body import Body, Contact, Snapshot
 from contactfpga.robot.body.snapshot import BASE, LINK
 from contactfpga.tools.console import numbers, terminal
 
-HELP = "Show every link's state and contacts (the usual topic: contactfpga body ROBOT.toml)."
+EXTRA = None
 
 READINGS_S = 0.03
 """After a frame: its readings of pressure units come when the next ones do."""

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Callable
 
 from contactfpga.design.cover.answer import CoverError
-from contactfpga.tools.commands.cover import design, figures, impact, sense
 
-HELP = "Compute the soft cover: impact, sensitivity and design."
-EXTRA = "sim"
-
-TOPICS = {"impact": impact, "sense": sense, "design": design, "figures": figures}
-
-
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topics, each with its flags."""
-    commands = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC")
-    for name, topic in TOPICS.items():
-        topic.add_flags(commands.add_parser(name, help=topic.HELP, description=topic.HELP))
+TOPICS = {
+    "impact": "Compute compression, time and peak force when an arm runs into something.",
+    "sense": "Compute the force that closes a switch under the cover, or how far a force reaches.",
+    "design": "Find material, thickness and pitch for an arm, a switch and limits.",
+    "figures": "Draw the paper's curves, the impact over time and the design map.",
+}
+USUAL = None
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+def run(topic: Callable[[], int]) -> int:
+    """Run a topic; raises :class:`CoverError` for numbers that are too large."""
     try:
-        status: int = TOPICS[args.topic].run(args)
-        return status
+        return topic()
     except OverflowError:
         raise CoverError("a number is too large to compute with; all are in SI units") from None

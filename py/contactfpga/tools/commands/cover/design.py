@@ -14,7 +14,7 @@ from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands.cover import units
 from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table
 
-HELP = "Find material, thickness and pitch for an arm, a switch and limits."
+EXTRA = "sim"
 
 HEADS = ("foam", "E kPa", "pressed mm", "for ms", "peak N", "thick mm", "kg/m2", "least N", "pitch mm", "binds")
 THIN_HEADS = (

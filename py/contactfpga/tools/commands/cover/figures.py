@@ -10,7 +10,7 @@ from contactfpga.design.cover.task import Task
 from contactfpga.tools.commands.cover.printing import MM, say
 from contactfpga.tools.console import flags, outputs
 
-HELP = "Draw the paper's curves, the impact over time and the design map."
+EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from contactfpga.design.cover.impact import METHODS, Impact
 from contactfpga.tools.commands.cover import units
 from contactfpga.tools.commands.cover.printing import KPA, MM, notes, say, table, unsolved
 
-HELP = "Compute compression, time and peak force when an arm runs into something."
+EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands.cover import units
 from contactfpga.tools.commands.cover.printing import MM, notes, say, table
 
-HELP = "Compute the force that closes a switch under the cover, or how far a force reaches."
+EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Callable
 
 from contactfpga.inputs import files
 from contactfpga.robot.haptics.values import HapticsError
-from contactfpga.tools.commands.haptics import contacts, place, threshold, wrench, zero
 from contactfpga.tools.console import interrupt
-
-HELP = "Compute forces at contacts from pressure units; set their zeros and thresholds."
-EXTRA = "haptics"
 
 BAD_INPUT = 2
 """Exit status: scripts tell a file that cannot be used from a failure."""
 
-TOPICS = {"contacts": contacts, "wrench": wrench, "place": place, "zero": zero, "threshold": threshold}
+TOPICS = {
+    "contacts": "Compute the force at each contact from a wrench.",
+    "wrench": "Compute the wrench on the link from the readings of its pressure units.",
+    "place": "Compare places for the pressure units of a link.",
+    "zero": "Read the zeros of a board's pressure units while nothing touches, and set them on the board.",
+    "threshold": "Set the deviations from zero at which a board's units and their weighted sums raise contact.",
+}
+USUAL = None
 
 
-def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the topics, each with its flags."""
-    commands = parser.add_subparsers(dest="topic", required=True, metavar="TOPIC")
-    for name, topic in TOPICS.items():
-        topic.add_flags(commands.add_parser(name, help=topic.HELP, description=topic.HELP))
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+def run(topic: Callable[[], int]) -> int:
+    """Run a topic; the status is :data:`BAD_INPUT` for a file or a number that cannot be used."""
     try:
-        status: int = TOPICS[args.topic].run(args)
-        return status
+        return topic()
     except (HapticsError, OSError) as error:
         if isinstance(error, BrokenPipeError):
             raise

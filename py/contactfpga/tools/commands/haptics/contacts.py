@@ -10,7 +10,7 @@ from contactfpga.robot.haptics import Center, Contacts, contacts
 from contactfpga.tools.commands.haptics import reading
 from contactfpga.tools.console import terminal
 
-HELP = "Compute the force at each contact from a wrench."
+EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from contactfpga.robot.haptics.values import HapticsError
 from contactfpga.robot.haptics.wrench import Surface
 from contactfpga.tools.console import numbers, outputs
 
-HELP = "Compare places for the pressure units of a link."
+EXTRA = "haptics"
 
 SHOWN = 3
 """Arrangements of each kind in the table."""

@@ -11,7 +11,7 @@ from contactfpga.robot.haptics import HapticsError, LoadCells
 from contactfpga.tools.console import flags, terminal
 from contactfpga.tools.console.forces import cells_of
 
-HELP = "Set the deviations from zero at which a board's units and their weighted sums raise contact."
+EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ import json
 from contactfpga.tools.commands.haptics import reading
 from contactfpga.tools.console import terminal
 
-HELP = "Compute the wrench on the link from the readings of its pressure units."
+EXTRA = "haptics"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,7 @@ from contactfpga.robot.haptics.values import Floats
 from contactfpga.tools.console import flags, numbers, outputs, terminal
 from contactfpga.tools.console.forces import cells_of
 
-HELP = "Read the zeros of a board's pressure units while nothing touches, and set them on the board."
+EXTRA = "haptics"
 
 LEAST = 10
 """Readings for a zero."""
