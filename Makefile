@@ -158,7 +158,7 @@ campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long t
 	$(PY) -m pytest -n $(JOBS) --dist loadfile -m campaign --timeout 7200 $(ARGS)
 
 soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
-	$(PY) -m contactfpga_sim.model.board.soak $(ARGS)
+	$(PY) -m contactfpga_sim.lab.speed.soak $(ARGS)
 
 # Its libraries are of no use to anything else, so they stay out of the user's cache.
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]

@@ -11,10 +11,10 @@ from contactfpga_sim.lab import size
 from contactfpga_sim.lab.size import DESIGNS, square
 from contactfpga_sim.lab.writer import table_of, update
 from contactfpga_sim.model.board import native
-from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden import all_departures
 from contactfpga_sim.model.scenes import shapes
 from contactfpga_sim.model.scenes.cells import to_words
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 __all__ = [
     "DESIGNS",

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import random
 
+import bench_several
 import numpy as np
 import pytest
 
@@ -17,7 +18,6 @@ from contactfpga_sim.model.board.several import CompiledSheets
 from contactfpga_sim.model.golden import Timeline
 from contactfpga_sim.model.golden.predict import predict_several
 from contactfpga_sim.model.golden.request import request
-from contactfpga_sim.verify.cosim import bench_several
 from contactfpga_sim.verify.cosim.compare import Mismatch, compare
 from contactfpga_sim.verify.cosim.covering import CHOICES, pairwise, skin_for
 

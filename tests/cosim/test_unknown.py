@@ -1,7 +1,9 @@
 """From a power-up at which nothing is known, every output is known after the reset, and the golden model's."""
 
+import bench_unknown
 import pytest
 from amaranth.hdl import Fragment
+from bench_unknown import Unknown, forget, initialized
 from reversal import never_let_go
 from sample import sample
 
@@ -11,8 +13,6 @@ from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_sim.model.golden import predict
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.sheet.matrix import Contention
-from contactfpga_sim.verify.cosim import bench_unknown
-from contactfpga_sim.verify.cosim.bench_unknown import Unknown, forget, initialized
 from contactfpga_sim.verify.cosim.compare import compare
 from contactfpga_sim.verify.cosim.covering import stimulus
 from contactfpga_sim.verify.proofs.inside import Inside
@@ -99,7 +99,7 @@ def test_lines_that_are_driven_against_each_other_are_told(monkeypatch):
 
 @with_icarus
 def test_a_word_that_is_read_while_it_is_written_is_seen(monkeypatch):
-    for stage in ("sum", "join"):  # all zones in one place of the table
+    for stage in ("run", "join"):  # all zones in one place of the table
         monkeypatch.setattr(f"contactfpga_hdl.label.{stage}.place_of", lambda derived, column: column & 0)
     cycles = 6 * facts(SMALL).scan_clocks
     with pytest.raises(Unknown, match=AT_A_PIN):

@@ -1,7 +1,7 @@
-"""What `python -m contactfpga_sim.model.board.driver_speed` feeds the driver is what a board sends."""
+"""What `python -m contactfpga_sim.lab.speed.driver` feeds the driver is what a board sends."""
 
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga_sim.model.board.driver_speed import FRAMES, SKIN, STEP_US, frame, greeting
+from contactfpga_sim.lab.speed.driver import FRAMES, SKIN, STEP_US, frame, greeting
 
 
 def test_its_frames_arrive_and_go_on_where_they_begin_again():

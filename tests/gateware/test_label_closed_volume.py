@@ -8,9 +8,9 @@ from sample import sample
 from unrolled import RULES, every_frame, recorded, skin_of
 
 from contactfpga.skin.derived import Derived
-from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 RECORDINGS = ("sdh13x6", "dtmf16x16", "feet45x52", "bed64x32", "popu64x27")
 

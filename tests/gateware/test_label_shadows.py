@@ -6,9 +6,9 @@ from sample import sample
 from shadows import moments, zones_by_image_tools
 
 from contactfpga.skin import Skin
-from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden.label import labelling
 from contactfpga_sim.model.scenes import shapes
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 LABELLERS = ("projection", "single")
 SIZES = ((4, 4), (1, 1), (1, 7), (7, 1), (9, 12), (16, 16), (3, 64))

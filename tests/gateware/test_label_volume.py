@@ -10,9 +10,9 @@ from sample import sample
 
 from contactfpga.choices.labellers import LABELLERS
 from contactfpga.skin import Skin
-from contactfpga_sim.model.board.labeller import LabelBench, Labelled
 from contactfpga_sim.model.golden import all_departures, row_clocks
 from contactfpga_sim.model.scenes import shapes
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench, Labelled
 
 EXACT = tuple(name for name, labeller in LABELLERS.items() if labeller.exact)
 BOTH = pytest.mark.parametrize("labeller", EXACT)

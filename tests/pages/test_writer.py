@@ -70,7 +70,7 @@ def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch
             "contactfpga: bad.toml: rows is 0; it must lie",
         ),
         ("verify.mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
-        ("model.board.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
+        ("lab.speed.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
     ],
 )
 def test_the_projects_own_commands_fail_in_one_sentence(tmp_path, module, arguments, message):

@@ -12,8 +12,8 @@ from contactfpga.skin import Skin
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.performance import labellers as label_figures
 from contactfpga_sim.lab.performance import scans
-from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden import volume
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/performance.md").read_text()

@@ -9,8 +9,8 @@ import time
 from contactfpga.skin.derived import EPOCH_BITS
 from contactfpga.skin.widths import HEARD_BITS
 from contactfpga.wire.hello import EPOCH_DIGITS, HEARD_DIGITS, SENT_DIGITS
-from contactfpga_sim.model.board.driver_speed import FRAMES, STEP_US, frame
-from contactfpga_sim.model.board.driver_speed import SKIN as SKIN
+from contactfpga_sim.lab.speed.driver import FRAMES, STEP_US, frame
+from contactfpga_sim.lab.speed.driver import SKIN as SKIN
 from contactfpga_sim.model.golden.facts import facts
 from contactfpga_sim.model.golden.hello import hello
 from contactfpga_sim.model.golden.request import heard

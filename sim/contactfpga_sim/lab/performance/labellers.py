@@ -12,12 +12,12 @@ from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import writer
-from contactfpga_sim.model.board.labeller import LabelBench
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
 from contactfpga_sim.model.scenes.scene import CONTACTS
 from contactfpga_sim.model.scenes.shapes import variants
+from contactfpga_sim.verify.cosim.bench_labeller import LabelBench
 
 EXACT = tuple(labeller for labeller in LABELLERS.values() if labeller.exact)
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import contactfpga
 from contactfpga.tools.console import interrupt
-from contactfpga_sim.model.board.driver_speed import FRAMES, STEP_US, stream
+from contactfpga_sim.lab.speed.driver import FRAMES, STEP_US, stream
 
 PACED = 3
 """Frames written at once: 12,000 per second, some more than the reference Skin's."""

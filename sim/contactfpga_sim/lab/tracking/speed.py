@@ -9,7 +9,7 @@ from typing import NamedTuple
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.zone import Zones
-from contactfpga_sim.model.board import driver_speed
+from contactfpga_sim.lab.speed.driver import frame, greeting
 
 FRAMES = 8192
 
@@ -30,14 +30,14 @@ class Speed(NamedTuple):
 
 def measure(contacts: int, frames: int = FRAMES) -> Speed:
     """With this many contacts that move; the best of some rounds."""
-    chunks = [driver_speed.frame(number, 1, contacts) for number in range(frames)]
+    chunks = [frame(number, 1, contacts) for number in range(frames)]
     rounds = [_round(chunks) for _ in range(4)]
     return Speed(*(max(found) for found in zip(*rounds)))
 
 
 def _round(chunks: list[bytes]) -> Speed:
     host = Conversation("bytes")
-    host.receive(driver_speed.greeting(), 0.0)
+    host.receive(greeting(), 0.0)
     arrived: list[Zones] = []
 
     def decode() -> None:

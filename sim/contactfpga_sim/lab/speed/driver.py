@@ -1,4 +1,4 @@
-"""How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.model.board.driver_speed`.
+"""How many frames the driver takes on this machine, and how soon: `python -m contactfpga_sim.lab.speed.driver`.
 
 A process of its own plays a board with a moving fingertip on a pseudo-terminal. Rates are per second of this
 process's processor time, all its threads together, so they do not depend on what else the machine does; the latencies

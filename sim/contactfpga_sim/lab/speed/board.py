@@ -1,4 +1,4 @@
-"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.model.board.speed`.
+"""How fast the virtual board runs on this machine, over some Skins: `python -m contactfpga_sim.lab.speed.board`.
 
 A core of its own is assumed: processor time is counted, of the best of some runs. No figure that a test could hold.
 """
