@@ -118,7 +118,7 @@ def test_a_closed_sheet_is_not_laid_on_a_cone(robot):
         Body.load(robot)
     assert str(error.value).endswith(
         "link 'chest': surface is a cone, around which the ends of a closed sheet do not meet; leave it out, or "
-        "make a table of the link's shape with `contactfpga surface`"
+        "make a table of the link's shape with `contactfpga body surface`"
     )
 
 

@@ -154,7 +154,9 @@ CASES = [
     ["zones", "sim://", "--record", "FOLDER"],
     ["publish", "sim://", "--key", ""],
     ["zones", "sim://", "--record", "/no/folder/x"],
-    *(["recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    *(["record", "--recover", name] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
+    ["record", "--recover", "RECORDED", "--seconds", "1"],
+    ["record", "--recover", "RECORDED", "--bytes-only"],
     *(["export", name, "x.csv"] for name in ("NONE", "FOLDER", "FIFO", "BINARY", "/dev/zero", "MCAP", "RECORDED")),
     *(["record", name, "sim://"] for name in ("x.bin", "/no/folder/x.mcap", "x")),
     *(["record", "x.mcap", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
@@ -184,10 +186,10 @@ CASES = [
     ["cover", "figures", "--data", "NONE"],
     ["cover", "figures", "--data", "FIFO"],
     ["cover", "figures", "--data", "BINARY"],
-    ["chart", "--method", "guess"],
-    ["chart", "--family", "guess"],
-    ["chart", "--jobs", "0"],
-    ["chart", "--jobs", "-1"],
+    ["study", "chart", "--method", "guess"],
+    ["study", "chart", "--family", "guess"],
+    ["study", "chart", "--jobs", "0"],
+    ["study", "chart", "--jobs", "-1"],
     *(["fit", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
     *(["fit", name] for name in ("elbow", "", "/dev/zero", *CELLS)),
     ["fit", "bumper", "--miscounted", "0"],
@@ -195,12 +197,12 @@ CASES = [
     ["fit", "bumper", "--placements", "1"],
     ["fit", "bumper", "--pitch-mm", "0"],
     ["fit", "bumper", "--jobs", "0"],
-    ["failures", "--study", "elbow"],
-    ["failures", "--page", "x.md", "--study", "ghost"],
-    *(["arm", "--case", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
-    ["arm", "--case", "elbow"],
-    ["arm", "--latency", "-1"],
-    ["arm", "--charts", "--jobs", "0"],
+    ["study", "failures", "--study", "elbow"],
+    ["study", "failures", "--page", "x.md", "--study", "ghost"],
+    *(["study", "arm", "--case", f"{name}.toml"] for name in TOML if name not in ("/dev/zero", "NONE")),
+    ["study", "arm", "--case", "elbow"],
+    ["study", "arm", "--latency", "-1"],
+    ["study", "arm", "--charts", "--jobs", "0"],
     [],
     ["elbow"],
     ["zones", "--elbow"],
@@ -266,8 +268,20 @@ NEEDED = {"build": ["icestick"], "replay": ["x.npy"], "fit": ["bumper"]}
 
 def test_every_numeric_option_is_found():
     assert {" ".join(words) for words, *_ in OPTIONS} >= {
-        *("zones", "wire", "doctor", "build", "replay", "cover impact", "cover sense", "chart", "fit", "arm", "settle"),
-        *("latency", "flips", "haptics place", "haptics zero", "haptics threshold", "surface", "body show"),
+        *(
+            "zones",
+            "wire",
+            "doctor",
+            "build",
+            "replay",
+            "cover impact",
+            "cover sense",
+            "study chart",
+            "fit",
+            "study arm",
+            "settle",
+        ),
+        *("latency", "study flips", "haptics place", "haptics zero", "haptics threshold", "body surface", "body show"),
         *("body register", "body learn", "view", "publish", "record", "ros"),
     }
     assert len(OPTIONS) > 100
@@ -327,7 +341,7 @@ texts = st.text(max_size=12).filter(lambda text: not {"\0"} & set(text))
 @example(which=(["doctor"], "--seconds", 1), bad="-1", more=[])
 def test_random_words_never_end_in_a_traceback(which, bad, more, run):
     words, option, _ = which
-    if words[0] not in NEEDED and words[0] not in ("cover", "settle", "chart"):
+    if words[0] not in NEEDED and words[0] not in ("cover", "settle") and words != ["study", "chart"]:
         more = ["NONE"]  # and no port of this machine
     run(*words, *NEEDED.get(words[0], []), f"{option}={bad}", *more)
 
@@ -341,7 +355,7 @@ BASES = {
     "patch": [["board", "--skin"], "rows = 8\n[cover]\nshare = 0.5\n[cover.switch]\narea_m2 = 1e-5\n"],
     "design": [["cover", "design"], (ROOT / "examples/paper-second-design.toml").read_text()],
     "scenes": [["fit"], (ROOT / "examples/scenes-hands.toml").read_text()],
-    "case": [["arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/lab/arm/cases/paper.toml").read_text()],
+    "case": [["study", "arm", "--json", "--case"], (ROOT / "sim/contactfpga_sim/lab/arm/cases/paper.toml").read_text()],
 }
 ODD = [
     *("nan", "inf", "-inf", "-1", "0", "1e300", "1e-300", "9223372036854775807", "true", "''", "'x'", "'\\u001b[31m'"),
@@ -417,13 +431,13 @@ def test_a_case_that_cannot_be_computed_is_refused(tmp_path, run, old, new):
     text = (ROOT / "sim/contactfpga_sim/lab/arm/cases/paper.toml").read_text()
     assert old in text
     (tmp_path / "case.toml").write_text(text.replace(old, new, 1))
-    assert "it must" in refused(*run("arm", "--json", "--case", str(tmp_path / "case.toml")))
+    assert "it must" in refused(*run("study", "arm", "--json", "--case", str(tmp_path / "case.toml")))
 
 
 def test_a_case_that_is_like_itself_is_refused(tmp_path, run):
     path = tmp_path / "case.toml"
     path.write_text(f"like = {str(path)!r}")
-    assert "it must name another case" in refused(*run("arm", "--case", str(path)))
+    assert "it must name another case" in refused(*run("study", "arm", "--case", str(path)))
 
 
 @pytest.mark.timeout(120)

@@ -57,7 +57,10 @@ def test_every_command_explains_itself(name, capsys):
         ("publish A --batch-ms 5 B --allow-commands C", {"ports": ["A", "B", "C"], "batch_ms": 5.0}),
         ("publish --batch-ms 5", {"ports": [], "batch_ms": 5.0}),
         ("body show r.toml --json", {"topic": "show", "robot": "r.toml", "json": True}),
-        ("surface m.stl --rpy 0 -1 0.5 t.npz --skin s.toml", {"mesh": "m.stl", "output": "t.npz", "rpy": [0, -1, 0.5]}),
+        (
+            "body surface m.stl --rpy 0 -1 0.5 t.npz --skin s.toml",
+            {"mesh": "m.stl", "output": "t.npz", "rpy": [0, -1, 0.5]},
+        ),
     ],
 )
 def test_options_may_stand_between_other_words(typed, found):
@@ -123,6 +126,16 @@ def test_a_command_is_a_module_and_a_line_of_the_table(tmp_path, monkeypatch, ru
     said = capsys.readouterr().out
     assert "Say hello." in said
     assert "--trust" in said
+
+
+@pytest.mark.parametrize(("old", "new"), cli.RENAMED.items())
+def test_an_old_name_works_and_names_the_new_one(old, new, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main([old, "--help"])
+    said = capsys.readouterr()
+    assert caught.value.code == 0
+    assert f"usage: contactfpga {new.removesuffix(' --recover')} " in said.out
+    assert said.err == f"contactfpga: contactfpga {old} is now contactfpga {new}\n"
 
 
 def test_without_a_command_help_is_shown(capsys):

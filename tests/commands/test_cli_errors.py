@@ -39,8 +39,8 @@ EXTRAS = [
     (["zones", "--once", "sim://"], "rich.console", "cli"),
     (["board"], "contactfpga_sim.model.board.virtual", "sim"),
     (["build", "icestick"], "amaranth.build", "boards"),
-    (["chart"], "scipy.optimize", "chart"),
-    (["chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+    (["study", "chart"], "scipy.optimize", "chart"),
+    (["study", "chart", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
     (["wire", "sim://"], "rich.console", "cli"),
     (["replay", "x.npy"], "contactfpga_sim.model.board.replay", "sim"),
     (["zones", "--json", "sim://"], "contactfpga_sim.model.board.virtual", "sim"),
@@ -48,8 +48,8 @@ EXTRAS = [
     (["fit", "bumper"], "rich.console", "chart"),
     (["fit", "bumper"], "scipy.optimize", "chart"),
     (["board"], "contactfpga_sim.model.board.pty_board", "sim"),
-    (["arm"], "matplotlib.figure", "sim"),
-    (["arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
+    (["study", "arm"], "matplotlib.figure", "sim"),
+    (["study", "arm", "--charts", "--dask", "tcp://127.0.0.1:1"], "distributed", "cluster"),
 ]
 
 

@@ -23,9 +23,12 @@ SLACK_S = 3.0
 
 SCENES = "examples/scenes-bumper.toml"
 POOLS = {
-    "chart": (["chart", "--placements", "125", "--method", "run, 10 mm", "--method", "run, 20 mm", "--no-size"], 2),
+    "chart": (
+        ["study", "chart", "--placements", "125", "--method", "run, 10 mm", "--method", "run, 20 mm", "--no-size"],
+        2,
+    ),
     "fit": (["fit", SCENES, "--placements", "80"], 2),
-    "arm": (["arm", "--charts"], 2),
+    "arm": (["study", "arm", "--charts"], 2),
 }
 """Commands that have processes work for them; and how many they have."""
 
@@ -82,7 +85,9 @@ def test_what_the_arm_has_done_is_kept(tmp_path):
     def ready(terminal):
         return any(int(done) >= 3 for done in re.findall(r"(\d+)/191", terminal.said))
 
-    status, took, said = interrupted(["arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache")
+    status, took, said = interrupted(
+        ["study", "arm", "--charts", "--output", tmp_path], ready, True, tmp_path / "cache"
+    )
     assert_well_ended(status, took, said)
     lines = (tmp_path / "arm-charts-so-far.csv").read_text().splitlines()
     assert len(lines) >= 4
@@ -95,7 +100,7 @@ def test_failures_keep_the_rows_that_are_finished(tmp_path):
     def ready(terminal):
         return any(int(done) >= 1 for done in re.findall(r"(\d+)/36", terminal.said))
 
-    status, took, said = interrupted(["failures", "--output", tmp_path], ready, True, tmp_path / "cache")
+    status, took, said = interrupted(["study", "failures", "--output", tmp_path], ready, True, tmp_path / "cache")
     assert_well_ended(status, took, said)
     assert "of the table, all that was finished, in" in " ".join(said.split())
     assert (tmp_path / "failures-so-far.md").read_text().startswith("| knob | method |")

@@ -27,11 +27,11 @@ def places(tmp_path):
 
 
 COMMANDS = {
-    "chart": ["chart", "--no-size"],
-    "arm": ["arm"],
-    "arm, charts": ["arm", "--charts"],
-    "failures": ["failures"],
-    "flips": ["flips"],
+    "chart": ["study", "chart", "--no-size"],
+    "arm": ["study", "arm"],
+    "arm, charts": ["study", "arm", "--charts"],
+    "failures": ["study", "failures"],
+    "flips": ["study", "flips"],
     "cover": ["cover", "figures"],
     "build": ["build", "icestick"],
 }
@@ -74,7 +74,7 @@ def test_a_table_stays_where_its_picture_fails(tmp_path, monkeypatch, capsys):
     point = sweep.Point(1.0, 1.0, 1.0, 1.0, 1.0)
     monkeypatch.setattr(latency_charts, "draw", refused)
     monkeypatch.setattr(sweep, "sweep", lambda tasks, *_: [point] * len(tasks))
-    assert cli.main(["arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1
+    assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert "No space left" in said.err
     assert str(tmp_path / "arm-charts.csv") in said.out
@@ -90,7 +90,7 @@ def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsy
     monkeypatch.setattr(run_pictures, "pictures", refused)
     monkeypatch.setattr(report, "columns", lambda *_: {})
     monkeypatch.setattr(report, "table", lambda *_: [["", "6 ms"], ["peak force, N", "18.91"]])
-    assert cli.main(["arm", "--output", str(tmp_path)]) == 1
+    assert cli.main(["study", "arm", "--output", str(tmp_path)]) == 1
     assert "18.91" in capsys.readouterr().out
 
 

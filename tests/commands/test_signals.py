@@ -19,7 +19,7 @@ CUT_SHORT = {
     "settle": ["settle"],
     "cover": ["cover", "design", "--help"],
     "latency": ["latency", "--touches", "40"],
-    "chart": ["chart", "--placements", "200", "--no-size", "--output", "OUT"],
+    "chart": ["study", "chart", "--placements", "200", "--no-size", "--output", "OUT"],
     "plot": ["plot", "nothing.mcap"],
     "doctor": ["doctor", "--list"],
 }

@@ -40,8 +40,8 @@ COMMANDS = {
     "wire": ["wire", "--once", "FILES/cells"],
     "doctor": ["doctor", "--seconds", "0.01", "sim://"],
     "replay": ["replay", "FILES/frames.npy"],
-    "arm": ["arm", "--output", "FILES/arm"],
-    "push": ["arm", "--case", "push"],
+    "arm": ["study", "arm", "--output", "FILES/arm"],
+    "push": ["study", "arm", "--case", "push"],
     "an error": ["zones", "sim://?scene=no_such_scene_of_this_name"],
     "help": ["--help"],
 }

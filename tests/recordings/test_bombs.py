@@ -133,7 +133,13 @@ def test_a_bomb_is_refused_by_all_that_read_it(tmp_path, name):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
-    [["recover", "X"], ["export", "X", "o.csv"], ["plot", "X"], ["zones", "--once", "replay://X"], ["view", "X"]],
+    [
+        ["record", "--recover", "X"],
+        ["export", "X", "o.csv"],
+        ["plot", "X"],
+        ["zones", "--once", "replay://X"],
+        ["view", "X"],
+    ],
 )
 def test_commands_end_in_one_line_with_little_memory(tmp_path, command):
     path = tmp_path / "bomb.mcap"

@@ -85,9 +85,9 @@ def test_after_kill_9_hardly_anything_is_lost(tmp_path, capsys, pieces):
         finally:
             process.kill()
             process.communicate()
-    with pytest.raises(contactfpga.ContactFPGAError, match=f"contactfpga recover {file}"):
+    with pytest.raises(contactfpga.ContactFPGAError, match=f"contactfpga record --recover {file}"):
         Recording(file)
-    assert cli.main(["recover", str(file)]) == 0
+    assert cli.main(["record", "--recover", str(file)]) == 0
     assert "touches_recovered.mcap" in capsys.readouterr().out
     kept = b"".join(data for _, data in Recording(tmp_path / "touches_recovered.mcap").raw_bytes())
     begun = kept.find(bytes(sender.sent[:100]))
@@ -170,7 +170,7 @@ def test_a_full_disk_is_said_and_what_is_there_is_whole(tmp_path):
             _, errors = process.communicate(timeout=LONG)
     assert process.returncode == 1
     assert f"{file}: there is no room for more (File too large); the 0.0 MB that are there are whole" in errors
-    assert f"contactfpga recover {file}" in errors
+    assert f"contactfpga record --recover {file}" in errors
     assert "Traceback" not in errors
     assert 1000 < file.stat().st_size <= limit
     found = recover(file)
@@ -250,7 +250,7 @@ def test_a_damaged_piece_is_left_out_and_counted(closed, tmp_path, capsys, numbe
     data = bytearray(path.read_bytes())
     data[ends[number] - 400] ^= 1
     path.write_bytes(data)
-    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     assert "Left out in between: 1 damaged piece;" in capsys.readouterr().out
     assert read(tmp_path / "new.mcap")[0] == messages[: 2 * number] + messages[2 * number + 2 :]
 
@@ -260,7 +260,7 @@ def test_a_file_that_ends_within_its_index_is_not_called_whole(closed, tmp_path,
     """All messages are there, and yet it cannot be read as it is."""
     path, messages, _ = closed
     path.write_bytes(path.read_bytes()[:-cut])
-    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     out = capsys.readouterr().out
     assert "Nothing is missing" not in out
     assert "Left out at the end: " in out
@@ -286,7 +286,7 @@ def topics(path):
 def test_two_recordings_in_one_file_are_both_recovered(closed, tmp_path, capsys):
     path, messages, _ = closed
     path.write_bytes(path.read_bytes() + recording(tmp_path / "b.mcap", "b", b"second"))
-    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert f"{path} holds 2 recordings, one after the other; the new file has them all." in out
     assert "Nothing is missing" not in out
@@ -320,7 +320,7 @@ def test_a_recording_behind_one_that_was_not_closed_is_recovered(closed, tmp_pat
 def test_bytes_behind_the_end_are_counted(closed, tmp_path, capsys):
     path, messages, _ = closed
     path.write_bytes(path.read_bytes() + b"x" * 1234)
-    assert cli.main(["recover", str(path), str(tmp_path / "new.mcap")]) == 0
+    assert cli.main(["record", "--recover", str(path), str(tmp_path / "new.mcap")]) == 0
     out = capsys.readouterr().out
     assert "Nothing is missing" not in out
     assert "Left out after the end: 1,234 bytes that are no recording." in out
@@ -347,7 +347,7 @@ def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
 
-    command = [sys.executable, "-m", "contactfpga", "recover", str(path)]
+    command = [sys.executable, "-m", "contactfpga", "record", "--recover", str(path)]
     done = subprocess.run(command, preexec_fn=limited, capture_output=True, text=True, env=UNKEPT)
     assert done.returncode == 1
     new = path.with_name("closed_recovered.mcap")
@@ -368,7 +368,7 @@ def test_no_room_for_the_new_file_leaves_nothing_of_it(closed):
 def test_what_is_no_recording(tmp_path, content, said, capsys):
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
-    assert cli.main(["recover", str(path)]) == 1
+    assert cli.main(["record", "--recover", str(path)]) == 1
     assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(contactfpga.ContactFPGAError):
@@ -376,11 +376,11 @@ def test_what_is_no_recording(tmp_path, content, said, capsys):
 
 
 def test_a_folder_is_no_recording(capsys):
-    assert cli.main(["recover", "."]) == 1
+    assert cli.main(["record", "--recover", "."]) == 1
     assert capsys.readouterr().err == "contactfpga: . cannot be opened: not a regular file\n"
 
 
 def test_no_file_is_written_over(closed, capsys):
     path, *_ = closed
-    assert cli.main(["recover", str(path), str(path)]) == 1
+    assert cli.main(["record", "--recover", str(path), str(path)]) == 1
     assert "is there already" in capsys.readouterr().err

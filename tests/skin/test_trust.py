@@ -156,7 +156,7 @@ def reading():
             yield [*command, *needed, "robot.toml"]
 
 
-HEAVY = {"arm", "fit", "ros", "build", "view"}  # each imports for a second and more
+HEAVY = {"study", "fit", "ros", "build", "view"}  # each imports for a second and more
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_the_texts_of_a_recording_import_nothing(mark, tmp_path, monkeypatch, ca
     with pytest.raises(BodyError, match="--trust"):
         packed.unpack(texts, tmp_path / "unpacked")
     assert cli.main(["export", "out.mcap", "out.npz"]) == 0
-    assert cli.main(["recover", "out.mcap"]) == 0
+    assert cli.main(["record", "--recover", "out.mcap"]) == 0
     assert cli.main(["zones", "--once", "replay://out.mcap"]) == 0
     capsys.readouterr()
     assert cli.main(["view", "out.mcap"]) == 1

@@ -67,7 +67,7 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
     few = latency_charts.plan(PAPER, latencies=(6e-3,), speeds=(0.1, 0.23))
     few = dataclasses.replace(few, sheet={"uart": few.force, "pin": few.force}, thick={})
     monkeypatch.setattr(latency_charts, "plan", lambda case: few)
-    assert cli.main(["arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
+    assert cli.main(["study", "arm", "--charts", "--jobs", "1", "--output", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     ends = [f"{name}.{end}" for name in ("arm-force", "arm-speed", "arm-thickness") for end in ("png", "svg")]
     assert all(str(tmp_path / name) in said.replace("\n", "") for name in [*ends, "arm-charts.csv"])
@@ -75,7 +75,7 @@ def test_the_charts_command_draws_with_processes(nothing_kept, tmp_path, monkeyp
 
 
 def test_charts_of_an_arm_at_rest_are_refused(capsys):
-    assert cli.main(["arm", "--case", "push", "--charts"]) == 1
+    assert cli.main(["study", "arm", "--case", "push", "--charts"]) == 1
     assert "behavior is 'comply' at 0 m/s" in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""`contactfpga arm`: its table, its pictures, its cases, and the push that it yields to."""
+"""`contactfpga study arm`: its table, its pictures, its cases, and the push that it yields to."""
 
 import dataclasses
 import functools
@@ -37,7 +37,7 @@ def ran_before(found, monkeypatch):
 @pytest.mark.slow
 def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_before, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    assert cli.main(["arm", "--output", str(tmp_path)]) == 0
+    assert cli.main(["study", "arm", "--output", str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     full = next(line for line in lines if line.startswith("speed stays positive"))  # has a cell in every column
     ends = [cell.end() for cell in re.finditer(r"\S+(?: \S+)*", full)]
@@ -78,7 +78,7 @@ def test_the_columns_are_what_they_are_called(found):
 
 def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_before):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["arm", "--json"]) == 0
+    assert cli.main(["study", "arm", "--json"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert known["runs"] == {name: dataclasses.asdict(result.outcome) for name, result in ran_before.items()}
     for field, printed in known["paper"].items():
@@ -91,7 +91,7 @@ def test_json_holds_every_run_in_si_units(capsys, tmp_path, monkeypatch, ran_bef
 def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsys, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('like = "paper"\n[link]\nspeed_m_s = 0.1\n')
-    assert cli.main(["arm", "--case", str(path), "--json", "--latency", "3"]) == 0
+    assert cli.main(["study", "arm", "--case", str(path), "--json", "--latency", "3"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert "paper" not in known
     assert list(known["runs"]) == ["3 ms", "UART", "pin", "limit alone"]
@@ -122,7 +122,7 @@ def test_another_case_has_neither_the_papers_numbers_nor_its_other_reading(capsy
 def test_a_case_that_cannot_be_is_refused_with_its_value(tmp_path, capsys, text, said):
     path = tmp_path / "mine.toml"
     path.write_text(text)
-    assert cli.main(["arm", "--case", str(path), "--json"]) == 1
+    assert cli.main(["study", "arm", "--case", str(path), "--json"]) == 1
     assert said in capsys.readouterr().err
 
 
@@ -168,12 +168,12 @@ def test_the_push_case_prints_how_fast_it_may_be(capsys, monkeypatch):
     monkeypatch.setattr(comply, "fastest_m_s", lambda case: 0.25)
     monkeypatch.setattr(comply, "SHARES", (1.0, 1.4))
     monkeypatch.setattr(comply, "pushed", functools.cache(comply.pushed))
-    assert cli.main(["arm", "--case", "push", "--json"]) == 0
+    assert cli.main(["study", "arm", "--case", "push", "--json"]) == 0
     known = json.loads(capsys.readouterr().out)
     assert [push["stopped"] for push in known["pushes"]] == [False, True]
     assert known["pushes"][0]["speed_m_s"] == known["fastest_m_s"] == 0.25
     assert known["pushes"][1]["back_s"] is None
-    assert cli.main(["arm", "--case", "push"]) == 0
+    assert cli.main(["study", "arm", "--case", "push"]) == 0
     said = capsys.readouterr().out
     assert "stays below 3 Nm up to a push of 0.250 m/s" in said
     assert "torque limit" in said

@@ -235,7 +235,9 @@ def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, caps
     first, second = tmp_path / "first", tmp_path / "second"
     names = ("run, 20 mm", "run, 10 mm")  # boards that other tests compile as well
     methods = [word for name in names for word in ("--method", name)]
-    assert cli.main(["chart", *methods, "--family", "fingers", "--placements", "12", *options, str(first)]) == 0
+    assert (
+        cli.main(["study", "chart", *methods, "--family", "fingers", "--placements", "12", *options, str(first)]) == 0
+    )
     assert "chart.png" in capsys.readouterr().out
     assert (first / "chart.png").stat().st_size > 10_000
     assert (first / "chart.svg").read_text().count("<svg") == 1
@@ -254,7 +256,7 @@ def test_the_command_draws_and_each_line_says_how_to_get_it_again(tmp_path, caps
     ],
 )
 def test_what_cannot_be_charted_is_refused(arguments, message, capsys):
-    assert cli.main(["chart", *arguments]) == 1
+    assert cli.main(["study", "chart", *arguments]) == 1
     assert message in capsys.readouterr().err
 
 
@@ -329,7 +331,7 @@ def test_a_labeller_that_nobody_has_drawn_gets_its_name_and_a_color_of_its_own()
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
 def test_the_pages_numbers_are_found_again(tmp_path):
-    assert cli.main(["chart", "--output", str(tmp_path)]) == 0
+    assert cli.main(["study", "chart", "--output", str(tmp_path)]) == 0
     for found, shown in zip(numbers.read(tmp_path / "chart.csv"), numbers.read(ROOT / tables.NUMBERS), strict=True):
         assert dataclasses.replace(found, host_us=shown.host_us) == shown
 

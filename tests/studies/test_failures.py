@@ -466,7 +466,7 @@ def test_the_highest_amount_is_drawn_where_its_axis_says(turned):
 
 
 def test_the_command_writes_a_study(tmp_path, capsys):
-    assert cli.main(["failures", "--study", "diodes", "--output", str(tmp_path)]) == 0
+    assert cli.main(["study", "failures", "--study", "diodes", "--output", str(tmp_path)]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["diodes.svg", "failures.md"]
     assert (tmp_path / "diodes.svg").read_text() == (PAGE.parent / "images" / "failures" / "diodes.svg").read_text()
     lines = (tmp_path / "failures.md").read_text().splitlines()[2:]
@@ -482,5 +482,5 @@ def test_the_command_writes_a_study(tmp_path, capsys):
     ],
 )
 def test_what_the_command_does_not_take(arguments, message, capsys):
-    assert cli.main(["failures", *arguments]) == 1
+    assert cli.main(["study", "failures", *arguments]) == 1
     assert message in capsys.readouterr().err

@@ -311,9 +311,9 @@ def test_a_block_after_one_that_is_missing_does_not_count():
 
 
 def test_bad_choices_are_refused_in_a_sentence(capsys):
-    assert cli.main(["flips", "--design", "triple"]) == 1
+    assert cli.main(["study", "flips", "--design", "triple"]) == 1
     assert "--design 'triple' is not known; take one of: run;" in capsys.readouterr().err
-    assert cli.main(["flips", "--page", "x.md", "--design", "run"]) == 1
+    assert cli.main(["study", "flips", "--page", "x.md", "--design", "run"]) == 1
     assert "--page takes all designs; leave --design out" in capsys.readouterr().err
 
 

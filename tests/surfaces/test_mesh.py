@@ -103,7 +103,20 @@ def test_command_writes_a_table_that_loads(tube, tmp_path, capsys):
     skin.write_text("rows = 6\ncolumns = 8\n")
     origin = [str(value) for value in POSE.point_m]
     status = cli.main(
-        ["surface", str(tube), str(table), "--skin", str(skin), "--origin", *origin, "--rpy", "0.3", "-0.4", "0.5"]
+        [
+            "body",
+            "surface",
+            str(tube),
+            str(table),
+            "--skin",
+            str(skin),
+            "--origin",
+            *origin,
+            "--rpy",
+            "0.3",
+            "-0.4",
+            "0.5",
+        ]
     )
     assert (status, capsys.readouterr().out) == (
         0,
@@ -147,7 +160,7 @@ def test_files_that_are_no_tables_or_meshes_are_refused_in_one_line(tmp_path, ca
     with pytest.raises(SurfaceError, match="the normal at row 0, column 0 has no direction"):
         Mesh.load(tmp_path / "odd.npz")
     np.savez(tmp_path / "object.npz", points_mm=np.array([{}], object))
-    with pytest.raises(SurfaceError, match=r"not a table of `contactfpga surface`"):
+    with pytest.raises(SurfaceError, match=r"not a table of `contactfpga body surface`"):
         Mesh.load(tmp_path / "object.npz")
 
 

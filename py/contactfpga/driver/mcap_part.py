@@ -135,7 +135,7 @@ class McapPart:
                 yield file
             except (Unreadable, struct.error, OSError):
                 raise RecordingError(
-                    f"{self.path} is damaged or was not closed; mend it with: contactfpga recover {self.path}"
+                    f"{self.path} is damaged or was not closed; mend it with: contactfpga record --recover {self.path}"
                 ) from None
 
 

@@ -67,7 +67,7 @@ class Mesh:
             if missing := [key for key in KEYS if key not in found]:
                 raise ArrayFileError(f"it has no {missing[0]}")
         except ArrayFileError as error:
-            raise SurfaceError(f"{path}: not a table of `contactfpga surface`: {error}") from None
+            raise SurfaceError(f"{path}: not a table of `contactfpga body surface`: {error}") from None
         try:
             if found["pitch_mm"].shape != (2,) or found["closed"].shape != ():
                 raise SurfaceError("pitch_mm must be two numbers, and closed one")

@@ -13,38 +13,43 @@ from contactfpga import __version__
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
 from contactfpga.tools import commands
-from contactfpga.tools.console import interrupt
+from contactfpga.tools.console import interrupt, terminal
 from contactfpga.tools.console.parser import Parser
 
 COMMANDS = {
     "zones": "Show the contact zones live.",
-    "body": "Show the contacts on all links of a robot in one coordinate frame.",
     "view": "Show the sheet in the browser, live or from a recording; press a virtual one with the mouse.",
+    "body": "Show the contacts on all links of a robot in one coordinate frame.",
     "wire": "Show the pressed cells live, to check wiring, bounce and settle times.",
     "board": "Run the virtual board on a pseudo-terminal.",
     "doctor": "Find out what is wrong between this computer and the board.",
-    "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
     "build": "Build a bitstream for a board; print its wiring.",
     "flash": "Write a bitstream to a board.",
-    "replay": "Send recorded frames through the compiled gateware.",
     "latency": "Measure the time from a touch to the last byte that reports it, on the simulated gateware.",
-    "record": "Record a board, or all boards of a robot, into an MCAP file.",
-    "recover": "Repair a recording whose program was killed or whose disk was full.",
-    "export": "Write a recording as a table: Parquet, NPZ or CSV.",
-    "ros": "Publish contacts as ROS 2 topics, with no ROS installed.",
+    "record": "Record a board, or all boards of a robot, into an MCAP file; repair one that was not closed.",
+    "replay": "Send recorded frames through the compiled gateware.",
     "plot": "Draw a recording: where, when and how large it was touched.",
+    "export": "Write a recording as a table: Parquet, NPZ or CSV.",
+    "publish": "Publish boards over the network (Eclipse Zenoh); zenoh://KEY reads one.",
+    "ros": "Publish contacts as ROS 2 topics, with no ROS installed.",
     "settle": "Compute the times that the circuit of a sheet needs.",
-    "surface": "Lay a sheet on a mesh: a table of point and normal per cell.",
     "cover": "Compute the soft cover: impact, sensitivity and design.",
     "haptics": "Compute forces at contacts from pressure units; set their zeros and thresholds.",
-    "chart": "Chart what speed costs in accuracy.",
     "fit": "Find the cheapest Skin that is good enough for given scenes.",
-    "failures": "Turn one knob after another until something breaks.",
-    "flips": "Flip bits of the running gateware one by one and see what the host notices.",
-    "arm": "Run the robot arm into a human arm and see what force results.",
+    "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",
 }
 """Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
 :class:`Command` or a :class:`Group`; it is imported when the command is called."""
+
+RENAMED = {
+    "chart": "study chart",
+    "failures": "study failures",
+    "flips": "study flips",
+    "arm": "study arm",
+    "surface": "body surface",
+    "recover": "record --recover",
+}
+"""Old names of commands, which work in this release; the next one refuses them."""
 
 
 class Command(Protocol):
@@ -83,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     parser = _parser()
-    args = parser.parse_args(arguments)
+    args = parser.parse_args(_renamed(sys.argv[1:] if arguments is None else arguments))
     if args.command is None:
         parser.print_help(sys.stderr)
         return 2
@@ -97,6 +102,15 @@ def _run(arguments: Sequence[str] | None) -> int:
         return interrupt.failed(MissingExtra(error.what, args.extra) if args.extra else error)
     except ValueError as error:
         return interrupt.failed(error)
+
+
+def _renamed(arguments: Sequence[str]) -> list[str]:
+    """The arguments with the name that a command has today; says so."""
+    old, *rest = arguments or [""]
+    if old not in RENAMED:
+        return list(arguments)
+    terminal.say(f"contactfpga: contactfpga {old} is now contactfpga {RENAMED[old]}", sys.stderr, hang=2)
+    return [*RENAMED[old].split(), *rest]
 
 
 def _missing(command: str, extra: str | None, error: ModuleNotFoundError) -> MissingExtra:

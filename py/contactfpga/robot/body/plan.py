@@ -160,7 +160,7 @@ def _surface(values: Any, skin: Skin, folder: Path) -> Plane | Cylinder | Cone |
         if skin.closed:
             raise BodyError(
                 "surface is a cone, around which the ends of a closed sheet do not meet; leave it out, or make "
-                "a table of the link's shape with `contactfpga surface`"
+                "a table of the link's shape with `contactfpga body surface`"
             )
         return surfaces.Cone(**values)
     if not isinstance(values, str):

@@ -1,4 +1,4 @@
-"""`contactfpga record`: everything a board says, into a file."""
+"""`contactfpga record`: everything a board says, into a file; and what is whole of a file that was not closed."""
 
 from __future__ import annotations
 
@@ -28,8 +28,11 @@ SHOWN_S = 0.5
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
-    parser.add_argument("file", metavar="FILE.mcap", help="File to write; it must not exist yet.")
-    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, or ROBOT.toml for all boards of a robot (docs/body.md).")
+    file = "File to write; it must not exist yet. With --recover: the file to repair; it is not changed."
+    parser.add_argument("file", metavar="FILE.mcap", help=file)
+    robot = "or ROBOT.toml for all boards of a robot (docs/body.md)."
+    into = "With --recover: the new file (default: FILE_recovered.mcap)."
+    flags.connection(parser, f"{flags.PORT.removesuffix('.')}, {robot} {into}")
     flags.seconds(parser)
     megabytes = "Split the recording into FILE_0001.mcap, FILE_0002.mcap and so on, each about this large."
     parser.add_argument("--split-mb", type=numbers.number(0.1, 1e6, "MB"), metavar="MB", help=megabytes)
@@ -38,10 +41,16 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     flags.forces(parser, "Add forces")
     bare = "Leave out the messages for other programs: about a fifth of the size; replay and export lose nothing."
     parser.add_argument("--bytes-only", action="store_true", help=bare)
+    recover = "Record nothing; repair a recording whose program was killed or whose disk was full."
+    parser.add_argument("--recover", action="store_true", help=recover)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    return _recover(args) if args.recover else _record(args)
+
+
+def _record(args: argparse.Namespace) -> int:
     from contactfpga.robot.body import packed
     from contactfpga.tools.recordings.recorder import Split
     from contactfpga.tools.recordings.session import Session
@@ -101,6 +110,33 @@ def _felt_on(plan: Plan) -> Callable[[Board], Felt]:
     from contactfpga.robot.body.snapshot import forces_of
 
     return lambda board: lambda zones, tracks: forces_of(plan, zones, tracks)
+
+
+def _recover(args: argparse.Namespace) -> int:
+    from contactfpga.tools.recordings.recover import recover
+
+    for name in ("skin", "baud", "seconds", "split_mb", "split_s", "units", "friction", "bytes_only"):
+        if getattr(args, name) not in (None, False):
+            raise ContactFPGAError(f"--{name.replace('_', '-')} is for a recording that is made; --recover repairs one")
+    found = recover(args.file, args.port)
+    terminal.say(f"{found.path}: {found.messages:,} messages of {found.seconds:.1f} s")
+    if found.recordings > 1:
+        terminal.say(
+            f"{args.file} holds {found.recordings} recordings, one after the other; the new file has them all."
+        )
+    elif found.closed and not found.damaged and not found.beyond:
+        terminal.say(f"Nothing is missing: {args.file} was closed and whole, so you can use it as it is.")
+    if found.cut:
+        terminal.say(f"Left out at the end: {found.cut:,} bytes of a piece that is not whole.")
+    if found.damaged:
+        terminal.say(f"Left out in between: {_pieces(found.damaged)}; frames are missing there.")
+    if found.beyond:
+        terminal.say(f"Left out after the end: {found.beyond:,} bytes that are no recording.")
+    return 0
+
+
+def _pieces(count: int) -> str:
+    return "1 damaged piece" if count == 1 else f"{count} damaged pieces"
 
 
 class _Progress:

@@ -69,6 +69,6 @@ class WholeFile:
         reason = f"there is no room for more ({error.strerror})" if full else error.strerror or told(error)
         return RecordingFailed(
             f"{self.path}: {reason}; the {self._whole / 1e6:.1f} MB that are there are whole. "
-            f"Make room, then close the file with: contactfpga recover {self.path}",
+            f"Make room, then close the file with: contactfpga record --recover {self.path}",
             reason,
         )

@@ -59,7 +59,7 @@ FAILURES = (
 
 
 def set_table(found: Mapping[str, Result]) -> str:
-    """What ``contactfpga arm`` prints."""
+    """What ``contactfpga study arm`` prints."""
     return writer.table_of(report.table(dict(found), True))
 
 

@@ -23,7 +23,7 @@ def command(point: Point) -> str:
     """What works out this point alone."""
     task = point.task
     return (
-        f'contactfpga chart --method "{task.method}" --family {task.family} --placements {task.count} '
+        f'contactfpga study chart --method "{task.method}" --family {task.family} --placements {task.count} '
         f"--seed {task.seed}"
     )
 

@@ -1,4 +1,4 @@
-"""`contactfpga chart`: the picture of speed against accuracy, and its numbers."""
+"""`contactfpga study chart`: the picture of speed against accuracy, and its numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXTRA = "chart"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
+    """Add the topic's flags to its parser."""
     parser.add_argument("--method", action="append", metavar="NAME", help="Chart only this method; can be repeated.")
     own = "Add this labeller, module:attribute of your own, to the methods; can be repeated."
     parser.add_argument("--labeller", action="append", metavar="NAME", help=own)
@@ -32,7 +32,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the topic."""
     from contactfpga_sim.lab import pool
     from contactfpga_sim.lab.chart import host, picture
     from contactfpga_sim.lab.chart import numbers as table

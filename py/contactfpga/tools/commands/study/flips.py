@@ -1,4 +1,4 @@
-"""`contactfpga flips`: flips bits of the running gateware, and says what the host notices."""
+"""`contactfpga study flips`: flips bits of the running gateware, and says what the host notices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ EXTRA = "chart"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
+    """Add the topic's flags to its parser."""
     parser.add_argument("--design", action="append", metavar="NAME", help="Flip only this design; can be repeated.")
     count = numbers.whole(1, 1_000_000)
     registers = "Flips of flip-flops per design (default: 400); always the same ones."
@@ -30,7 +30,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the topic."""
     from contactfpga_sim.lab import pool, writer
     from contactfpga_sim.lab.flips import campaign, picture, summary
     from contactfpga_sim.lab.flips import tables as flips_tables

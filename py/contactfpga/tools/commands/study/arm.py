@@ -1,4 +1,4 @@
-"""`contactfpga arm`: the experiment of the paper's Section IV, its table and its pictures."""
+"""`contactfpga study arm`: the experiment of the paper's Section IV, its table and its pictures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
+    """Add the topic's flags to its parser."""
     case = "Case to run: paper, paper-offset, push or a .toml file (default: paper)."
     parser.add_argument("--case", default="paper", metavar="NAME", help=case)
     late, usual = numbers.number(0, 10_000, "ms"), "Latency from the switch to the controller (default: the paper's 6)."
@@ -37,7 +37,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the topic."""
     from contactfpga_sim.lab.arm.case import Case
 
     case = Case.load(args.case)

@@ -1,4 +1,4 @@
-"""`contactfpga surface`: where the cells of a sheet lie on a link of any shape."""
+"""`contactfpga body surface`: where the cells of a sheet lie on a link of any shape."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LENGTH = numbers.number(-1e5, 1e5, "mm")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
+    """Add the topic's flags to its parser."""
     parser.add_argument("mesh", metavar="MESH", help="An .stl or .obj file (.ply and .off, too).")
     parser.add_argument("output", metavar="TABLE.npz", help="File to write; robot.toml names it as a link's surface.")
     parser.add_argument("--skin", metavar="FILE", help="The sheet (default: the reference Skin).")
@@ -35,7 +35,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the topic."""
     skin = Skin() if args.skin is None else Skin.load(args.skin)
     if skin.closed and args.by != "unrolling":
         raise ValueError("the ends of the Skin's sheet meet, so it goes round; use --by unrolling")

@@ -1,4 +1,4 @@
-"""`contactfpga failures`: turns every knob, writes the table and the pictures."""
+"""`contactfpga study failures`: turns every knob, writes the table and the pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXTRA = "sim"
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the command's flags to its parser."""
+    """Add the topic's flags to its parser."""
     parser.add_argument("--study", action="append", metavar="NAME", help="Run only this study; can be repeated.")
     page = "Rewrite the table in this page, and its pictures in images/failures beside it."
     parser.add_argument("--page", metavar="FILE", help=page)
@@ -26,7 +26,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command."""
+    """Run the topic."""
     from contactfpga_sim.lab import writer
     from contactfpga_sim.lab.failures import tables as failures_tables
     from contactfpga_sim.lab.failures.catalogue import STUDIES
