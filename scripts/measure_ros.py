@@ -1,9 +1,8 @@
-"""Measures what docs/ros.md says: `python scripts/measure_ros.py docs/ros.md`. Makes an environment with ROS 2 for each
-distribution where there is none (scripts/ros_environment.py)."""
+"""The tables of docs/ros.md. Makes an environment with ROS 2 for each distribution where there is none
+(scripts/ros_environment.py)."""
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -12,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ros_environment import DISTRIBUTIONS, ROOT, Environment
@@ -24,7 +22,6 @@ from contactfpga.robot.ros.dds import Publisher
 from contactfpga.robot.ros.hashes import type_hash
 from contactfpga.robot.ros.markers import markers, outline
 from contactfpga.robot.ros.settings import TOPICS
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 
 sys.path.append(str(ROOT / "tests" / "support"))
@@ -157,17 +154,3 @@ def spent_us(action: Callable[[], object]) -> float:
             action()
         found.append((time.thread_time() - begun) / (ROUNDS // 5) * 1e6)
     return min(found)
-
-
-def main() -> int:
-    """The command."""
-    parser = argparse.ArgumentParser(description="Measure the tables of docs/ros.md and write them there.")
-    parser.add_argument("page", type=Path)
-    page = writer.page(parser.parse_args().page)
-    writer.write(page, {"costs": costs_table, "shown": shown_table})
-    print(f"measured {page}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

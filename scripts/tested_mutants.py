@@ -35,6 +35,8 @@ LEFT_OUT = ("board/", "__init__.py")
 CHEAP_S = 12
 """Processor time that the tests may take that are run first."""
 LIMIT_S = 1800
+COUNT = 60
+"""Changes that are drawn."""
 
 EXPLAINED: dict[tuple[str, str], tuple[str, str]] = {
     ("units/watch.py", "compares & (self.sum != count - 1) -> (compares)"): (
@@ -333,30 +335,37 @@ def left(fates: Sequence[tuple[Change, str]]) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=60, help="changes (default %(default)s)")
+    parser.add_argument("--count", type=int, default=COUNT, help="changes (default %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="for their choice (default %(default)s)")
     parser.add_argument("--again", action="store_true", help="run the tests again for what is alive")
-    parser.add_argument("--page", type=Path, help="write the tables into this page")
     args = parser.parse_args()
+    found = fates(args.count, args.seed, args.again)
+    print(f"{table(found)}\n\n{left(found)}")
+    return 0
+
+
+def compute() -> list[tuple[Change, str]]:
+    """What the page shows."""
+    return fates(COUNT, 0)
+
+
+def fates(count: int, seed: int, again: bool = False) -> list[tuple[Change, str]]:
+    """Changes with what became of each; ``again``: those that were alive are tried again."""
     touched = KEPT / "touched"
     if not touched.is_dir():
         run_noting(touched)
     tests = Noted(touched)
     path = KEPT / "fates.json"
-    fates = json.loads(path.read_text()) if path.exists() else {}
-    changes = drawn(args.count, args.seed)
+    known = json.loads(path.read_text()) if path.exists() else {}
+    changes = drawn(count, seed)
     for number, change in enumerate(changes, 1):
-        if change.name in fates and not (args.again and fates[change.name]["fate"] == "alive"):
+        if change.name in known and not (again and known[change.name]["fate"] == "alive"):
             continue
         started = time.monotonic()
-        fates[change.name] = fate_of(change, tests)
-        path.write_text(json.dumps(fates, indent=1) + "\n")
-        print(f"{number}: {time.monotonic() - started:.0f} s {change.name} {fates[change.name]}", flush=True)
-    found = [(change, fates[change.name]["fate"]) for change in changes]
-    print(f"{table(found)}\n\n{left(found)}")
-    if args.page:
-        writer.write(args.page, {"tested": lambda: table(found), "left": lambda: left(found)})
-    return 0
+        known[change.name] = fate_of(change, tests)
+        path.write_text(json.dumps(known, indent=1) + "\n")
+        print(f"{number}: {time.monotonic() - started:.0f} s {change.name} {known[change.name]}", flush=True)
+    return [(change, known[change.name]["fate"]) for change in changes]
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from contactfpga_hdl.board.synthesis import FAMILIES, NO_COLLISIONS
 from contactfpga_hdl.board.tools import BitstreamFailed
 from contactfpga_sim.lab import size
 from contactfpga_sim.lab.size import DESIGNS, square
-from contactfpga_sim.lab.writer import table_of, update
+from contactfpga_sim.lab.writer import table_of
 from contactfpga_sim.model.board import native
 from contactfpga_sim.model.golden import all_departures
 from contactfpga_sim.model.scenes import shapes
@@ -39,5 +39,4 @@ __all__ = [
     "square",
     "table_of",
     "to_words",
-    "update",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from rivals.exactness import Checked
 from rivals.house import DEVICES, Size, table_of
@@ -94,12 +94,3 @@ def summary_table(measured: Measured) -> str:
         cells = (_cell(row.sizes.get((device.title, OURS))) for device in DEVICES)
         rows.append((*_of(row), f"{row.checked.after_last_row} clocks", *cells))
     return table_of(rows)
-
-
-TABLES: dict[str, Callable[[Measured], str]] = {
-    "rivals_made_of": provenance,
-    "rivals_exact": exactness_table,
-    "rivals": sizes_table,
-    "labellers": summary_table,
-}
-"""By the name of their place in a page."""

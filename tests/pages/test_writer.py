@@ -15,6 +15,13 @@ def test_only_sections_that_are_known_are_written():
     assert writer.update(PAGE, {"one": lambda: "new"}) == PAGE.replace("old", "new")
 
 
+def test_a_section_states_what_it_was_made_by():
+    made = writer.update(PAGE, {"one": lambda: "new"}, "12ab")
+    assert made == PAGE.replace("old", "new").replace("figures: one", "figures: one of 12ab")
+    assert writer.update(made, {"one": lambda: "old"}) == made.replace("new", "old")
+    assert writer.sections(made) == {"one": ("new", "12ab"), "two": ("kept", "")}
+
+
 def test_what_a_page_does_not_show_is_not_measured(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(PAGE)
@@ -42,23 +49,11 @@ def test_a_page_is_looked_for_before_anything_is_measured_for_it(tmp_path):
     assert writer.page(tmp_path / "page.md").read_text() == PAGE
 
 
-def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch):
-    page, folder = tmp_path / "page.md", tmp_path / "images"
-    page.write_text(PAGE)
-    monkeypatch.setattr(sys, "argv", ["page", str(page), str(folder)])
-    assert writer.page_and_folder("Write it.") == (page, folder)
-    assert folder.is_dir()
-    monkeypatch.setattr(sys, "argv", ["page", str(page), str(page)])
-    with pytest.raises(OutputError, match=r"^folder is '.*page.md'; that is no folder$"):
-        writer.page_and_folder("Write it.")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "arguments", "message"),
     [
-        ("lab.performance.scans", ["none.md"], "contactfpga: page is 'none.md'; there is no such page"),
-        ("lab.cover.tables", ["none.md", "."], "contactfpga: page is 'none.md'; there is no such page"),
+        ("lab", ["units"], "contactfpga: there is no folder 'docs' here; run this in the folder of the sources"),
         (
             "verify.netlist.replay",
             ["icebreaker", "--skin", "none.toml"],
@@ -69,7 +64,7 @@ def test_a_page_and_a_folder_are_looked_at_before_the_work(tmp_path, monkeypatch
             ["icebreaker", "--skin", "bad.toml"],
             "contactfpga: bad.toml: rows is 0; it must lie",
         ),
-        ("verify.mutants.campaign", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
+        ("lab.mutants", ["--each", "-3"], "'-3' is not a whole number from 1 to 1000000 mutants"),
         ("lab.speed.soak", ["--seconds", "nan"], "'nan' is not a number above 0 and at most 86400 s"),
     ],
 )

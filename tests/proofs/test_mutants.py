@@ -7,6 +7,7 @@ import pytest
 
 from contactfpga.skin import Skin
 from contactfpga.skin.units import SUM_THRESHOLD, THRESHOLD
+from contactfpga_sim.lab.mutants import tables
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.golden import Timeline, units
 from contactfpga_sim.model.golden.facts import facts
@@ -70,24 +71,6 @@ def test_every_stage_of_the_design_has_mutants(sample):
 def test_a_mutant_counts_for_the_stage_of_its_source_else_of_its_module(line, stage):
     mutant = netlist.parsed(f"mutate -mode inv -module top {line}")
     assert (mutant and mutant.stage) == stage
-
-
-@pytest.mark.parametrize(
-    ("flags", "written"),
-    [
-        (["--skin", "8x8"], []),
-        (["--group", "options"], ["options"]),
-        ([], ["mutants", "options", "several"]),
-    ],
-)
-def test_a_table_is_written_only_when_all_of_its_skins_were_run(tmp_path, monkeypatch, flags, written):
-    page = tmp_path / "page.md"
-    page.write_text("".join(f"<!-- figures: {name} -->\nold\n<!-- end -->\n" for name in campaign.GROUPS))
-    monkeypatch.setattr(campaign, "_run", lambda names, *_: [[] for _ in names])
-    monkeypatch.setattr("sys.argv", ["campaign", *flags, "--page", str(page)])
-    assert campaign.main() == 0
-    parts = page.read_text().split("<!-- figures: ")[1:]
-    assert [part.split(" ")[0] for part in parts if "old" not in part] == written
 
 
 def test_no_noise_comes_where_pulses_are_bits():
@@ -221,8 +204,8 @@ def test_a_table_counts_the_fates_by_stage():
     ]
     fates = ["killed", "equivalent", "killed", "alive"]
     results = [campaign.Result("8x8", mutant, fate) for mutant, fate in zip(mutants, fates)]
-    lines = campaign.table(results).splitlines()
+    lines = tables.table(results).splitlines()
     assert "| scan | 2 | 1 | 1 | 0 | 100.0 % |" in lines
     assert "| link | 2 | 1 | 0 | 1 | 50.0 % |" in lines
     assert lines[-1] == "| all | 4 | 2 | 1 | 1 | 66.7 % |"
-    assert campaign.listed(results) == "link x.py:1: -mode inv 3  (8x8)"
+    assert tables.listed(results) == "link x.py:1: -mode inv 3  (8x8)"

@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import math
-import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -11,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
-from contactfpga_sim.lab import kept
-from contactfpga_sim.lab.arm import latency_charts, sweep, tables
+from contactfpga_sim.lab import kept, registry
+from contactfpga_sim.lab.arm import latency_charts, sweep
 from contactfpga_sim.lab.arm.case import Case
 from contactfpga_sim.lab.arm.run import run
 from contactfpga_sim.lab.arm.sweep import Task
@@ -116,15 +116,12 @@ def test_charts_of_a_few_points(nothing_kept, tmp_path):
 
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
-def test_the_page_and_its_pictures_are_what_the_command_writes(tmp_path, monkeypatch):
-    page = tmp_path / "arm.md"
-    page.write_text(
-        re.sub(r"(<!-- figures: \w+ -->).*?(<!-- end -->)", r"\1\n\2", PAGE, flags=re.DOTALL), encoding="utf-8"
-    )
-    monkeypatch.setattr(sys, "argv", ["study", str(page), str(tmp_path)])
-    assert tables.main() == 0
-    assert page.read_text(encoding="utf-8") == PAGE
-    drawn = sorted(tmp_path.glob("*.svg"))
+def test_the_page_and_its_pictures_are_what_the_study_makes(tmp_path):
+    run = registry.Run(registry.load("arm"))
+    assert {name: run.text(name) for name in run.study.sections} == {
+        name: section("arm.md", name) for name in run.study.sections
+    }
+    drawn = run.call(run.study.pictures, tmp_path)
     assert len(drawn) == 5
     for picture in drawn:
         assert picture.read_text() == (Path(__file__).parents[2] / "docs/images" / picture.name).read_text(), (

@@ -1,9 +1,9 @@
 """The arm's second line of defense: a force threshold of pressure units, compared by the board itself."""
 
-import re
 from pathlib import Path
 
 import pytest
+from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
@@ -39,7 +39,7 @@ def test_a_force_threshold_reacts_where_no_switch_closes():
 
 @pytest.mark.campaign
 def test_the_page_has_what_a_run_gives():
-    table = re.search(r"<!-- figures: defense -->\n(.*?)\n<!-- end -->", PAGE, re.DOTALL)[1]
+    table = section("arm.md", "defense")
     lines = report.defense_lines(Case.load("paper"))
     assert table.splitlines()[2:] == [f"| {' | '.join(line)} |" for line in lines[1:]]
 

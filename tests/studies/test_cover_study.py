@@ -7,33 +7,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import outdated, section
 
 from contactfpga.design.cover import Ball, formula_study, paper, study_drawing
 from contactfpga.design.cover.foams import FOAMS
 from contactfpga.design.cover.sense import LADDER
+from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.cover import tables
 
+RUN = registry.Run(registry.load("cover"))
+
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "cover.md").read_text(encoding="utf-8")
-
-
-def section(name):
-    return re.search(rf"<!-- figures: {name} -->\n(.*?)\n<!-- end -->", PAGE, flags=re.DOTALL)[1]
 
 
 def cells(table):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 
-def test_the_page_has_every_table():
-    assert re.findall(r"<!-- figures: (\w+) -->", PAGE) == [
-        "rules", "failing", "sense", "thinning", "foams", "paper",
-    ]  # fmt: skip
-    assert set(tables.TABLES) == {"rules", "failing", "sense", "thinning", "foams", "paper"}
-
-
 @pytest.mark.parametrize("name", ["paper", "foams", "thinning"])
 def test_tables_without_times_are_up_to_date(name):
-    assert section(name) == tables.TABLES[name]()
+    assert not outdated("cover", name)
 
 
 @pytest.mark.parametrize("name", ["rules", "failing", "sense"])
@@ -42,8 +35,8 @@ def test_errors_in_the_other_tables_are_up_to_date(name):
         # the last column is a time; of an error near rounding only its order is the same everywhere
         return [[re.sub(r"\d(?=e-1)", "", cell) for cell in row[:-1]] for row in cells(table)]
 
-    assert comparable(section(name)) == comparable(tables.TABLES[name]())
-    assert all(row[-1].endswith(" µs") for row in cells(section(name))[2:])
+    assert comparable(section("cover.md", name)) == comparable(RUN.text(name))
+    assert all(row[-1].endswith(" µs") for row in cells(section("cover.md", name))[2:])
 
 
 def test_rules_that_are_offered_hold():
@@ -98,7 +91,7 @@ def test_every_line_of_the_papers_table_has_a_verdict():
 
 
 def test_every_foam_is_in_the_page():
-    assert [row[0] for row in cells(section("foams"))[2:]] == [foam.name for foam in FOAMS]
+    assert [row[0] for row in cells(section("cover.md", "foams"))[2:]] == [foam.name for foam in FOAMS]
 
 
 def test_a_time_is_measured():
@@ -106,15 +99,10 @@ def test_a_time_is_measured():
 
 
 @pytest.mark.slow
-def test_study_as_a_command(tmp_path, monkeypatch, capsys):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- figures: foams -->\n<!-- end -->\n", encoding="utf-8")
-    monkeypatch.setattr("sys.argv", ["study", str(page), str(tmp_path)])
-    assert tables.main() == 0
-    assert "Plastazote" in page.read_text(encoding="utf-8")
-    drawn = sorted(file.name for file in tmp_path.glob("*.svg"))
+def test_the_pictures(tmp_path):
+    drawn = sorted(file.name for file in tables.draw(tmp_path))
     assert drawn == ["cover-force.svg", "cover-impact.svg", "cover-map.svg", "cover-study.svg"]
-    assert capsys.readouterr().out.count("drew ") == 4
+    assert drawn == sorted(file.name for file in tmp_path.glob("*.svg"))
 
 
 def cross(one, other):

@@ -12,11 +12,12 @@ import pytest
 from sample import sample
 from scipy import ndimage
 from shadows import zones_by_image_tools
+from study_pages import section
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.failures import axes, electric, knob_pictures, line, shapes, tables, touch
 from contactfpga_sim.lab.failures.catalogue import STUDIES
 from contactfpga_sim.lab.failures.knob import Outcome, Study, Turned
@@ -186,14 +187,9 @@ def test_nothing_wrong_leaves_unnoticed_but_what_is_listed(turn, name, method):
 
 
 def test_what_passes_unnoticed_has_its_reason_on_the_page():
-    text = PAGE.read_text()
-
-    def figures(name):
-        return text.partition(f"<!-- figures: {name} -->")[2].partition("<!-- end -->")[0]
-
-    reasons = figures("unnoticed")
+    reasons = section("failures.md", "unnoticed")
     name, silent = "", set()
-    for row in figures("failures").splitlines():
+    for row in section("failures.md", "failures").splitlines():
         name = found[1] if (found := re.search(r"\]\(#(\w+)\)", row)) else name
         silent |= {name} if "**not noticed**" in row else set()
     assert set(re.findall(r"\]\(#(\w+)\)", reasons)) == silent
@@ -204,8 +200,9 @@ def test_what_passes_unnoticed_has_its_reason_on_the_page():
 
 @pytest.mark.campaign
 def test_the_page_and_its_pictures_are_up_to_date(turned):
-    text = PAGE.read_text()
-    assert writer.update(text, tables.tables(turned)) == text
+    assert {name: table() for name, table in tables.tables(turned).items()} == {
+        name: section("failures.md", name) for name in registry.load("failures").sections
+    }
     for name, methods in turned.items():
         drawn = (PAGE.parent / "images" / "failures" / f"{name}.svg").read_text(encoding="utf-8")
         assert knob_pictures.svg(STUDIES[name], methods) == drawn

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from amaranth.back import rtlil
 from fits import APART, BUMPER, HANDS, SECOND, chosen
+from study_pages import outdated, section
 
 from contactfpga.skin import Skin
 from contactfpga.tools import cli
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.top import Top
-from contactfpga_sim.lab import size, writer
+from contactfpga_sim.lab import registry, size
 from contactfpga_sim.lab.fit import cost, search, tables
 from contactfpga_sim.lab.fit.goals import Goals
 from contactfpga_sim.lab.fit.sources import source
@@ -118,15 +119,13 @@ def test_a_recording_of_few_frames_is_refused(tmp_path, capsys):
     assert "few.npy has 3 frames; two to choose with and two to report are the least" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", tables.EXAMPLES)
+@pytest.mark.parametrize("name", registry.load("fit").sections)
 def test_the_page_shows_what_the_examples_say(name):
-    command = f"contactfpga fit {tables.EXAMPLES[name]}"
-    assert command in (ROOT / tables.EXAMPLES[name].split()[0]).read_text()
-    section = (
-        (ROOT / "docs" / "fit.md").read_text().partition(f"<!-- figures: {name} -->")[2].partition("<!-- end -->")[0]
-    )
-    assert f"\n    {command}\n" in section
-    assert section.count("| the answer |") == section.count("| runner-up |") == 1
+    text = section("fit.md", name)
+    command = text.partition("\n")[0].strip()
+    assert command.startswith("contactfpga fit examples/")
+    assert command in (ROOT / command.split()[2]).read_text()
+    assert text.count("| the answer |") == text.count("| runner-up |") == 1
 
 
 @pytest.mark.slow
@@ -147,11 +146,10 @@ def test_a_section_of_the_page_has_the_command_and_all_it_says(file, shortcuts):
 
 @pytest.mark.campaign
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("name", tables.EXAMPLES)
+@pytest.mark.parametrize("name", registry.load("fit").sections)
 def test_the_page_is_up_to_date(name, monkeypatch):
     monkeypatch.undo()  # what was synthesized before is kept
-    text = (ROOT / "docs" / "fit.md").read_text()
-    assert writer.update(text, {name: tables.TABLES[name]}) == text
+    assert not outdated("fit", name)
 
 
 @pytest.mark.campaign

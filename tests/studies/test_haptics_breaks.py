@@ -1,10 +1,10 @@
 """Where force joined to location fails: the breaks that the page states, found again; and end to end."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import section
 
 from contactfpga.robot.haptics import Plane
 from contactfpga_sim.lab.failures import tables
@@ -25,7 +25,7 @@ QUICK = [
 
 def on_page(name):
     """The lines of a study in the page's table."""
-    table = re.search(r"<!-- figures: breaks -->\n(.*?)\n<!-- end -->", PAGE, re.DOTALL)[1].splitlines()[2:]
+    table = section("haptics.md", "breaks").splitlines()[2:]
     starts = [at for at, line in enumerate(table) if line.startswith("| [")] + [len(table)]
     first = next(at for at in starts if f"(#{name})" in table[at])
     return table[first : starts[starts.index(first) + 1]]

@@ -6,21 +6,20 @@ from pathlib import Path
 
 import pytest
 from sample import sample
+from study_pages import outdated
 
 from contactfpga.design.circuit import load_checked, needed
 from contactfpga.skin import Skin
-from contactfpga_sim.lab import writer
+from contactfpga_sim.lab import registry
 from contactfpga_sim.lab.maker import schematic, tables
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "maker.md"
 
 
-@pytest.mark.parametrize("name", sample(tables.TABLES, quick=["diodes"]))
+@pytest.mark.parametrize("name", sample(registry.load("maker").sections, quick=["diodes"]))
 def test_tables_are_up_to_date(name):
-    text = PAGE.read_text(encoding="utf-8")
-    assert f"<!-- figures: {name} -->" in text
-    assert writer.update(text, {name: tables.TABLES[name]}) == text
+    assert not outdated("maker", name)
 
 
 def test_the_schematic_is_the_one_that_is_drawn(tmp_path):

@@ -1,6 +1,5 @@
 """The picture of the scenes page."""
 
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -10,11 +9,8 @@ PICTURE = Path(__file__).resolve().parents[2] / "docs" / "images" / "scenes.svg"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def test_the_pages_picture_is_what_the_command_draws(tmp_path, monkeypatch):
-    again = tmp_path / "scenes.svg"
-    monkeypatch.setattr(sys, "argv", ["scene_drawing", str(again)])
-    assert pictures.main() == 0
-    assert again.read_text() == PICTURE.read_text()
+def test_the_pages_picture_is_what_the_study_draws(tmp_path):
+    assert pictures.draw(tmp_path).read_text() == PICTURE.read_text()
 
 
 def test_a_panel_shows_every_closed_switch_part_and_contact():

@@ -5,26 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from study_pages import outdated, section
 
 from contactfpga.design.circuit import Circuit
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.settle import breaks, shorted, tables
+from contactfpga_sim.lab.settle import breaks, shorted
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "settle.md"
 
 
-def section(name):
-    text = PAGE.read_text(encoding="utf-8")
-    return re.search(rf"<!-- figures: {name} -->\n(.*?)\n<!-- end -->", text, re.DOTALL)[1]
-
-
 def test_the_page_has_what_a_new_run_says():
-    text = PAGE.read_text(encoding="utf-8")
-    assert writer.update(text, {"shorted": tables.shorted_table}) == text
+    assert not outdated("settle", "shorted")
 
 
 def test_the_comparison_on_the_page_is_wide_and_close():
-    rows = section("agreement").splitlines()[2:]
+    rows = section("settle.md", "agreement").splitlines()[2:]
     errors = [abs(float(re.search(r"([-+][\d.]+) % \|$", row)[1])) for row in rows]
     assert len(errors) >= 30
     assert max(errors) < 5
@@ -36,7 +30,7 @@ def test_each_break_is_found_again_on_both_of_its_sides(name):
     """The values before and after the break of each run's first one, as the page has them."""
     knob = breaks.KNOBS[name]
     run = next(iter(knob.runs))
-    row = next(line for line in section("breaks").splitlines() if f"| {knob.title}: " in line).split(" | ")
+    row = next(line for line in section("settle.md", "breaks").splitlines() if f"| {knob.title}: " in line).split(" | ")
     holds, fails = (float(row[index].strip("*").replace(",", "")) for index in (2, 3))
     assert row[1] == run
     assert knob.values.index(fails) == knob.values.index(holds) + 1

@@ -18,13 +18,16 @@ from contactfpga.tools.console.interrupt import silence_amaranth
 GRACE_S = 0.5
 """What a worker that is told to end has to tidy up, until it is ended."""
 
+usual_jobs: int | None = None
+"""Processes where a study does not say how many; None: one per core."""
+
 LINE_S = 5.0
 """Between two lines of progress where none can be written over."""
 
 
 @contextlib.contextmanager
 def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Executor]:
-    """This many processes on this machine, one per core for None; or the cluster with this scheduler.
+    """This many processes on this machine, :data:`usual_jobs` for None; or the cluster with this scheduler.
 
     When the block ends by an error or by Ctrl-C, what is left to do is dropped, and no process stays.
     """
@@ -32,7 +35,7 @@ def executor(jobs: int | None = None, dask: str | None = None) -> Iterator[Execu
         with _cluster(dask) as workers:
             yield workers
         return
-    with ProcessPoolExecutor(jobs, initializer=_alone) as workers:
+    with ProcessPoolExecutor(jobs or usual_jobs, initializer=_alone) as workers:
         try:
             yield workers
         except BaseException:

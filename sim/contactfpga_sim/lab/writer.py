@@ -1,11 +1,14 @@
-"""Writes tables into pages: each stands between markers, ``<!-- figures: NAME -->`` and ``<!-- end -->``."""
+"""Markdown tables, and sections of pages: text between ``<!-- figures: NAME of FINGERPRINT -->`` and ``<!-- end -->``.
+
+The fingerprint stands for the code that the text was made by; a section that was never made has none.
+"""
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from contactfpga.inputs.files import write_text
 from contactfpga.tools.console import outputs
@@ -13,7 +16,20 @@ from contactfpga.tools.console import outputs
 Tables = Mapping[str, Callable[[], str]]
 """What makes each table, by its name."""
 
-_SECTION = re.compile(r"(<!-- figures: (\w+) -->).*?(<!-- end -->)", re.DOTALL)
+_SECTION = re.compile(r"<!-- figures: (\w+)(?: of (\w+))? -->\n(.*?)\n?<!-- end -->", re.DOTALL)
+
+
+class Written(NamedTuple):
+    """A section as it stands in a page."""
+
+    text: str
+    fingerprint: str
+    """Empty where none was stated."""
+
+
+def sections(page: str) -> dict[str, Written]:
+    """The sections of a page's text, by name."""
+    return {name: Written(text, fingerprint) for name, fingerprint, text in _SECTION.findall(page)}
 
 
 def line(cells: Iterable[str]) -> str:
@@ -31,21 +47,27 @@ def table_of(rows: Sequence[Sequence[str]]) -> str:
     return table(rows[0], map(line, rows[1:]))
 
 
-def update(text: str, tables: Tables) -> str:
-    """The text of a page with those of its sections measured that are among ``tables``."""
+def update(text: str, tables: Tables, fingerprint: str | None = None) -> str:
+    """The text of a page with those of its sections made anew that are among ``tables``, with their fingerprint; for
+    None it stays as it was."""
 
-    def measured(match: re.Match[str]) -> str:
-        return f"{match[1]}\n{tables[match[2]]()}\n{match[3]}" if match[2] in tables else match[0]
+    def made(match: re.Match[str]) -> str:
+        name, before = match[1], match[2]
+        if name not in tables:
+            return match[0]
+        mark = before if fingerprint is None else fingerprint
+        head = f"{name} of {mark}" if mark else name
+        return f"<!-- figures: {head} -->\n{tables[name]()}\n<!-- end -->"
 
-    return _SECTION.sub(measured, text)
+    return _SECTION.sub(made, text)
 
 
-def write(path: Path, tables: Tables) -> None:
-    """Write the tables into a page; each is there as soon as it is measured."""
+def write(path: Path, tables: Tables, fingerprint: str | None = None) -> None:
+    """Write the tables into a page, as :func:`update` does; each is there as soon as it is made."""
     for name, measure in tables.items():
         before = path.read_text(encoding="utf-8")
-        if f"<!-- figures: {name} -->" in before:
-            write_text(path, update(before, {name: measure}))
+        if name in sections(before):
+            write_text(path, update(before, {name: measure}, fingerprint))
 
 
 def page(path: str | Path, option: str = "page") -> Path:
@@ -54,23 +76,3 @@ def page(path: str | Path, option: str = "page") -> Path:
     if not Path(path).is_file():
         raise outputs.OutputError(f"{option} is {str(path)!r}; there is no such page")
     return outputs.file(path, option)
-
-
-def page_and_folder(description: str) -> tuple[Path, Path]:
-    """The page and the folder of its pictures that the command line names; ``description``: of the command. Both can be
-    written. Raises :class:`~contactfpga.tools.console.outputs.OutputError`."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("page", type=Path, help="Page to write tables into.")
-    parser.add_argument("folder", type=Path, help="Folder to draw pictures in.")
-    args = parser.parse_args()
-    return page(args.page), outputs.folder(args.folder, "folder")
-
-
-def main(tables: Tables) -> int:
-    """Update the pages named on the command line."""
-    parser = argparse.ArgumentParser(description="Measure the tables in these pages and write them there.")
-    parser.add_argument("pages", type=Path, nargs="+")
-    for path in list(map(page, parser.parse_args().pages)):
-        write(path, tables)
-        print(f"measured {path}")
-    return 0

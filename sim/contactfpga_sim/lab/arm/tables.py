@@ -1,17 +1,12 @@
-"""Writes docs/arm.md's tables and pictures.
-
-``python -m contactfpga_sim.lab.arm.tables docs/arm.md docs/images`` does so.
-"""
+"""Writes docs/arm.md's tables and pictures."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.arm import comply, latency_charts, report, run_pictures, sweep
 from contactfpga_sim.lab.arm.case import Case
@@ -26,6 +21,30 @@ STEPS_US = (25.0, 12.5, 6.25)
 STEPPED = ("closes_s", "torque_before_nm", "peak_force_n", "rest_s")
 
 LIMITS_N = (10.0, 15.0, 20.0, 30.0)
+
+
+class Computed(NamedTuple):
+    """The runs that tables and pictures share."""
+
+    plan: latency_charts.Plan
+    points: dict[Task, Point]
+    columns: dict[str, Result]
+    """The paper's experiment by way to the controller."""
+
+
+def compute() -> Computed:
+    """Run them."""
+    case = Case.load("paper")
+    plan = latency_charts.plan(case)
+    with executor() as workers, progress() as step:
+        points = dict(zip(plan.all, sweep.sweep(plan.all, workers, step)))
+    return Computed(plan, points, report.columns(case, "paper", latency_charts.PAPER_S))
+
+
+def draw(folder: Path, found: Computed) -> list[Path]:
+    """Its runs, and force, speed and thickness against latency."""
+    charts = latency_charts.draw(Case.load("paper"), found.plan, found.points, folder, ("svg",))
+    return [*run_pictures.pictures(found.columns, folder, ("svg",)), *charts]
 
 
 class Failure(NamedTuple):
@@ -58,9 +77,9 @@ FAILURES = (
 )
 
 
-def set_table(found: Mapping[str, Result]) -> str:
+def set_table(found: Computed) -> str:
     """What ``contactfpga study arm`` prints."""
-    return writer.table_of(report.table(dict(found), True))
+    return writer.table_of(report.table(found.columns, True))
 
 
 def failure_table() -> str:
@@ -101,12 +120,12 @@ def step_table() -> str:
     return writer.table_of(lines)
 
 
-def sheet_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
+def sheet_table(found: Computed) -> str:
     """What the gateware's own runs take from the switch to the controller, and what that costs."""
     lines = [["way", "touches", "to the controller, ms: median / worst", "bound, ms", "peak force, N: median / worst"]]
     bounds = sweep.bounds_s(Case.load("paper"), latency_charts.Skin())
     for way, name in (("uart", "UART"), ("pin", "pin")):
-        points = [found[task] for task in tasks.sheet[way]]
+        points = [found.points[task] for task in found.plan.sheet[way]]
         takes = 1e3 * np.array([point.takes_s for point in points])
         forces = np.array([point.peak_force_n for point in points])
         both = [f"{np.median(values):.2f} / {values.max():.2f}" for values in (takes, forces)]
@@ -114,50 +133,18 @@ def sheet_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
     return writer.table_of(lines)
 
 
-def speed_table(tasks: latency_charts.Plan, found: Mapping[Task, Point]) -> str:
+def speed_table(found: Computed) -> str:
     """How fast the arm may be, by its peak force and, in brackets, by the force at the reaction alone."""
-    lines = [["force limit, N", *tasks.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
+    lines = [["force limit, N", *found.plan.speed, "(δ(limit) - δ(closing)) / 6 ms"]]
     for limit in LIMITS_N:
         cells = []
-        for group in tasks.speed.values():
+        for group in found.plan.speed.values():
             speeds = np.array([task.case.link.speed_m_s for task in group])
             fields = ("peak_force_n", "force_before_n")
-            forces = [np.array([getattr(found[task], field) for task in group]) for field in fields]
+            forces = [np.array([getattr(found.points[task], field) for task in group]) for field in fields]
             safe, naive = (sweep.safe_speed(speeds, values, limit) for values in forces)
             cells.append(f"**{safe:.2f}** ({f'{naive:.2f}' if naive == naive else f'> {speeds[-1]:g}'})")
         lines.append(
             [f"{limit:g}", *cells, f"{sweep.naive_speed(Case.load('paper'), limit, latency_charts.PAPER_S):.2f}"]
         )
     return writer.table_of(lines)
-
-
-def main() -> int:
-    """Write the tables into the page and the pictures into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the arm.")
-    case = Case.load("paper")
-    tasks = latency_charts.plan(case)
-    with executor() as workers, progress() as step:
-        points = dict(zip(tasks.all, sweep.sweep(tasks.all, workers, step)))
-    found = report.columns(case, "paper", latency_charts.PAPER_S)
-    tables: writer.Tables = {
-        "set": lambda: set_table(found),
-        "sheet": lambda: sheet_table(tasks, points),
-        "speeds": lambda: speed_table(tasks, points),
-        "defense": defense_table,
-        "pushes": push_table,
-        "failures": failure_table,
-        "steps": step_table,
-    }
-    writer.write(page, tables)
-    print(f"wrote {page}")
-    drawn = (
-        *run_pictures.pictures(found, folder, ("svg",)),
-        *latency_charts.draw(case, tasks, points, folder, ("svg",)),
-    )
-    for path in drawn:
-        print(f"drew {path}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

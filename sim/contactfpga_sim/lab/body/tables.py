@@ -1,13 +1,9 @@
-"""The tables and pictures of docs/body.md.
-
-python -m contactfpga_sim.lab.body.tables docs/body.md docs/images
-"""
+"""The tables and pictures of docs/body.md."""
 
 from __future__ import annotations
 
 import itertools
 import math
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -21,7 +17,6 @@ from contactfpga.robot.body import Body, LinkState
 from contactfpga.robot.body.kinematics import Pose
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.body import folding, outages, registering
 from contactfpga_sim.model.scenes.scene import scene
@@ -74,9 +69,6 @@ def folds_table() -> str:
     return writer.table_of(rows)
 
 
-TABLES: writer.Tables = {"outages": outages_table, "registration": registration_table, "folds": folds_table}
-
-
 def draw(folder: Path) -> Path:
     """The example's robot from the front and from the side, with its sheets and contacts."""
     import matplotlib
@@ -120,16 +112,3 @@ def _draw_sheet(axes: Any, plan: Plan, pose: Pose, across: int) -> None:
         ends = ([contact.point_m[across], tip[across]], [contact.point_m[2], tip[2]])
         axes.plot(ends[0][0], ends[1][0], "o", ms=5, color=style.VERMILLION, label="contacts")
         axes.plot(*ends, color=style.VERMILLION, lw=1.5, label="their normals")
-
-
-def main() -> int:
-    """Write the tables into the page named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and pictures of the page on bodies.")
-    writer.write(page, TABLES)
-    print(f"wrote {page}")
-    print(f"drew {draw(folder)}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

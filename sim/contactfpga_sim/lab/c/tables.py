@@ -1,21 +1,15 @@
-"""Measures what the C header takes on microcontrollers, and writes it into its page.
-
-`make c-page` runs it; it needs Debian's gcc-arm-none-eabi.
-"""
+"""Measures what the C header takes on microcontrollers, and writes it into its page."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from contactfpga.errors import MissingTool
 from contactfpga.skin import Skin
 from contactfpga.skin.widths import LONGEST_PACKET, Widths
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 
 COMPILER = "arm-none-eabi-gcc"
@@ -73,10 +67,3 @@ def size(code: str, flags: list[str], packet: int) -> tuple[int, int]:
         told = subprocess.run(["arm-none-eabi-size", built], check=True, capture_output=True, text=True).stdout
     text, initialized, zeroed = map(int, told.splitlines()[1].split()[:3])
     return text + initialized, initialized + zeroed
-
-
-TABLES: dict[str, Callable[[], str]] = {"c": sizes_table}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,31 +1,49 @@
-"""The tables of the chart's page. `make chart-page` writes them."""
+"""The tables of the chart's page."""
 
 from __future__ import annotations
 
 import bisect
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.tools.console import interrupt
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.chart import host, numbers, speed, steady
-from contactfpga_sim.lab.chart.compute import Point, front
+from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.lab.chart import front_picture, host, numbers, picture, speed, steady
+from contactfpga_sim.lab.chart.compute import FAMILIES_DRAWN, Point, Task, front, study
+from contactfpga_sim.lab.chart.methods import METHODS
 
 NUMBERS = Path("docs/chart/chart.csv")
 """Of the chart that the page shows."""
 
+PLACEMENTS = 1000
+"""Scenes of each point."""
+
 SHEETS = (16, 32, 64)
 
 
-def front_table() -> str:
+def compute() -> list[Point]:
+    """Every point of the chart, as the file of its numbers has it."""
+    tasks = [Task(method, skin, family, PLACEMENTS, 0) for family in FAMILIES_DRAWN for method, skin in METHODS.items()]
+    with pool.executor() as executor, pool.progress() as step:
+        points = [host.timed(point) for point in study(tasks, executor, True, step)]
+    numbers.write(points, NUMBERS)
+    return numbers.read(NUMBERS)
+
+
+def draw(folder: Path, points: list[Point]) -> list[Path]:
+    """The chart, and the README's picture."""
+    chart, small = folder.parent / "chart", folder / "front.svg"
+    picture.save(points, chart)
+    front_picture.save(points, small)
+    return [chart / "chart.svg", small]
+
+
+def front_table(points: list[Point]) -> str:
     """The methods of each family that no other beats in the time and in the share of scenes miscounted."""
     head = ("family", "method", "touch to zones, median / worst", "miscounted", "barycenter", "area", "LUT4")
     lines: list[str] = []
-    points = numbers.read(NUMBERS)
     for family in dict.fromkeys(point.task.family for point in points):
         some = [point for point in points if point.task.family == family]
         best = front(
@@ -94,10 +112,3 @@ def _frame(skin: Skin, cells: np.ndarray) -> tuple[float, int]:
     """From a frame's first row time to its last byte in us, and its bytes."""
     _, size = speed.touch(skin, cells, 0.5)
     return steady.frame_clocks(skin, cells, size) * 1e6 / skin.clock_hz, size
-
-
-TABLES: writer.Tables = {"front": front_table, "host": host_table}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,11 +1,9 @@
-"""The table of docs/clock.md: `python -m contactfpga_sim.lab.clock.tables docs/clock.md`."""
+"""The table of docs/clock.md."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.clock.compute import PATHS, accuracy
 
@@ -27,10 +25,3 @@ def accuracy_table(names: Iterable[str] = PATHS) -> str:
         times = (found.late_s, found.error_s, found.worst_s, found.sigma_s)
         rows.append((path.title, *(f"{1e6 * time_s:,.0f} µs" for time_s in times), f"{100 * found.within:.0f} %"))
     return writer.table_of(rows)
-
-
-TABLES: writer.Tables = {"accuracy": accuracy_table}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,12 +1,8 @@
-"""Measures what it takes to join zones over the seam of a closed sheet, and writes it into the page on labelling.
-
-`make closed-page` runs it.
-"""
+"""Measures what it takes to join zones over the seam of a closed sheet, and writes it into the page on labelling."""
 
 from __future__ import annotations
 
 import functools
-import sys
 from typing import Any
 
 import numpy as np
@@ -14,7 +10,6 @@ import numpy as np
 from contactfpga.choices.labellers import LABELLERS, Labeller
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import sizes
 from contactfpga_sim.lab import size, writer
 from contactfpga_sim.model.golden import volume
@@ -72,10 +67,3 @@ def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
     """LUT4 on an iCE40UP5K of an open and a closed sheet."""
     skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
     return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
-
-
-TABLES: writer.Tables = {"closed": clocks_table, "closed_size": size_table}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

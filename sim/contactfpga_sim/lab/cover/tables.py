@@ -1,19 +1,15 @@
-"""The tables and pictures of docs/cover.md.
-
-python -m contactfpga_sim.lab.cover.tables docs/cover.md docs/images
-"""
+"""The tables and pictures of docs/cover.md."""
 
 from __future__ import annotations
 
 import math
-import sys
+from pathlib import Path
 
 import numpy as np
 
 from contactfpga.design.cover import drawing, formula_study, paper, study_drawing
 from contactfpga.design.cover.design import thinning
 from contactfpga.design.cover.foams import FOAMS
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 
 
@@ -92,25 +88,16 @@ def foam_table() -> str:
     return writer.table_of(rows)
 
 
-TABLES: writer.Tables = {
-    "paper": paper_table,
-    "rules": lambda: _rule_table(formula_study.RULES),
-    "failing": lambda: _rule_table(formula_study.FAILING),
-    "sense": sense_table,
-    "thinning": thinning_table,
-    "foams": foam_table,
-}
+def rules_table() -> str:
+    """Rules for the peak force: error against the exact one, and time."""
+    return _rule_table(formula_study.RULES)
 
 
-def main() -> int:
-    """Write the tables into the page and the pictures into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the cover.")
-    writer.write(page, TABLES)
-    print(f"wrote {page}")
-    for file in (*drawing.draw(folder, "svg"), study_drawing.study(folder / "cover-study.svg")):
-        print(f"drew {file}")
-    return 0
+def failing_table() -> str:
+    """The same of rules that fail."""
+    return _rule_table(formula_study.FAILING)
 
 
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+def draw(folder: Path) -> list[Path]:
+    """The pictures of the command's answer, and the one of the study."""
+    return [*drawing.draw(folder, "svg"), study_drawing.study(folder / "cover-study.svg")]

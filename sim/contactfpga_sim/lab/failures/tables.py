@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
+from contactfpga.inputs.files import write_text
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.failures import knob_pictures
 from contactfpga_sim.lab.failures.catalogue import STUDIES
 from contactfpga_sim.lab.failures.knob import Study, Turned
+from contactfpga_sim.lab.pool import progress
 
 HEAD = ("knob", "method", "holds until", "breaks at", "what breaks", "what the system says", "what helps")
 
@@ -67,7 +71,7 @@ def unnoticed(turned: Mapping[str, Mapping[str, Turned]]) -> str:
 
 
 def tables(turned: Mapping[str, Mapping[str, Turned]]) -> writer.Tables:
-    """All of the page, by name."""
+    """All sections of the page, by name."""
     return {"failures": lambda: table(turned), "unnoticed": lambda: unnoticed(turned), "pictures": pictures}
 
 
@@ -76,3 +80,28 @@ def pictures() -> str:
     return "\n".join(
         f"({study.name})=\n\n![{study.title}](images/failures/{study.name}.svg)\n" for study in STUDIES.values()
     )
+
+
+def compute() -> dict[str, dict[str, Turned]]:
+    """Every knob turned until something breaks."""
+    turned: dict[str, dict[str, Turned]] = {}
+    turn(list(STUDIES), turned)
+    return turned
+
+
+def turn(names: Sequence[str], turned: dict[str, dict[str, Turned]]) -> None:
+    """Turn the knobs one after another; each is in ``turned`` as soon as it is done."""
+    runs = sum(len(STUDIES[name].runs) for name in names)
+    with progress() as step:
+        for name in names:
+            STUDIES[name].turn(lambda: step("knobs and methods", runs), turned.setdefault(name, {}))
+
+
+def draw(folder: Path, turned: Mapping[str, Mapping[str, Turned]]) -> list[Path]:
+    """A picture for each knob, in a folder of their own."""
+    (folder / "failures").mkdir(exist_ok=True)
+    drawn = []
+    for name, methods in turned.items():
+        drawn.append(folder / "failures" / f"{name}.svg")
+        write_text(drawn[-1], knob_pictures.svg(STUDIES[name], methods))
+    return drawn

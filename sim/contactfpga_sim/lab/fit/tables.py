@@ -1,24 +1,15 @@
-"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md: `make fits`."""
+"""Writes what `contactfpga fit` chooses for the examples into docs/fit.md."""
 
 from __future__ import annotations
 
 import argparse
 import shlex
 import sys
-from collections.abc import Callable
 
 from contactfpga.tools.commands.fit import add_flags, asked
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import pool, writer
 from contactfpga_sim.lab.fit import show
 from contactfpga_sim.lab.fit.search import fit
-
-EXAMPLES = {
-    "bumper": "examples/scenes-bumper.toml --barycenter-mm 3 --latency-us 500",
-    "hands": "examples/scenes-hands.toml --barycenter-mm 3 --latency-us 500",
-    "sole": "examples/scenes-sole.toml --barycenter-mm 3 --latency-us 500",
-}
-"""Arguments by name."""
 
 
 def section(arguments: str) -> str:
@@ -35,12 +26,16 @@ def section(arguments: str) -> str:
     return "\n\n".join((f"    {command}", *map(writer.table_of, tables), " ".join((*show.notes(found), none))))
 
 
-def _table(arguments: str) -> Callable[[], str]:
-    return lambda: section(arguments)
+def bumper_section() -> str:
+    """A robot's bumper."""
+    return section("examples/scenes-bumper.toml --barycenter-mm 3 --latency-us 500")
 
 
-TABLES = {name: _table(arguments) for name, arguments in EXAMPLES.items()}
+def hands_section() -> str:
+    """Hands."""
+    return section("examples/scenes-hands.toml --barycenter-mm 3 --latency-us 500")
 
 
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))
+def sole_section() -> str:
+    """A shoe's sole."""
+    return section("examples/scenes-sole.toml --barycenter-mm 3 --latency-us 500")

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
 
-from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.flips import summary
+from contactfpga_sim.lab import pool, writer
+from contactfpga_sim.lab.flips import campaign, picture, summary
 from contactfpga_sim.lab.flips.campaign import Row
+from contactfpga_sim.lab.flips.designs import DESIGNS
 from contactfpga_sim.lab.flips.summary import Design
 
-DESIGNS = (
+COLUMNS = (
     "design",
     "LUT4",
     "bits",
@@ -20,24 +24,54 @@ DESIGNS = (
 )
 MODULES = ("module", "flips", "silently wrong", "reported", "masked", "registers silently wrong")
 KINDS = ("design", "outcome", "by", "flips")
+REGISTERS, MEMORIES = 400, 100
+"""Flips of each design."""
+LONGEST_S = 25 * 60.0
+"""After which no more flips begin."""
 LONG_S = 0.005
 """Longer than any fault that spoils a frame or two."""
 OUTCOMES = {"silent": "silently wrong", "told": "reported"}
 """In words."""
 
 
+class Computed(NamedTuple):
+    """What the sections share."""
+
+    rows: Sequence[Row]
+    designs: Sequence[Design]
+
+
+def compute() -> Computed:
+    """As many flips as there is time for, and the size of each design."""
+    with pool.executor() as executor, pool.progress() as step:
+        done = functools.partial(step, "blocks of flips")
+        rows = campaign.run(list(DESIGNS), REGISTERS, MEMORIES, executor, done, LONGEST_S)
+    return Computed(rows, summary.measured(DESIGNS))
+
+
+def draw(folder: Path, found: Computed) -> list[Path]:
+    """The picture, and all numbers as files beside the page."""
+    numbers = folder.parent / "flips"
+    campaign.write(found.rows, numbers / "flips.csv")
+    summary.write(found.designs, numbers / "designs.csv")
+    drawn = picture.draw(found.rows, found.designs, folder / "flips.svg")
+    return [numbers / "flips.csv", numbers / "designs.csv", drawn]
+
+
 def tables(rows: Sequence[Row], designs: Sequence[Design]) -> writer.Tables:
-    """All of them, by name."""
+    """All sections of the page, by name."""
+    found = Computed(rows, designs)
     return {
-        "worst": lambda: worst_text(rows),
-        "flipped": lambda: designs_table(rows, designs),
-        "modules": lambda: modules_table(rows, designs),
-        "ways": lambda: ways_table(rows, designs),
+        "worst": lambda: worst_text(found),
+        "flipped": lambda: designs_table(found),
+        "modules": lambda: modules_table(found),
+        "ways": lambda: ways_table(found),
     }
 
 
-def worst_text(rows: Sequence[Row]) -> str:
+def worst_text(found: Computed) -> str:
     """What the flips of registers and of memories did at worst, with one copy and with two, and how rare that is."""
+    rows = found.rows
     groups = [
         (f"Flips of {'memory' if memory else 'registers'} with {'two copies' if dual else 'one copy'}", some)
         for dual in (False, True)
@@ -66,12 +100,12 @@ def _worst(rows: Sequence[Row]) -> str:
     )
 
 
-def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+def designs_table(found: Computed) -> str:
     """A row for each design's registers, and one for its memories."""
     lines = []
-    for design in designs:
+    for design in found.designs:
         for memory, bits in ((False, design.registers), (True, design.memories)):
-            some = summary.of(rows, design.name, memory)
+            some = summary.of(found.rows, design.name, memory)
             if not some:
                 continue
             median, longest = summary.wrong_ms(some)
@@ -89,7 +123,7 @@ def designs_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
                     )
                 )
             )
-    return writer.table(DESIGNS, lines)
+    return writer.table(COLUMNS, lines)
 
 
 def _interval(share: summary.Share) -> str:
@@ -97,9 +131,9 @@ def _interval(share: summary.Share) -> str:
     return f"{100 * low:.1f} to {100 * high:.1f} %"
 
 
-def modules_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+def modules_table(found: Computed) -> str:
     """Registers of the plain designs, by module."""
-    plain = [row for row in rows if not row.design.endswith("dual") and not row.found.memory]
+    plain = [row for row in found.rows if not row.design.endswith("dual") and not row.found.memory]
     lines = []
     for module, some in summary.by(plain, summary.stage).items():
         counts = [summary.share(some, outcome).hits for outcome in ("silent", "told", "masked")]
@@ -109,11 +143,11 @@ def modules_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
     return writer.table(MODULES, lines)
 
 
-def ways_table(rows: Sequence[Row], designs: Sequence[Design]) -> str:
+def ways_table(found: Computed) -> str:
     """What is wrong with each design, or reports the flip."""
     lines = []
-    for design in designs:
-        some = [row for row in rows if row.design == design.name and row.found.outcome != "masked"]
+    for design in found.designs:
+        some = [row for row in found.rows if row.design == design.name and row.found.outcome != "masked"]
         for way, hits in summary.by(some, lambda row: f"{row.found.outcome}|{row.found.kind}").items():
             outcome, kind = way.split("|")
             lines.append(writer.line((f"`{design.name}`", OUTCOMES[outcome], kind, str(len(hits)))))

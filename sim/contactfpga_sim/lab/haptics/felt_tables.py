@@ -93,15 +93,6 @@ def breaks_pictures() -> str:
     )
 
 
-TABLES: writer.Tables = {
-    "felt": felt_table,
-    "pairs": pairs_table,
-    "limits": limits_table,
-    "breaks": breaks_table,
-    "breakpictures": breaks_pictures,
-}
-
-
 def draw(folder: Path) -> list[Path]:
     """Error over time, and a picture for each break."""
     drawn = [_front(folder / "haptics-front.svg")]

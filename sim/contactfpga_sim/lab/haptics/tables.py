@@ -1,16 +1,12 @@
-"""The tables and pictures of docs/haptics.md.
-
-python -m contactfpga_sim.lab.haptics.tables docs/haptics.md docs/images
-"""
+"""The tables and pictures of docs/haptics.md."""
 
 from __future__ import annotations
 
 import math
-import sys
+from pathlib import Path
 
 from contactfpga.robot.haptics import Cylinder, drawing
 from contactfpga.robot.haptics.rate import Rating, Requirements, compared
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.haptics import coverage, felt_tables
 from contactfpga_sim.lab.haptics.coverage import Case
@@ -77,24 +73,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-TABLES: writer.Tables = {
-    "layouts": layouts_table,
-    "places": places_table,
-    "wrong": wrong_table,
-    **felt_tables.TABLES,
-}
-
-
-def main() -> int:
-    """Write the tables into the page and the picture into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and the picture of the page on haptics.")
-    writer.write(page, TABLES)
-    print(f"wrote {page}")
-    print(f"drew {drawing.draw(folder / 'haptics-place.svg', LINK, compared(LINK, RING_M))}")
-    for path in felt_tables.draw(folder):
-        print(f"drew {path}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+def draw(folder: Path) -> list[Path]:
+    """The arrangements of units, and what is felt."""
+    return [drawing.draw(folder / "haptics-place.svg", LINK, compared(LINK, RING_M)), *felt_tables.draw(folder)]

@@ -1,16 +1,12 @@
-"""The tables and the schematic of docs/maker.md.
-
-python -m contactfpga_sim.lab.maker.tables docs/maker.md docs/images
-"""
+"""The tables and the schematic of docs/maker.md."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
+from pathlib import Path
 
 from contactfpga.design.circuit import SCHOTTKY, SILICON, Circuit, needed, static
 from contactfpga.design.circuit.times import MARGIN, Time
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.maker import schematic
 
@@ -78,17 +74,6 @@ def _kilo(ohm: float) -> str:
     return f"{ohm / 1000:g} kΩ"
 
 
-TABLES: writer.Tables = {"diodes": diodes_table, "pulls": pulls_table, "series": series_table}
-
-
-def main() -> int:
-    """Write the tables into the page and the schematic into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and the schematic of the maker's page.")
-    writer.write(page, TABLES)
-    print(f"wrote {page}")
-    print(f"drew {schematic.draw(folder / 'schematic.svg')}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+def draw(folder: Path) -> Path:
+    """The schematic."""
+    return schematic.draw(folder / "schematic.svg")

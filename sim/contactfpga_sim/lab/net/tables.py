@@ -1,17 +1,12 @@
-"""The tables and the picture of docs/net.md.
-
-python -m contactfpga_sim.lab.net.tables docs/net.md docs/images
-"""
+"""The tables and the picture of docs/net.md."""
 
 from __future__ import annotations
 
 import functools
-import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
 from contactfpga.robot.net.message import HEAD_BYTES
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.net import load, source
 
@@ -95,9 +90,6 @@ def _ms(latency: tuple[float, float]) -> str:
     return " / ".join(f"{1000 * one:.1f}" for one in latency) + " ms"
 
 
-TABLES: writer.Tables = {"batch": batch_table, "links": links_table, "thousand": thousand_table}
-
-
 def draw(folder: Path) -> Path:
     """Processor time and latency by the number of links."""
     import matplotlib
@@ -122,16 +114,3 @@ def draw(folder: Path) -> Path:
             axes.legend()
         figure.supxlabel("links of 1 kHz", fontsize=style.NORMAL)
         return style.save(figure, folder / "net.svg")
-
-
-def main() -> int:
-    """Write the tables into the page and the picture into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and the picture of the page on networks.")
-    writer.write(page, TABLES)
-    print(f"wrote {page}")
-    print(f"drew {draw(folder)}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

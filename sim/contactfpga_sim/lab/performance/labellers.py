@@ -12,6 +12,7 @@ from contactfpga.choices.labellers import LABELLERS, Labeller, LabellerName
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.performance import scans
 from contactfpga_sim.model.golden import volume
 from contactfpga_sim.model.scenes.cells import to_words
 from contactfpga_sim.model.scenes.families import FAMILIES, placements
@@ -48,6 +49,11 @@ def labeller_row(skin: Skin, places: tuple[np.ndarray, np.ndarray]) -> str:
     most = str(bound(skin.columns, skin.connectivity, skin.labeller))
     sheet = f"{skin.rows}x{skin.columns}"
     return writer.line((f"`{skin.labeller}`", sheet, str(skin.connectivity), found, f"{worst} clocks", most))
+
+
+def recordings_table() -> str:
+    """:func:`recorded_table` of the recordings that lie beside the project."""
+    return recorded_table(scans.recordings())
 
 
 def recorded_table(recordings: Mapping[str, np.ndarray]) -> str:

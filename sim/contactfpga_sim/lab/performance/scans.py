@@ -1,11 +1,7 @@
-"""Measures what the pages state, in clock cycles of the gateware, and writes it there.
-
-`make figures` runs it. Everything here is exact and repeatable; a test compares the tables in the files with a new run.
-"""
+"""Measures what the pages state, in clock cycles of the gateware, and writes it there."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +10,8 @@ import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.performance.labellers import labeller_table, recorded_table
-from contactfpga_sim.lab.performance.reversal import latency_table, sides_table
 from contactfpga_sim.lab.sheets import adaptive_skin
-from contactfpga_sim.lab.units.tables import units_table
 from contactfpga_sim.model.board.compiled import CompiledBoard
 from contactfpga_sim.model.board.received import frames_in
 from contactfpga_sim.model.golden import Timeline
@@ -210,22 +202,11 @@ def recorded_scenes(folder: Path = RECORDINGS) -> dict[str, np.ndarray]:
     return {name: frames[:: max(1, len(frames) // RECORDED)][:RECORDED] for name, frames in recordings(folder).items()}
 
 
-TABLES: writer.Tables = {
-    "reference": reference_table,
-    "labeller": labeller_table,
-    "report": report_table,
-    "fast": latency_table,
-    "sides": sides_table,
-    "units": units_table,
-    "gain": lambda: gain_table(built_in_scenes()),
-}
-if RECORDINGS.is_dir():  # else their tables stay as they are
-    TABLES = {
-        **TABLES,
-        "recorded": lambda: gain_table(recorded_scenes()),
-        "labeller_recorded": lambda: recorded_table(recordings()),
-    }
+def scenes_gain_table() -> str:
+    """:func:`gain_table` of the built-in scenes."""
+    return gain_table(built_in_scenes())
 
 
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))
+def recorded_gain_table() -> str:
+    """:func:`gain_table` of the recordings."""
+    return gain_table(recorded_scenes())

@@ -1,14 +1,10 @@
-"""The figures of docs/recordings.md.
-
-python -m contactfpga_sim.lab.recordings.tables docs/recordings.md
-"""
+"""The figures of docs/recordings.md."""
 
 from __future__ import annotations
 
 import atexit
 import functools
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -85,9 +81,3 @@ def _cells(found: list[compute.Loss], of: Callable[[list[Any]], Any]) -> tuple[s
         f"{of([one.lost for one in found]):,}",
         f"{of([one.lost_s for one in found]):.3f}",
     )
-
-
-TABLES: writer.Tables = {"sizes": sizes_table, "reading": reading_table, "loss": loss_table}
-
-if __name__ == "__main__":
-    sys.exit(writer.main(TABLES))

@@ -1,13 +1,7 @@
-"""The tables of docs/safety.md.
-
-python -m contactfpga_sim.lab.safety.tables docs/safety.md
-"""
+"""The tables of docs/safety.md."""
 
 from __future__ import annotations
 
-import sys
-
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.safety import compute, start, trial
 from contactfpga_sim.lab.safety.catalogue import FAULTS
@@ -137,9 +131,3 @@ def times_table() -> str:
     rows.append([f"{trial.DEADLINE_US:,} µs", "the host's deadline for a frame"])
     rows.append([f"{trial.STEP_US} µs", "the grid of the times"])
     return writer.table_of(rows)
-
-
-TABLES: writer.Tables = {"coverage": coverage_table, "faults": faults_table, "times": times_table}
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

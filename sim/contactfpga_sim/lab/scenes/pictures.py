@@ -1,15 +1,13 @@
-"""The picture in docs/scenes.md: ``python -m contactfpga_sim.lab.scenes.pictures docs/images/scenes.svg``.
+"""The picture in docs/scenes.md.
 
 Written by hand rather than by a plotting library, so that the same scenes always make the same file.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import html
 import math
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,7 +17,6 @@ from contactfpga import picture_style as style
 from contactfpga.design.cover import Cover, Ellipse, Part
 from contactfpga.inputs.files import write_text
 from contactfpga.skin import Skin
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.model.scenes import contacts
 from contactfpga_sim.model.scenes.families import placements
 from contactfpga_sim.model.scenes.scene import Scene, sheet
@@ -133,15 +130,7 @@ def _outline(part: Part, left_mm: float, top_mm: float, scale: float) -> str:
     return f'<{shape} transform="{place}" fill="none" stroke="{OUTLINE}" stroke-width="1.2"/>'
 
 
-def main() -> int:
-    """Write the picture to the file named on the command line."""
-    parser = argparse.ArgumentParser(description="Draw scenes, what touches and which switches close.")
-    parser.add_argument("picture", type=Path)
-    picture = parser.parse_args().picture
-    write_text(picture, svg(panels()))
-    print(f"drew {picture}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+def draw(folder: Path) -> Path:
+    """All of them, in ``scenes.svg``."""
+    write_text(folder / "scenes.svg", svg(panels()))
+    return folder / "scenes.svg"

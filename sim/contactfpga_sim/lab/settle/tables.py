@@ -1,19 +1,14 @@
-"""The tables and pictures of docs/settle.md.
-
-python -m contactfpga_sim.lab.settle.tables docs/settle.md docs/images
-"""
+"""The tables and pictures of docs/settle.md."""
 
 from __future__ import annotations
 
 import functools
-import sys
 
 from contactfpga.design.circuit import SILICON, Circuit, needed, patterns, problems
 from contactfpga.design.circuit.times import MARGIN, Time
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
-from contactfpga_sim.lab.settle import breaks, pictures, shorted
-from contactfpga_sim.model.sheet import agreement, spice
+from contactfpga_sim.lab.settle import breaks, shorted
+from contactfpga_sim.model.sheet import agreement
 from contactfpga_sim.model.sheet.agreement import Compared
 
 SHEETS = {
@@ -126,30 +121,3 @@ def shorted_table() -> str:
             ]
         )
     return writer.table_of(rows)
-
-
-TABLES: writer.Tables = {
-    "needs": needs_table,
-    "breaks": breaks_table,
-    "shorted": shorted_table,
-}
-COMPARED: writer.Tables = {"summary": summary_table, "agreement": agreement_table}
-"""Those that need ngspice."""
-
-
-def main() -> int:
-    """Write the tables into the page and the pictures into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and pictures of the page on settling.")
-    writer.write(page, TABLES)
-    if spice.installed():
-        writer.write(page, COMPARED)
-    else:
-        print("ngspice is not installed: its tables stay as they are")
-    print(f"wrote {page}")
-    for file in pictures.draw(folder):
-        print(f"drew {file}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

@@ -1,19 +1,14 @@
-"""Measures what several sheets at one FPGA cost and how they share the line, and writes it into the page on them.
-
-`make several-page` runs it.
-"""
+"""Measures what several sheets at one FPGA cost and how they share the line, and writes it into the page on them."""
 
 from __future__ import annotations
 
 import functools
 import itertools
-import sys
 
 import numpy as np
 
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several
-from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import sizes
 from contactfpga_hdl.several import SeveralTop
 from contactfpga_hdl.top import Top
@@ -75,10 +70,3 @@ def _longest_wait(trace: Trace, begins: list[int]) -> int:
     rows = np.array([cycle for cycle, _, last in trace.rows if last])
     newest = np.searchsorted(rows, np.array(begins)) - 1
     return int(max(np.array(begins) - rows[newest]))
-
-
-TABLES: writer.Tables = {"several_line": line_table, "several_size": size_table}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

@@ -1,21 +1,16 @@
-"""Measures by place and route what the performance and boards pages state of size and clock, and writes it there.
-
-`make sizes` runs it: some 160 runs of place and route, an hour and more of one core unless they are kept from before.
-"""
+"""Measures by place and route what the performance and boards pages state of size and clock, and writes it there."""
 
 from __future__ import annotations
 
 import functools
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from contactfpga.boards import BOARDS
 from contactfpga.boards.spec import BoardSpec
 from contactfpga.skin import Skin
-from contactfpga.tools.console import interrupt
 from contactfpga_hdl.board import build, sizes
 from contactfpga_hdl.top import Top
 from contactfpga_sim.lab import size, writer
@@ -122,15 +117,3 @@ def board_row(board: BoardSpec, skin: Skin) -> str:
         f"{found.fmax_mhz:.1f} MHz",
     )
     return writer.line(fields)
-
-
-TABLES: dict[str, Callable[[], str]] = {
-    "gateware": gateware_table,
-    "faults": faults_table,
-    "units_size": units_table,
-    "boards": boards_table,
-}
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(lambda: writer.main(TABLES)))

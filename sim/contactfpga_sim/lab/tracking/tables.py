@@ -1,15 +1,10 @@
-"""The tables and the picture of docs/tracking.md.
-
-python -m contactfpga_sim.lab.tracking.tables docs/tracking.md docs/images
-"""
+"""The tables and the picture of docs/tracking.md."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from contactfpga import picture_style as style
-from contactfpga.tools.console import interrupt
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.failures import tables as failures_tables
 from contactfpga_sim.lab.performance.scans import RECORDINGS
@@ -61,19 +56,6 @@ def reflex_table() -> str:
     return writer.table_of([reflex.HEAD, reflex.measured().cells])
 
 
-TABLES: writer.Tables = {"breaks": breaks_table}
-"""Those that are the same on each machine and need no more than the simulation."""
-
-JUDGED: writer.Tables = {
-    "scores": scores_table,
-    **({"recorded": recorded_table} if RECORDINGS.is_dir() else {}),  # else it stays as it is
-}
-"""Those that py-motmetrics is needed for."""
-
-MEASURED: writer.Tables = {"speed": speed_table, "reflex": reflex_table}
-"""Those of this machine."""
-
-
 def draw(folder: Path) -> Path:
     """How often ids are right, by family, rate and tracker."""
     import matplotlib
@@ -94,17 +76,3 @@ def draw(folder: Path) -> Path:
         figure.supxlabel("frames per second", fontsize=style.NORMAL)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
         return style.save(figure, folder / "tracking.svg")
-
-
-def main() -> int:
-    """Write the tables into the page and the picture into the folder named on the command line."""
-    page, folder = writer.page_and_folder("Write the tables and the picture of the page on tracking.")
-    for tables in (MEASURED, TABLES, JUDGED):
-        writer.write(page, tables)
-    print(f"wrote {page}")
-    print(f"drew {draw(folder)}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))

@@ -1,7 +1,4 @@
-"""The figures of docs/view.md and the picture of the view, from a browser without a window.
-
-python -m contactfpga_sim.lab.view.tables docs/view.md docs/images
-"""
+"""The figures of docs/view.md and the picture of the view, from a browser without a window."""
 
 from __future__ import annotations
 
@@ -9,17 +6,15 @@ import contextlib
 import dataclasses
 import functools
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from contactfpga.driver import driver
 from contactfpga.driver.link import Link
 from contactfpga.skin.sheet import Sheet
-from contactfpga.tools.console import interrupt, outputs
 from contactfpga.tools.view import opening, plot, replayed
 from contactfpga.tools.view.app import View
 from contactfpga.tools.view.opening import Shown
@@ -240,19 +235,35 @@ WAY = ((2.0, 3.0), (5.0, 5.5), (8.5, 5.0), (11.5, 3.0))
 """Of the finger that moves, in pitches."""
 
 
-def main() -> int:
-    """Measure, write the page, take the picture."""
-    page, folder = writer.page_and_folder("Write the tables and pictures of the page on the view.")
-    image, drawn = (outputs.file(folder / name, "folder") for name in ("view.png", "plot.svg"))
-    plotted(drawn)
+class Computed(NamedTuple):
+    """What the tables share."""
+
+    loads: str
+    found: list[Click]
+
+
+def compute() -> Computed:
+    """Open the view twice: without a browser, and with one that clicks."""
     with opening.opened(http_port=0) as shown:
         loads = load_table(shown)
     with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
-        found = clicks(shown, visitor)
+        return Computed(loads, clicks(shown, visitor))
+
+
+def loads_table(computed: Computed) -> str:
+    """What was measured without a browser."""
+    return computed.loads
+
+
+def clicks_table(computed: Computed) -> str:
+    """What was measured with one."""
+    return click_table(computed.found)
+
+
+def draw(folder: Path) -> list[Path]:
+    """The view in a browser, and the picture of a recording."""
+    image, drawn = folder / "view.png", folder / "plot.svg"
+    plotted(drawn)
+    with opening.opened(http_port=0) as shown, browser.visit(shown) as visitor:
         picture(shown, visitor, image)
-    writer.write(page, {"view_load": lambda: loads, "view_clicks": lambda: click_table(found)})
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(interrupt.guarded(main))
+    return [image, drawn]

@@ -15,7 +15,7 @@ import os
 import re
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from contactfpga.errors import MissingExtra
@@ -53,6 +53,13 @@ def own(files: Iterable[Path]) -> str:
     """The same for files of a user's own, and what they import from our packages and from beside themselves."""
     files = sorted(files)
     return _hashed([*map(_hash, files), *_marks(map(_name, files), _folders(PACKAGES) | _beside(files))])
+
+
+def files(modules: Iterable[str], scripts: Iterable[Path] = ()) -> set[Path]:
+    """All files of ours that modules and scripts reach: what they import, and data in folders beside it."""
+    folders = _folders(PACKAGES) | _beside(scripts)
+    found = {file for file in _closure({*modules, *map(_name, scripts)}, folders).values() if file}
+    return found | {data for folder in {file.parent for file in found} for data in _data(folder)}
 
 
 def package(name: str) -> Path:
@@ -128,27 +135,37 @@ def _find(name: str, folders: Mapping[str, Path]) -> Path | None:
 def _marks(roots: Iterable[str], folders: Mapping[str, Path], ours: bool = False) -> list[str]:
     """A line for each module that is reached and for each other package. Of packages of ``ours`` also for each file of
     data beside a module; users' modules may be changed and loaded again."""
-    todo, seen, files, marks = set(roots), set[str](), list[Path](), list[str]()
-    while todo:
-        name = todo.pop()
-        seen.add(name)
-        if file := _find(name, folders):
-            if ours:
-                _read.setdefault(file, _stamp(file))
-            text = file.read_bytes()
-            files.append(file)
-            marks.append(f"{name} {hashlib.sha256(text).hexdigest()}")
-            todo |= _imported(text.decode(errors="replace"), name, file.name == "__init__.py")
-        # A package's own file runs before its modules. The outermost one only gathers names for users.
-        if name.count(".") > 1:
-            todo.add(name.rpartition(".")[0])
-        todo -= seen
-    tops = {name.partition(".")[0] for name in seen}
-    marks += (f"{top} {_hash(file)}" for top in tops - seen if (file := _find(top, folders)))
-    for folder in {file.parent for file in files} if ours else ():
+    found = _closure(roots, folders, _noted if ours else lambda _: None)
+    marks = [f"{name} {_hash(file)}" for name, file in found.items() if file]
+    tops = {name.partition(".")[0] for name in found}
+    marks += (f"{top} {_hash(file)}" for top in tops - set(found) if (file := _find(top, folders)))
+    for folder in {file.parent for file in found.values() if file} if ours else ():
         marks += (f"{file.name} {_hash(file)}" for file in _data(folder))
     others = tops - set(folders) - set(PACKAGES) - sys.stdlib_module_names
     return sorted((*marks, *(f"{other} {version(other)}" for other in others)))
+
+
+def _closure(
+    roots: Iterable[str], folders: Mapping[str, Path], about_to_read: Callable[[Path], None] = lambda _: None
+) -> dict[str, Path | None]:
+    """The file of each module that is reached, by name; None for what is in none of these folders."""
+    todo, found = set(roots), dict[str, Path | None]()
+    while todo:
+        name = todo.pop()
+        found[name] = file = _find(name, folders)
+        if file:
+            about_to_read(file)
+            text = file.read_bytes().decode(errors="replace")
+            todo |= _imported(text, name, file.name == "__init__.py")
+        # A package's own file runs before its modules. The outermost one only gathers names for users.
+        if name.count(".") > 1:
+            todo.add(name.rpartition(".")[0])
+        todo -= set(found)
+    return found
+
+
+def _noted(file: Path) -> None:
+    _read.setdefault(file, _stamp(file))
 
 
 def _stamp(file: Path) -> object:

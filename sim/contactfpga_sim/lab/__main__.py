@@ -1,0 +1,136 @@
+"""Makes the tables and pictures of the pages anew: ``python -m contactfpga_sim.lab NAME``, or ``--all``."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga.tools.console import flags, interrupt, numbers, outputs
+from contactfpga_sim.lab import meaning, pool, registry, writer
+from contactfpga_sim.lab.registry import Run, Study
+
+DOCS = Path("docs")
+QUICK_MINUTES = 2
+
+
+class StudyError(ContactFPGAError):
+    """A study cannot be made here."""
+
+
+def lacking(needs: Iterable[str]) -> list[str]:
+    """Those of the needs that are absent: programs, and files or folders with a slash in their name."""
+    return [one for one in needs if not (Path(one).exists() if "/" in one else shutil.which(one))]
+
+
+def make(study: Study) -> None:
+    """Write all sections of a study, and draw its pictures. Raises :class:`StudyError`, :class:`MissingExtra`."""
+    if absent := lacking(study.needs):
+        raise StudyError(f"{study.name} needs {', '.join(absent)}")
+    for name in {study.page_of(section) for section in study.sections}:
+        writer.page(DOCS / name)
+    images = outputs.folder(DOCS / "images", "the folder of the pictures")
+    try:
+        _make(study, Run(study), images)
+    except ImportError as error:
+        if isinstance(error, ContactFPGAError) or (error.name or "").startswith("contactfpga"):
+            raise
+        raise MissingExtra(study.name, study.extra) from error
+
+
+def _make(study: Study, run: Run, images: Path) -> None:
+    for name, section in study.sections.items():
+        page = study.page_of(name)
+        if absent := lacking(section.needs):
+            print(f"{page}: {name} stays as it is without {', '.join(absent)}", flush=True)
+            continue
+        text = run.text(name)
+        writer.write(DOCS / page, {name: lambda text=text: text}, meaning.fingerprint(study, name))  # type: ignore[misc]
+        print(f"{page}: {name}", flush=True)
+    if study.pictures:
+        drawn = run.call(study.pictures, images)
+        for path in [drawn] if isinstance(drawn, Path) else drawn:
+            print(f"drew {path}", flush=True)
+
+
+def stale(study: Study) -> Iterator[str]:
+    """A line for each section that stands in its page with another fingerprint than it would have now."""
+    for name in study.sections:
+        page = study.page_of(name)
+        written = writer.sections((DOCS / page).read_text(encoding="utf-8"))[name]
+        if written.fingerprint != meaning.fingerprint(study, name):
+            yield f"{page}: {name}: make pages NAME={study.name}"
+
+
+def listed(study: Study) -> str:
+    """A study's line."""
+    needs = f"; needs {', '.join(study.needs)}" if study.needs else ""
+    return f"{study.name:<12} {study.page:<16} {study.minutes:>4g} min  {study.title}{needs}"
+
+
+def main() -> int:
+    """The command; its status."""
+    args = _parser().parse_args()
+    names = flags.known("study", args.name, list(registry.STUDIES))
+    studies = [registry.load(name) for name in names]
+    if args.quick:
+        studies = [study for study in studies if study.minutes <= QUICK_MINUTES]
+    if args.list:
+        print(*map(listed, studies), sep="\n")
+        return 0
+    if not DOCS.is_dir():
+        raise StudyError("there is no folder 'docs' here; run this in the folder of the sources")
+    if args.stale:
+        print(*(line for study in studies for line in stale(study)), sep="\n")
+        return 0
+    if not (args.name or args.all):
+        raise StudyError("name a study, or give --all or --list")
+    with _settings(args):
+        return _make_all(studies, strict=bool(args.name))
+
+
+def _make_all(studies: Iterable[Study], strict: bool) -> int:
+    """Make each; ``strict``: what cannot be made here is an error, and not just left out."""
+    for study in studies:
+        try:
+            make(study)
+        except (StudyError, MissingExtra) as error:
+            if strict:
+                raise
+            print(f"left out: {error}", file=sys.stderr, flush=True)
+    return 0
+
+
+@contextlib.contextmanager
+def _settings(args: argparse.Namespace) -> Iterator[None]:
+    """Processes that studies use, and where they look for results of before."""
+    with contextlib.ExitStack() as stack:
+        stack.callback(setattr, pool, "usual_jobs", pool.usual_jobs)
+        pool.usual_jobs = args.jobs
+        if args.fresh:
+            os.environ["CONTACTFPGA_CACHE"] = stack.enter_context(tempfile.TemporaryDirectory(prefix="contactfpga-"))
+        yield
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m contactfpga_sim.lab", description="Make tables and pictures of the pages anew."
+    )
+    parser.add_argument("name", nargs="*", help="Study to make; --list shows them.")
+    parser.add_argument("--all", action="store_true", help="Make all studies that can be made here.")
+    parser.add_argument("--list", action="store_true", help="List the studies, and make none.")
+    parser.add_argument("--stale", action="store_true", help="List the sections that are out of date, and make none.")
+    parser.add_argument("--quick", action="store_true", help=f"Only those of at most {QUICK_MINUTES} minutes.")
+    parser.add_argument("--fresh", action="store_true", help="Take no result that was kept from before.")
+    parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Processes to use (default: one per core).")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(interrupt.guarded(main))

@@ -1,0 +1,73 @@
+"""Fingerprints of what makes a section of a page. They stay when code is only moved, or explained otherwise.
+
+The statements of all modules that are reached are taken as a set: without imports, comments and docstrings, and without
+the place where they stand.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from contactfpga_sim.lab.registry import Run, Study
+from contactfpga_sim.model.board import sources
+
+LENGTH = 8
+"""Hexadecimal digits of a fingerprint."""
+
+
+def fingerprint(study: Study, section: str) -> str:
+    """Of what makes a section."""
+    declared = study.sections[section]
+    if declared.depends:
+        return _hashed(Run(study).call(declared.depends))
+    return _of(frozenset(study.module(place) for place in (declared.makes, study.compute) if place))
+
+
+@functools.cache
+def _of(modules: frozenset[str]) -> str:
+    scripts = [Path(module).resolve() for module in modules if "/" in module]
+    named = [module for module in modules if "/" not in module]
+    marks = {mark for file in sources.files(named, scripts) for mark in _marks(file)}
+    return _hashed("\n".join(sorted(marks)))
+
+
+def _hashed(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:LENGTH]
+
+
+@functools.cache
+def _marks(file: Path) -> tuple[str, ...]:
+    """A hash for each statement of a module, or for the whole of another file."""
+    data = file.read_bytes()
+    if file.suffix != ".py":
+        return (hashlib.sha256(data).hexdigest(),)
+    statements = [one for one in ast.parse(data).body if not _says_nothing(one)]
+    return tuple(hashlib.sha256(repr(_plain(one)).encode()).hexdigest() for one in statements)
+
+
+def _says_nothing(statement: ast.AST) -> bool:
+    """Whether it is an import, a docstring, or what only types need."""
+    if isinstance(statement, ast.If):
+        return isinstance(statement.test, ast.Name) and statement.test.id == "TYPE_CHECKING"
+    if isinstance(statement, ast.Expr):
+        return isinstance(statement.value, ast.Constant)
+    return isinstance(statement, (ast.Import, ast.ImportFrom))
+
+
+def _plain(node: object) -> object:
+    """A syntax tree as plain values, the same in each version of Python that has this syntax."""
+    if isinstance(node, ast.AST):
+        return type(node).__name__, *_fields(node)
+    if isinstance(node, list):
+        return [_plain(one) for one in node if not (isinstance(one, ast.stmt) and _says_nothing(one))]
+    return node
+
+
+def _fields(node: ast.AST) -> Iterator[tuple[str, object]]:
+    for name, value in ast.iter_fields(node):
+        if value not in (None, []) and name not in ("ctx", "kind", "type_comment"):
+            yield name, _plain(value)

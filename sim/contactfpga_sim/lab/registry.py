@@ -1,0 +1,115 @@
+"""The studies: each is a folder beside this file, with one declaration, ``STUDY`` in its ``study.py``.
+
+A declaration names functions as ``module:function`` of the study's folder, or ``folder/file.py:function`` of the
+project's, so that it is read without what the study needs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent
+STUDIES: Mapping[str, str] = {
+    path.parent.name: f"{__package__}.{path.parent.name}.study" for path in sorted(FOLDER.glob("*/study.py"))
+}
+"""The module of each study's declaration, by name."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """A table, or other text, between two markers of a page."""
+
+    makes: str
+    """The function that gives its text; it takes what the study computes, or nothing."""
+    page: str = ""
+    """In ``docs``; empty for the study's page."""
+    needs: tuple[str, ...] = ()
+    """As :attr:`Study.needs`. Where one is absent, the section stays as it is."""
+    sample: str = ""
+    """A function that gives in less than a minute a part of the text, such as a row; it takes nothing."""
+    depends: str = ""
+    """A function that gives a text that changes with the section, such as that of a netlist; by default all code that
+    ``makes`` reaches decides."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Study:
+    """What a study makes, and what it takes to make it."""
+
+    package: str
+    """The study's folder: ``__package__``."""
+    title: str
+    page: str
+    """In ``docs``."""
+    minutes: float
+    """Two cores are busy with it, when nothing is kept from before."""
+    sections: Mapping[str, Section] = dataclasses.field(default_factory=dict)
+    """By the name in their markers; they are made in this order."""
+    compute: str = ""
+    """The function whose result sections and pictures share; it is called when the first of them asks for it."""
+    pictures: str = ""
+    """The function that draws into a folder, that of the pages, and gives the files."""
+    extra: str = "sim"
+    """The extra of ``pyproject.toml`` that has what it imports."""
+    needs: tuple[str, ...] = ()
+    """Programs, and files or folders whose names have a slash."""
+
+    @property
+    def name(self) -> str:
+        return self.package.rpartition(".")[2]
+
+    def page_of(self, section: str) -> str:
+        """The page in ``docs`` that has this section."""
+        return self.sections[section].page or self.page
+
+    def module(self, place: str) -> str:
+        """The module of a function, or its file."""
+        module = place.partition(":")[0]
+        return module if "/" in module else f"{self.package}.{module}"
+
+    def function(self, place: str) -> Callable[..., Any]:
+        """The function at a place."""
+        module, name = self.module(place), place.partition(":")[2]
+        if "/" in module:
+            file = Path(module).resolve()
+            if str(file.parent) not in sys.path:
+                sys.path.append(str(file.parent))
+            module = file.stem
+        found: Callable[..., Any] = getattr(importlib.import_module(module), name)
+        return found
+
+
+def load(name: str) -> Study:
+    """The declaration of a study; raises KeyError."""
+    found: Study = importlib.import_module(STUDIES[name]).STUDY
+    return found
+
+
+class Run:
+    """One run of a study: what it computes is computed once, when the first function asks for it."""
+
+    def __init__(self, study: Study):
+        self.study = study
+
+    @functools.cached_property
+    def computed(self) -> Any:
+        return self.study.function(self.study.compute)()
+
+    def call(self, place: str, *given: object) -> Any:
+        """What the function at a place gives."""
+        function = self.study.function(place)
+        parameters = inspect.signature(function).parameters.values()
+        wanted = sum(one.default is one.empty for one in parameters)
+        return function(*given, *([self.computed] if wanted > len(given) else []))
+
+    def text(self, section: str) -> str:
+        """The text of a section."""
+        text: str = self.call(self.study.sections[section].makes)
+        return text

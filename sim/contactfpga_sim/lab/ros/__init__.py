@@ -1,0 +1,1 @@
+"""Messages to nodes of ROS 2."""

@@ -1,0 +1,1 @@
+"""Changes of the gateware's source that the default tests notice."""

@@ -1,0 +1,200 @@
+"""The studies: each section of a page has one owner, and a toy study is made, listed and found out of date."""
+
+import inspect
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from study_pages import DOCS
+
+from contactfpga.errors import ContactFPGAError, MissingExtra
+from contactfpga_sim.lab import __main__ as runner
+from contactfpga_sim.lab import meaning, registry, writer
+from contactfpga_sim.lab.registry import Run, Section, Study
+
+ROOT = DOCS.parent
+DECLARED = [registry.load(name) for name in registry.STUDIES]
+PLACES = [
+    (study, place)
+    for study in DECLARED
+    for place in (
+        *(one for section in study.sections.values() for one in (section.makes, section.sample, section.depends)),
+        *(study.compute, study.pictures),
+    )
+    if place
+]
+SAMPLES = [(study, name) for study in DECLARED for name, section in study.sections.items() if section.sample]
+
+
+def test_each_section_of_a_page_has_one_owner():
+    """Also those of which the study has a section that no page shows."""
+    shown = Counter(
+        (page.name, name)
+        for page in (*DOCS.glob("*.md"), ROOT / "README.md")
+        for name in re.findall(r"^<!-- figures: (\w+)[^\n]*-->$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    owned = Counter((study.page_of(name), name) for study in DECLARED for name in study.sections)
+    assert owned == shown
+    assert set(owned.values()) == {1}
+
+
+def test_each_study_is_declared_in_its_own_folder():
+    assert [study.name for study in DECLARED] == list(registry.STUDIES)
+    for study in DECLARED:
+        assert (DOCS / study.page).is_file()
+        assert study.title
+        assert study.minutes > 0
+        assert study.sections or study.pictures
+
+
+@pytest.mark.parametrize(("study", "place"), PLACES, ids=lambda value: value if isinstance(value, str) else value.name)
+def test_each_function_that_is_declared_exists(study, place):
+    try:
+        parameters = inspect.signature(study.function(place)).parameters.values()
+    except ImportError as error:
+        pytest.skip(str(error))
+    wanted = sum(one.default is one.empty for one in parameters)
+    drawn = place == study.pictures
+    assert wanted in ((drawn, drawn + 1) if study.compute else (drawn,))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("study", "name"), SAMPLES, ids=lambda value: value if isinstance(value, str) else value.name)
+def test_a_part_of_each_section_that_is_quick_to_make_is_up_to_date(study, name):
+    absent = runner.lacking((*study.needs, *study.sections[name].needs))
+    if absent:
+        pytest.skip(f"needs {', '.join(absent)}")
+    part = Run(study).call(study.sections[name].sample)
+    assert f"\n{part}\n" in f"\n{writer.sections((DOCS / study.page_of(name)).read_text())[name].text}\n"
+
+
+# ---- a toy study: its declaration and its function
+
+
+MAKES = """
+from pathlib import Path
+
+def compute():
+    return [1, 2]
+
+def table(found):
+    return "| sum |\\n|---|\\n| " + str(sum(found)) + " |"
+
+def fixed():
+    return "always"
+
+def draw(folder, found):
+    (folder / "toy.svg").write_text(str(found))
+    return folder / "toy.svg"
+"""
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    """A project of one page and one study."""
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / "docs" / "toy.md"
+    page.write_text("a\n<!-- figures: toy -->\nold\n<!-- end -->\n<!-- figures: fixed of 1234 -->\nb\n<!-- end -->\n")
+    (tmp_path / "toys").mkdir()
+    (tmp_path / "toys" / "made_toy.py").write_text(MAKES)
+    sections = {"toy": Section("toys/made_toy.py:table"), "fixed": Section("toys/made_toy.py:fixed")}
+    places = {"compute": "toys/made_toy.py:compute", "pictures": "toys/made_toy.py:draw"}
+    declared = Study("lab.toy", title="Toys", page="toy.md", minutes=1, sections=sections, **places)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "STUDIES", {"toy": "its module"})
+    monkeypatch.setattr(registry, "load", {"toy": declared}.__getitem__)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    meaning._of.cache_clear()
+    meaning._marks.cache_clear()
+    yield page
+    sys.modules.pop("made_toy", None)
+
+
+def run(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["lab", *arguments])
+    return runner.main()
+
+
+def test_a_study_writes_its_sections_and_draws(toy, monkeypatch, capsys):
+    assert run(monkeypatch, "toy") == 0
+    written = writer.sections(toy.read_text())
+    assert written["toy"].text == "| sum |\n|---|\n| 3 |"
+    assert written["fixed"].text == "always"
+    assert all(re.fullmatch(r"[0-9a-f]{8}", one.fingerprint) for one in written.values())
+    assert toy.read_text().startswith("a\n")
+    assert Path("docs/images/toy.svg").read_text() == "[1, 2]"
+    assert capsys.readouterr().out.splitlines() == ["toy.md: toy", "toy.md: fixed", "drew docs/images/toy.svg"]
+
+
+def test_sections_are_out_of_date_once_what_they_are_made_by_means_something_else(toy, monkeypatch, capsys):
+    def stale():
+        meaning._of.cache_clear()
+        meaning._marks.cache_clear()
+        assert run(monkeypatch, "--stale") == 0
+        return [line for line in capsys.readouterr().out.splitlines() if line]
+
+    assert stale() == ["toy.md: toy: make pages NAME=toy", "toy.md: fixed: make pages NAME=toy"]
+    run(monkeypatch, "--all")
+    capsys.readouterr()
+    assert stale() == []
+    code = Path("toys/made_toy.py")
+    code.write_text(
+        '"""Explained."""\nimport os\n# and more\n' + MAKES.replace("    return [1", '    "It."\n    return  [1')
+    )
+    assert stale() == []
+    moved = MAKES.partition("def fixed")
+    code.write_text("from beside_toy import fixed, draw\n" + moved[0])
+    Path("toys/beside_toy.py").write_text("".join(moved[1:]))
+    assert stale() == []
+    code.write_text(code.read_text().replace("[1, 2]", "[1, 3]"))
+    assert len(stale()) == 2
+
+
+def test_what_the_machine_lacks_is_told_and_left_out_of_all(toy, monkeypatch, capsys):
+    whole = registry.load("toy")
+    lacking = Study("lab.toy", title="Toys", page="toy.md", minutes=1, needs=("no-such-program", "no/such/folder"))
+    monkeypatch.setattr(registry, "load", {"toy": lacking}.__getitem__)
+    with pytest.raises(ContactFPGAError, match=r"^toy needs no-such-program, no/such/folder$"):
+        run(monkeypatch, "toy")
+    assert run(monkeypatch, "--all") == 0
+    assert capsys.readouterr().err == "left out: toy needs no-such-program, no/such/folder\n"
+    without = {"toy": Section("toys/made_toy.py:table", needs=("no/such/folder",))}
+    part = Study("lab.toy", title="T", page="toy.md", minutes=1, sections=without, compute=whole.compute)
+    monkeypatch.setattr(registry, "load", {"toy": part}.__getitem__)
+    assert run(monkeypatch, "toy") == 0
+    assert capsys.readouterr().out == "toy.md: toy stays as it is without no/such/folder\n"
+    assert "old" in toy.read_text()
+
+
+def test_a_package_that_is_not_installed_is_told_with_its_extra(toy, monkeypatch):
+    Path("toys/made_toy.py").write_text("import no_such_package_of_anybody")
+    with pytest.raises(MissingExtra, match=r"^toy needs more than is installed; .*'\.\[sim\]'"):
+        run(monkeypatch, "toy")
+
+
+def test_all_studies_are_listed_without_what_they_need(monkeypatch, capsys):
+    assert run(monkeypatch, "--list") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(registry.STUDIES)
+    assert run(monkeypatch, "--list", "--quick") == 0
+    assert 0 < len(capsys.readouterr().out.splitlines()) < len(lines)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nobody"], r"study 'nobody' is not known; take one of: toy"),
+        ([], "name a study, or give --all or --list"),
+    ],
+)
+def test_what_cannot_be_made_is_refused(toy, monkeypatch, arguments, message):
+    with pytest.raises((ContactFPGAError, ValueError), match=message):
+        run(monkeypatch, *arguments)
+
+
+def test_a_study_is_refused_where_there_are_no_pages(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ContactFPGAError, match="there is no folder 'docs' here"):
+        run(monkeypatch, "--all")

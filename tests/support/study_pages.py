@@ -1,0 +1,19 @@
+"""Sections of the pages as they stand there, and as their studies make them now."""
+
+from pathlib import Path
+
+from contactfpga_sim.lab import registry, writer
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def section(page, name):
+    """The text of a section of a page in ``docs``."""
+    return writer.sections((DOCS / page).read_text(encoding="utf-8"))[name].text
+
+
+def outdated(study, *names, without=()):
+    """Sections of a study, of these names or all, that it would make otherwise now."""
+    run = registry.Run(registry.load(study))
+    named = names or [name for name in run.study.sections if name not in without]
+    return [name for name in named if run.text(name) != section(run.study.page_of(name), name)]
