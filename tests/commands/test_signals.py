@@ -122,6 +122,15 @@ def body():
     except BaseException:
         raise PortNotFound("no such port") from None
 """,
+    "nothing": """
+import os
+def body():
+    try:
+        os.kill(os.getpid(), NUMBER)
+        for _ in range(100): pass
+    except BaseException:
+        pass
+""",
     "twice": """
 import os
 def body():
@@ -146,11 +155,33 @@ def test_a_signal_that_others_make_something_of(how, number):
     assert (done.returncode, done.stderr) == (STATUSES[number], "")
 
 
+TEXT = "exec('import os; os.kill(os.getpid(), NUMBER); [0 for _ in range(100)]')"
+"""A signal while Python runs a text, as it does to make a dataclass; `python -m` then ended by SIGINT."""
+IN_A_TEXT = {
+    "raised": f"""
+def body():
+    {TEXT}
+""",
+    "dropped": f"""
+def body():
+    try:
+        {TEXT}
+    except BaseException:
+        return 0
+""",
+    "usual end": f"""
+def body():
+    with interrupt.usual_end():
+        {TEXT}
+""",
+}
+
+
 @pytest.mark.parametrize("number", SIGNALS)
-def test_a_signal_while_python_runs_a_text(number, tmp_path):
-    """As it does to make a dataclass, with which `python -m` ended by SIGINT."""
-    body = f"def body():\n    exec('import os; os.kill(os.getpid(), {int(number)}); [0 for _ in range(100)]')\n"
-    (tmp_path / "started.py").write_text(STARTS.replace("WORK", body))
+@pytest.mark.parametrize("how", IN_A_TEXT)
+def test_a_signal_while_python_runs_a_text(how, number, tmp_path):
+    program = STARTS.replace("WORK", IN_A_TEXT[how]).replace("NUMBER", str(int(number)))
+    (tmp_path / "started.py").write_text(program)
     done = subprocess.run(
         [sys.executable, "-m", "started"],
         capture_output=True,
@@ -158,7 +189,7 @@ def test_a_signal_while_python_runs_a_text(number, tmp_path):
         timeout=25,
         env=environment(PYTHONPATH=os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])),
     )
-    assert (done.returncode, done.stderr) == (STATUSES[number], "")
+    assert (done.returncode, done.stderr) == (0 if how == "usual end" else STATUSES[number], "")
 
 
 def test_what_fails_after_the_usual_end_is_told(capsys):

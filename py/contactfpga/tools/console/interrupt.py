@@ -40,32 +40,38 @@ def guarded(body: Callable[[], int | None]) -> int:
     global _came
     _came = None
     terminal.prepare()
-    with _listening():
-        try:
-            status = body() or 0
-            sys.stdout.flush()
-            return status
-        except KeyboardInterrupt as interrupt:
-            return _cut_short(str(interrupt))
-        except ContactFPGAError as error:
-            return failed(error)
-        except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
-            terminal.drop_unwritable()
-            return 0
-        except OSError as error:
-            terminal.drop_unwritable()
-            return failed(_told(error))
-        except Exception:
-            if _came is None:
-                raise
-            return _cut_short()  # whatever was made of it, as by a module that it kept from being imported
+    try:
+        with _listening():
+            return _status(body)
+    finally:
+        # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by
+        # SIGINT, whatever the status, unless another text is run to its end.
+        exec("")
+
+
+def _status(body: Callable[[], int | None]) -> int:
+    try:
+        status = body() or 0
+        sys.stdout.flush()
+        return status if _came is None else _cut_short()  # whoever kept the signal to himself
+    except KeyboardInterrupt as interrupt:
+        return _cut_short(str(interrupt))
+    except ContactFPGAError as error:
+        return failed(error)
+    except BrokenPipeError:  # `contactfpga zones --json | head` closed its end, which is no error
+        terminal.drop_unwritable()
+        return 0
+    except OSError as error:
+        terminal.drop_unwritable()
+        return failed(_told(error))
+    except Exception:
+        if _came is None:
+            raise
+        return _cut_short()  # whatever was made of it, as by a module that it kept from being imported
 
 
 def _cut_short(said: str = "") -> int:
     number = signal.SIGINT if _came is None else _came
-    # Where the signal came while Python ran a text, as it does to make a dataclass, it would end the process by SIGINT,
-    # whatever the status, unless another text is run to its end.
-    exec("")
     if threading.current_thread() is threading.main_thread():
         signals.end_all_at_once()  # should it be told twice
     if said:
