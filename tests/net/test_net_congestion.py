@@ -9,7 +9,6 @@ from net_processes import Relay, free_endpoint
 from small_port import SmallPort, published
 
 import contactfpga
-from contactfpga.driver import transport
 from contactfpga.robot.net import port as net_port
 from contactfpga.robot.net import session
 from contactfpga.robot.net.message import Message
@@ -34,7 +33,7 @@ class FirstKept(net_port.ZenohPort):
 
 @pytest.mark.parametrize("block", [False, True], ids=["drop", "block"])
 def test_what_a_slow_network_does_not_take_is_counted(block, monkeypatch):
-    monkeypatch.setattr(transport, "ZenohPort", FirstKept)
+    monkeypatch.setattr(net_port, "ZenohPort", FirstKept)
     endpoint = free_endpoint()
     source = SmallPort()
     with (

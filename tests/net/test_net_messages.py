@@ -10,8 +10,8 @@ import contactfpga
 from contactfpga.driver.address import parse
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.driver.stats import NetCounters
-from contactfpga.robot.net.address import LOOPBACK, is_loopback, key_of, own_endpoint
 from contactfpga.robot.net.message import BEAT_S, MOST_BYTES, QUIET_S, Message, Stream
+from contactfpga.robot.net.session import LOOPBACK, is_loopback, key_of, own_endpoint
 from contactfpga.wire.asked import Asked, asked_in
 from contactfpga.wire.command import Command, encode_command
 from contactfpga.wire.protocol import encode_request

@@ -16,8 +16,8 @@ from net_processes import Streaming, free_endpoint, publish, router
 
 import contactfpga
 from contactfpga.robot.net import session
-from contactfpga.robot.net.address import own_endpoint
 from contactfpga.robot.net.message import Message
+from contactfpga.robot.net.session import own_endpoint
 from contactfpga.tools import cli
 
 pytest.importorskip("zenoh")

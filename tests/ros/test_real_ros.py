@@ -14,8 +14,8 @@ import pytest
 from ros_board import SKIN, flowing
 from ros_environment import DISTRIBUTIONS, Environment
 
-from contactfpga.robot.ros.hashes import type_hash
 from contactfpga.robot.ros.settings import TOPICS
+from contactfpga.robot.ros.types import type_hash
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(3600)]
 

@@ -11,8 +11,7 @@ from contactfpga import Skin
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.robot.haptics import LoadCells, Plane, Unit, contacts
-from contactfpga.robot.ros.feed import Feed
-from contactfpga.robot.ros.moments import Moments
+from contactfpga.robot.ros.feed import Feed, Moments
 from contactfpga.robot.ros.settings import TOPICS, Settings
 from contactfpga.zones.host_line import HostLine
 

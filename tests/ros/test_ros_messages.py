@@ -11,8 +11,8 @@ from tracked import SKIN, frame
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.robot.ros import cdr, convert, hashes, types
-from contactfpga.robot.ros.standard import STANDARD
+from contactfpga.robot.ros import cdr, convert, types
+from contactfpga.robot.ros.types import STANDARD
 
 
 @pytest.mark.parametrize(("name", "message"), list(samples()), ids=lambda one: one if isinstance(one, str) else "")
@@ -43,7 +43,7 @@ def assert_same(read, meant):
 def test_hashes_are_those_of_rosbags_in_each_distribution(which):
     store = ros_types.store(which)
     for name in [*ros_types.OURS, *STANDARD]:
-        assert hashes.type_hash(name) == store.hash_rihs01(ros_types.full(name)), name
+        assert types.type_hash(name) == store.hash_rihs01(ros_types.full(name)), name
 
 
 @pytest.mark.parametrize("name", ros_types.OURS)

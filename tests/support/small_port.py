@@ -7,7 +7,7 @@ import time
 from model_board import ModelBoard
 
 import contactfpga
-from contactfpga.robot.net.publisher import Publisher
+from contactfpga.robot.net.publisher import BoardPublisher
 
 
 class SmallPort(ModelBoard):
@@ -75,7 +75,7 @@ class SmallPort(ModelBoard):
 def published(source, network, key, **options):
     """A publisher in a thread of its own; it may be ended before the block's end."""
     stop = threading.Event()
-    publisher = Publisher(source, network, key, **options)
+    publisher = BoardPublisher(source, network, key, **options)
     thread = threading.Thread(target=publisher.run, args=(stop,))
     thread.start()
 

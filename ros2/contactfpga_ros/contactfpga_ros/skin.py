@@ -21,9 +21,9 @@ from contactfpga import ContactFPGAError
 from contactfpga import open as open_board
 from contactfpga.driver.driver import Board
 from contactfpga.robot.haptics import WithReadings
-from contactfpga.robot.ros import convert, diagnostics
+from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
-from contactfpga.robot.ros.feed import Feed
+from contactfpga.robot.ros.feed import Feed, lost_board
 from contactfpga.robot.ros.settings import TOPICS, Settings, Topic
 from contactfpga.tools.console.forces import Forces
 
@@ -138,7 +138,7 @@ class Skin(Node):
     def _lost(self, why: str) -> None:
         self.get_logger().error(why, throttle_duration_sec=10.0)
         name = self._settings.frame or "skin"
-        message = diagnostics.lost(name, why, convert.header(self._now_ns(), ""))
+        message = lost_board(name, why, convert.header(self._now_ns(), ""))
         self._send("/diagnostics", encode(TOPICS["/diagnostics"].type, message))
 
     def _send(self, topic: str, data: bytes) -> None:

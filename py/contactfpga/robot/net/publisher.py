@@ -25,7 +25,7 @@ SIMULATED_S = 0.002
 """The most simulated time that passes at once."""
 
 
-class Source(Protocol):
+class ByteSource(Protocol):
     """A transport of the driver."""
 
     threaded: bool
@@ -37,7 +37,7 @@ class Source(Protocol):
     def clock(self) -> float: ...
 
 
-class Publisher:
+class BoardPublisher:
     """One board under one key: ``KEY/bytes`` from it, ``KEY/ask`` to it, ``KEY/alive/...`` as long as this runs.
 
     ``batch_s``: how long bytes are collected before they are sent. ``block``: where the network is too slow, wait and
@@ -47,7 +47,7 @@ class Publisher:
 
     def __init__(
         self,
-        source: Source,
+        source: ByteSource,
         session: zenoh.Session,
         key: str,
         *,
@@ -75,13 +75,13 @@ class Publisher:
         """Publish until told to stop. Raises :class:`~contactfpga.PortLost` where the board is gone."""
         try:
             while not stop.is_set():
-                self.turn()
+                self.step()
         finally:
             self._token.undeclare()
             self._in.undeclare()
             self._out.undeclare()
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Send what comes next."""
         data = self._read(BEAT_S)
         read_us = round(self._clock() * 1e6)

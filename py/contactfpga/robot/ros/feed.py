@@ -1,18 +1,19 @@
-"""From what a board sends to messages: which, and when. The same for a ROS 2 node and for Cyclone DDS."""
+"""From what a board sends to messages: which, and when; and how the board fares. The same for a ROS 2 node and for
+Cyclone DDS."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 from contactfpga.errors import ReadTimeout, ReplayEnded
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
-from contactfpga.robot.ros.diagnostics import Diagnostics
+from contactfpga.robot.ros.convert import Message
 from contactfpga.robot.ros.markers import markers, outline
-from contactfpga.robot.ros.moments import Moments
 from contactfpga.robot.ros.settings import TOPICS, Settings
+from contactfpga.skin.limits import MAX_KEEP_ALIVE_MS
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Event, Tracks
 from contactfpga.zones.zone import Zones
@@ -20,6 +21,131 @@ from contactfpga.zones.zone import Zones
 if TYPE_CHECKING:
     from contactfpga.driver.driver import Board
     from contactfpga.robot.haptics import Contacts
+    from contactfpga.robot.haptics.live import FrameSource
+
+KEPT_S = 1.0
+"""The difference of the clocks is measured as often: they drift apart, and a clock may be set."""
+_TRIES = 5
+
+
+class Moments:
+    """From the board's clock to that of the messages."""
+
+    def __init__(self, now_ns: Callable[[], int], clock: Callable[[], float]):
+        self._now_ns = now_ns
+        self._clock = clock
+        self._until = -1e300
+        self._offset_ns = 0
+
+    def now(self) -> int:
+        """In ns."""
+        return self._now_ns()
+
+    def of(self, zones: Zones) -> int:
+        """When a frame was sampled, in ns; of a recording, which does not say so, now."""
+        return self._now_ns() if zones.host_time_s is None else self._shifted(zones.host_time_s)
+
+    def _shifted(self, seconds: float) -> int:
+        now = self._clock()
+        if not self._until - KEPT_S <= now < self._until:
+            self._offset_ns = self._measured()
+            self._until = now + KEPT_S
+        return round(seconds * 1e9) + self._offset_ns
+
+    def _measured(self) -> int:
+        """The difference of the clocks, by the reading that was interrupted for the shortest time."""
+        found = []
+        for _ in range(_TRIES):
+            before, now_ns, after = self._clock(), self._now_ns(), self._clock()
+            found.append((after - before, now_ns - round((before + after) / 2 * 1e9)))
+        return min(found)[1]
+
+
+OK, WARN, ERROR = range(3)
+WAITED_S = 0.25
+"""Frames that wait for longer until they are taken are told."""
+
+_COUNTED = ("frames", "lost", "dropped", "overwritten", "resynchronized", "restarts", "skin_changes")
+_TROUBLE = ("lost", "damaged", "dropped", "restarts")
+"""Of these a new one since the last message is a warning."""
+
+
+class Diagnostics:
+    """Counts between two messages."""
+
+    def __init__(self, board: Board, name: str, silence_s: float):
+        self._board = board
+        self._name = name
+        self._silence_s = silence_s + (MAX_KEEP_ALIVE_MS / 1000 if board.hello.send == "on_change" else 0)
+        self._heard_s = self._since_s = board.clock()
+        self._before: dict[str, int] = {}
+        self._waited_s = 0.0
+        self._flags: set[str] = set()
+        self._faults: tuple[str, ...] = ()
+
+    def frame(self, zones: Zones) -> None:
+        """A frame came."""
+        self._heard_s = self._board.clock()
+        if zones.arrived_s is not None:
+            self._waited_s = max(self._waited_s, self._heard_s - zones.arrived_s)
+        self._flags |= zones.flags
+        self._faults = zones.faults
+
+    @property
+    def silent(self) -> bool:
+        """No frame came for too long."""
+        return self._board.clock() - self._heard_s > self._silence_s
+
+    def message(self, head: Message, left_out: int) -> Message:
+        """A ``DiagnosticArray`` of what happened since the message before."""
+        counts = self._counts() | {"not published": left_out}
+        now, frames = self._board.clock(), counts["frames"] - self._before.get("frames", 0)
+        rate = frames / (now - self._since_s) if now > self._since_s else 0.0
+        level, text = self._said(counts, now)
+        values: dict[str, object] = {
+            "port": self._board.port,
+            "frames per second": f"{rate:.0f}",
+            "faults": ", ".join(self._faults),
+        }
+        found = _array(head, self._name, level, text, self._board.fingerprint.hex(), values | counts)
+        self._before, self._since_s = counts, now
+        self._waited_s = 0.0
+        self._flags.clear()
+        return found
+
+    def _counts(self) -> dict[str, int]:
+        stats = self._board.stats
+        return {name: int(getattr(stats, name)) for name in _COUNTED} | {"damaged": stats.damaged.total()}
+
+    def _said(self, counts: dict[str, int], now: float) -> tuple[int, str]:
+        if self.silent:
+            return ERROR, f"no frame for {now - self._heard_s:.1f} s; the sheet may be touched"
+        said = [f"{counts[name] - self._before.get(name, 0)} {name}" for name in _TROUBLE if self._more(counts, name)]
+        said += [f"flagged {flag}" for flag in ("mismatch", "overflow") if flag in self._flags]
+        if self._waited_s > WAITED_S:
+            said.append(f"frames waited for {self._waited_s:.1f} s: the computer is too busy")
+        said += self._faults
+        return (WARN, "; ".join(said)) if said else (OK, "frames come")
+
+    def _more(self, counts: dict[str, int], name: str) -> bool:
+        return counts[name] > self._before.get(name, 0)
+
+
+def lost_board(name: str, why: str, head: Message) -> Message:
+    """A ``DiagnosticArray`` where no board is connected."""
+    return _array(head, name, ERROR, why, "", {})
+
+
+def _array(head: Message, name: str, level: int, text: str, hardware: str, values: Mapping[str, object]) -> Message:
+    status = {
+        "level": level,
+        "name": f"contactfpga: {name}",
+        "message": text,
+        "hardware_id": hardware,
+        "values": [{"key": key, "value": str(value)} for key, value in values.items()],
+    }
+    return {"header": head, "status": [status]}
+
 
 QUEUE = 4096
 """Frames that wait while others are published."""
@@ -34,12 +160,6 @@ Send = Callable[[str, bytes], None]
 """Publishes a message, written as CDR, by the name of its topic in :data:`TOPICS`."""
 Felt = Callable[[Zones, Tracks], "Contacts | None"]
 """The forces at the zones of a frame, from pressure units; None: no readings belong to it."""
-
-
-class Frames(Protocol):
-    """A subscription, or what else gives frames in order."""
-
-    def next(self, timeout: float = 1.0) -> Zones: ...
 
 
 class Feed:
@@ -72,7 +192,7 @@ class Feed:
         self._due = dict.fromkeys(("zones", "markers", "diagnostics"), -1e300)
         self._diagnostics = Diagnostics(board, self._frame, self.settings.silence_s)
 
-    def run(self, frames: Frames, stop: Callable[[], bool] = lambda: False) -> None:
+    def run(self, frames: FrameSource, stop: Callable[[], bool] = lambda: False) -> None:
         """Publish until ``stop`` says so, or a recording ends; errors as for :meth:`Board.next`."""
         self.begin()
         while not stop():

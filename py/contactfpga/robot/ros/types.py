@@ -1,16 +1,67 @@
-"""The types of messages: read from their texts, which are the same files that a ROS workspace builds."""
+"""The types of messages, read from their texts, which are the same files that a ROS workspace builds; and the hash by
+which ROS 2 tells whether two programs mean the same type (REP 2011)."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
+import json
 from importlib.resources import files
 from pathlib import Path
-
-from contactfpga.robot.ros.standard import STANDARD
+from typing import Any
 
 PACKAGE = "contactfpga_msgs"
 """Of our own messages."""
+
+STANDARD = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec\n",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "std_msgs/ColorRGBA": "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+    "geometry_msgs/Pose": "Point position\nQuaternion orientation\n",
+    "geometry_msgs/Transform": "Vector3 translation\nQuaternion rotation\n",
+    "geometry_msgs/TransformStamped": "std_msgs/Header header\nstring child_frame_id\nTransform transform\n",
+    "geometry_msgs/Wrench": "Vector3 force\nVector3 torque\n",
+    "geometry_msgs/WrenchStamped": "std_msgs/Header header\nWrench wrench\n",
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    "diagnostic_msgs/KeyValue": "string key\nstring value\n",
+    "diagnostic_msgs/DiagnosticStatus": """byte level
+string name
+string message
+string hardware_id
+KeyValue[] values
+""",
+    "diagnostic_msgs/DiagnosticArray": "std_msgs/Header header\nDiagnosticStatus[] status\n",
+    "sensor_msgs/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data\n",
+    "visualization_msgs/UVCoordinate": "float32 u\nfloat32 v\n",
+    "visualization_msgs/MeshFile": "string filename\nuint8[] data\n",
+    "visualization_msgs/Marker": """std_msgs/Header header
+string ns
+int32 id
+int32 type
+int32 action
+geometry_msgs/Pose pose
+geometry_msgs/Vector3 scale
+std_msgs/ColorRGBA color
+builtin_interfaces/Duration lifetime
+bool frame_locked
+geometry_msgs/Point[] points
+std_msgs/ColorRGBA[] colors
+string texture_resource
+sensor_msgs/CompressedImage texture
+UVCoordinate[] uv_coordinates
+string text
+string mesh_resource
+MeshFile mesh_file
+bool mesh_use_embedded_materials
+""",
+    "visualization_msgs/MarkerArray": "Marker[] markers\n",
+}
+"""The standard messages of ROS 2 that we use: their fields, in their order, as Jazzy and Kilted have them."""
 
 PRIMITIVES = {
     "bool": "?",
@@ -119,3 +170,56 @@ def _field(package: str, kind: str, name: str) -> Field:
     if kind not in PRIMITIVES and kind != "string" and "/" not in kind:
         kind = f"{package}/{kind}"
     return Field(name, kind, int(size.rstrip("]") or 0) if bracket else None)
+
+
+_NUMBERS = {
+    "int8": 2,
+    "uint8": 3,
+    "int16": 4,
+    "uint16": 5,
+    "int32": 6,
+    "uint32": 7,
+    "int64": 8,
+    "uint64": 9,
+    "float32": 10,
+    "float64": 11,
+    "bool": 15,
+    "byte": 16,
+    "string": 17,
+}
+_NESTED, _FIXED_ARRAY, _ANY_ARRAY = 1, 48, 144
+"""What is added to a type's number for an array of a fixed and of any length."""
+
+
+@functools.cache
+def type_hash(name: str) -> str:
+    """``RIHS01_`` and 64 hexadecimal digits."""
+    described = {
+        "type_description": _described(message_type(name)),
+        "referenced_type_descriptions": [_described(one) for one in needed(name)],
+    }
+    return "RIHS01_" + hashlib.sha256(json.dumps(described).encode()).hexdigest()
+
+
+def _described(kind: MessageType) -> dict[str, Any]:
+    return {"type_name": _full(kind.name), "fields": [_described_field(field) for field in kind.fields]}
+
+
+def _described_field(field: Field) -> dict[str, Any]:
+    number = _NESTED if field.nested else _NUMBERS[field.type]
+    if field.count is not None:
+        number += _FIXED_ARRAY if field.count else _ANY_ARRAY
+    return {
+        "name": field.name,
+        "type": {
+            "type_id": number,
+            "capacity": field.count or 0,
+            "string_capacity": 0,
+            "nested_type_name": _full(field.type) if field.nested else "",
+        },
+    }
+
+
+def _full(name: str) -> str:
+    package, _, short = name.partition("/")
+    return f"{package}/msg/{short}"

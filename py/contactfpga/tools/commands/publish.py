@@ -16,12 +16,12 @@ from contactfpga.driver import driver
 from contactfpga.driver.address import NET, SheetOf, checked_key
 from contactfpga.driver.transport import connect
 from contactfpga.errors import ContactFPGAError
-from contactfpga.robot.net import address
+from contactfpga.robot.net.session import is_loopback, key_of
 from contactfpga.tools.console import flags, interrupt, numbers, terminal
 
 if TYPE_CHECKING:
     from contactfpga.driver.transport import Transport
-    from contactfpga.robot.net.publisher import Publisher
+    from contactfpga.robot.net.publisher import BoardPublisher
 
 EXTRA = "net"
 
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if args.key is not None and len(args.ports) > 1:
         raise ContactFPGAError(f"--key {args.key} names one board, and there are {len(args.ports)}; leave it out")
     from contactfpga.robot.net import session
-    from contactfpga.robot.net.publisher import Publisher
+    from contactfpga.robot.net.publisher import BoardPublisher
 
     key = None if args.key is None else checked_key(args.key)
     boards = _look(args, key)
@@ -68,12 +68,12 @@ def run(args: argparse.Namespace) -> int:
     with contextlib.ExitStack() as ending:
         open_session = session.connected if args.connect else session.listening
         network = ending.enter_context(open_session(here, args.config))
-        publishers: dict[Publisher, Transport] = {}
+        publishers: dict[BoardPublisher, Transport] = {}
         for of, (device, baud) in boards.items():
             transport = connect(device, baud)
             ending.callback(transport.close)
             options = {"batch_s": batch_s, "block": block, "commands": args.allow_commands}
-            publishers[Publisher(transport, network, of, **options)] = transport
+            publishers[BoardPublisher(transport, network, of, **options)] = transport
         for of in boards:
             print(f"{NET}{of}" + (f"?connect={here}" if here else ""), flush=True)
         _warn(args)
@@ -87,7 +87,7 @@ def _look(args: argparse.Namespace, key: str | None) -> dict[str, tuple[str, int
         if port is not None and port.startswith(("replay:", NET)):
             raise ContactFPGAError(f"port is {port!r}; publish a board, not a recording or what is published already")
         with driver.open(port, args.skin, baud=args.baud, timeout=args.timeout) as board:
-            of = key or address.key_of(board.hello.name, board.hello.fingerprint)
+            of = key or key_of(board.hello.name, board.hello.fingerprint)
             if of in found:
                 _refuse(found[of][0], board.port, of)
             found[of] = board.port, args.baud or board.hello.baud
@@ -111,7 +111,7 @@ def _place(port: str) -> tuple[str, int | None]:
     return name if virtual else os.path.realpath(name), number
 
 
-def _publish(publishers: Mapping[Publisher, Transport]) -> int:
+def _publish(publishers: Mapping[BoardPublisher, Transport]) -> int:
     """One thread each. If a board is gone, the others go on."""
     stop = threading.Event()
     ended: queue.SimpleQueue[Exception] = queue.SimpleQueue()
@@ -147,7 +147,7 @@ def _ended(ended: queue.SimpleQueue[Exception]) -> list[Exception]:
 
 
 def _run(
-    publisher: Publisher, transport: Transport, stop: threading.Event, ended: queue.SimpleQueue[Exception]
+    publisher: BoardPublisher, transport: Transport, stop: threading.Event, ended: queue.SimpleQueue[Exception]
 ) -> None:
     try:
         publisher.run(stop)
@@ -158,7 +158,7 @@ def _run(
 
 
 def _warn(args: argparse.Namespace) -> None:
-    if args.listen and not address.is_loopback(args.listen) and args.config is None:
+    if args.listen and not is_loopback(args.listen) and args.config is None:
         terminal.say(
             f"whoever reaches {args.listen} can read this board; docs/net.md says how to ask for certificates and "
             "users",

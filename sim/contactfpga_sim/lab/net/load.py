@@ -16,7 +16,7 @@ import numpy as np
 
 import contactfpga
 from contactfpga.robot.net import session
-from contactfpga.robot.net.publisher import Publisher
+from contactfpga.robot.net.publisher import BoardPublisher
 from contactfpga_sim.lab.net import source
 
 SECONDS = 5.0
@@ -104,7 +104,7 @@ def _publish(pipe: Connection, endpoint: str, links: range, batch_s: float, full
     with session.connected(endpoint) as network:
         stop = threading.Event()
         for number, board in enumerate(boards):
-            publisher = Publisher(board, network, f"load/{number}", batch_s=batch_s)
+            publisher = BoardPublisher(board, network, f"load/{number}", batch_s=batch_s)
             threading.Thread(target=publisher.run, args=(stop,), daemon=True).start()
         bare = network.declare_publisher("bare/pair", express=True)
         pipe.send("ready")
