@@ -94,6 +94,7 @@ def test_the_arms_table_is_said_before_its_pictures(tmp_path, monkeypatch, capsy
     assert "18.91" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_time_to_compile_is_no_part_of_the_speed_of_a_replay(tmp_path, monkeypatch, capsys):
     from contactfpga.tools.commands import replay
     from contactfpga_sim.model.board import native

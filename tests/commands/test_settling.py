@@ -9,6 +9,7 @@ import tomllib
 import numpy as np
 import pytest
 from model_board import DirectPort
+from sample import sample
 
 import contactfpga
 from contactfpga import Skin
@@ -101,7 +102,10 @@ def test_the_sheet_of_a_file_has_its_circuits_times(capsys, tmp_path):
     assert {cell for row in clocks[1:] for cell in row} == {predicted(cells[0])[1, 0]}
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), contactfpga.ReadTimeout("no frame came")])
+ERRORS = [KeyboardInterrupt(), contactfpga.ReadTimeout("no frame came")]
+
+
+@pytest.mark.parametrize("error", sample(ERRORS, quick=ERRORS[:1], slow=ERRORS[1:]))
 def test_what_was_found_is_told_and_the_board_left_as_it_was(capsys, error):
     """It ends while the board samples early, in the middle of a frame."""
     pressed, stops = np.ones((4, 4), bool), [0.03125]

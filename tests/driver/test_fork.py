@@ -87,6 +87,7 @@ again = contactfpga.open(port)
     assert board.asked - asked <= 6, "a child asked"
 
 
+@pytest.mark.slow
 def test_children_of_a_busy_board_end_at_any_moment(board):
     """While other threads of the parent read, ask and hold locks."""
     board.stream = board.frame

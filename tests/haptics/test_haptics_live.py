@@ -163,6 +163,7 @@ def test_a_drifted_unit_is_named_with_its_drift():
     assert forces.to_dict()["drifted"] == [1]
 
 
+@pytest.mark.slow
 def test_a_sheet_without_surface_is_refused():
     with contactfpga.open(VirtualBoard(SKIN, Scene(())), SKIN) as board:
         with pytest.raises(HapticsError, match="surface is missing"):

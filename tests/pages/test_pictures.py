@@ -26,6 +26,7 @@ def test_words_are_large_enough(path):
 
 
 @every_picture
+@pytest.mark.slow
 def test_words_are_whole(path):
     picture = svg_texts.read(path)
     for one in picture.words:

@@ -65,6 +65,7 @@ def test_the_table_has_the_papers_numbers_beside_ours(capsys, tmp_path, ran_befo
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_columns_are_what_they_are_called(found):
     assert list(found) == ["6 ms", "UART", "pin", "limit alone", "at 12 N, 6 ms", "at 12 N, no limit"]
     outcomes = [result.outcome for result in found.values()]

@@ -462,6 +462,7 @@ def test_the_highest_amount_is_drawn_where_its_axis_says(turned):
     assert heights == {knob_pictures.TOP, knob_pictures.TOP + knob_pictures.HIGH / 2}  # two zones, and one
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_study(tmp_path, capsys):
     assert cli.main(["study", "failures", "--study", "diodes", "--output", str(tmp_path)]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["diodes.svg", "failures.md"]

@@ -113,6 +113,7 @@ def loaded(copy):
     return [Path(line) for line in run(copy, LOADED, copy / "py/contactfpga")]
 
 
+@pytest.mark.slow
 def test_python_loads_all_gateware_but_that_of_boards(copy, loaded):
     gateware = copy / "hdl/contactfpga_hdl"
     there = {path for path in gateware.rglob("*.py") if path.parent != gateware / "board"}
