@@ -96,7 +96,6 @@ def test_yield():
 def test_yield_is_where_the_mean_pressure_is_the_strength_times_its_ratio():
     ball = Ball(0.03, 2e5)
     depth = elastic.yield_indentation_m(ball, 4e4)
-    assert elastic.mean_pressure_pa(ball, depth) == pytest.approx(1.1 * 4e4, rel=1e-12)
     force = elastic.stiffness(ball) * depth**1.5
     assert force / (math.pi * ball.patch_m(force) ** 2) == pytest.approx(1.1 * 4e4, rel=1e-12)
 
@@ -136,6 +135,4 @@ def test_modulus_of_an_incompressible_foam_and_of_two_bodies():
     assert elastic.effective_modulus_pa(3e5, 0.0) == 3e5
     assert elastic.effective_modulus_pa(3e5, 0.5, 3e5, 0.5) == pytest.approx(2e5, rel=1e-15)
     assert elastic.young_pa(4e5, 0.5) == pytest.approx(3e5)
-    assert elastic.effective_radius_m(0.038, 0.038) == pytest.approx(0.019)
-    assert elastic.effective_radius_m(0.038) == 0.038
     assert elastic.ball_of(elastic.stiffness(Ball(0.02, 3e5)), 0.02).modulus_pa == pytest.approx(3e5)

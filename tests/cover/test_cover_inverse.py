@@ -7,7 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from impacts import FIRST, SPEED, arm
 
-from contactfpga.design.cover import Ball, CoverError, NoSolution, elastic, impact, motion
+from contactfpga.design.cover import Ball, CoverError, NoSolution, elastic, impact
+from contactfpga.design.cover import arm as motion
 from contactfpga.design.cover.arm import Arm
 from contactfpga.design.cover.impact import Impact
 

@@ -8,7 +8,8 @@ import pytest
 from impacts import FIRST, ROWS, SPEED, arm
 from scipy import integrate
 
-from contactfpga.design.cover import CoverError, NoSolution, impact, motion, solve
+from contactfpga.design.cover import CoverError, NoSolution, impact, solve
+from contactfpga.design.cover import arm as motion
 from contactfpga.design.cover.arm import Arm, speed2
 
 # ---- the equation of motion

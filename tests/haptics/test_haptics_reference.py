@@ -7,8 +7,8 @@ import pytest
 from bumpers import exerted, flat, hexapod, on_cylinder, touch, units, wrench
 
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, Sheet
-from contactfpga.design.cover.switch import Switch
 from contactfpga.robot.haptics import Closing, Cylinder, LoadCells, Locator, Plane, Reach, contacts, posterior
 from contactfpga.skin import sheet
 

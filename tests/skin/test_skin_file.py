@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactfpga import Skin, SkinError, examples
-from contactfpga.design.cover import Cover, CoverError, Switch, load_cover, table
+from contactfpga.design.cover import Cover, CoverError, Switch, load_cover
+from contactfpga.design.cover.press import write_cover
 
 CLOSED = {"surface": "cylinder", "radius_mm": 25, "closed": True}
 REVERSAL = {"scan": "reversal", "precharge_us": 0.25}
@@ -203,7 +204,7 @@ def test_a_file_with_a_cover(tmp_path):
     path.write_text(COVERED)
     assert Skin.load(path) == Skin(rows=8)
     assert load_cover(path) == Cover("bonded", 0.004, Switch(0.5))
-    path.write_text(Skin(rows=8).to_toml() + table.write(Cover(share=0.25)))
+    path.write_text(Skin(rows=8).to_toml() + write_cover(Cover(share=0.25)))
     assert (Skin.load(path), load_cover(path)) == (Skin(rows=8), Cover(share=0.25))
     path.write_text("rows = 8")
     assert load_cover(path) is None

@@ -8,7 +8,7 @@ from sample import sample
 from scipy.optimize import brentq
 
 from contactfpga.design.cover import point
-from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.point import Switch
 from contactfpga.skin import Skin
 from contactfpga_sim.lab.arm.case import Case, CaseError
 from contactfpga_sim.lab.arm.plant import Plant, finite

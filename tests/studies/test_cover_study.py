@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from study_pages import outdated, section
 
-from contactfpga.design.cover import Ball, formula_study, paper, study_drawing
-from contactfpga.design.cover.foams import FOAMS
+from contactfpga.design.cover import Ball
 from contactfpga.design.cover.sense import LADDER
+from contactfpga.design.cover.task import FOAMS
 from contactfpga_sim.lab import registry
-from contactfpga_sim.lab.cover import tables
+from contactfpga_sim.lab.cover import formulas, paper, pictures, tables
 
 RUN = registry.Run(registry.load("cover"))
 
@@ -40,16 +40,16 @@ def test_errors_in_the_other_tables_are_up_to_date(name):
 
 
 def test_rules_that_are_offered_hold():
-    for name, rule in formula_study.RULES.items():
-        errors = [abs(error) for error in formula_study.relative_errors(rule) if not math.isnan(error)]
+    for name, rule in formulas.RULES.items():
+        errors = [abs(error) for error in formulas.relative_errors(rule) if not math.isnan(error)]
         assert max(errors) < 3e-4, name
     for name in ("**adaptive, sin²**", "**ODE, 1e-10**"):
-        assert max(map(abs, formula_study.relative_errors(formula_study.RULES[name]))) < 1e-9
-    assert sum(map(math.isnan, formula_study.relative_errors(formula_study.RULES["closed form"]))) == 3
+        assert max(map(abs, formulas.relative_errors(formulas.RULES[name]))) < 1e-9
+    assert sum(map(math.isnan, formulas.relative_errors(formulas.RULES["closed form"]))) == 3
 
 
 def test_rules_that_fail_do():
-    found = {name: formula_study.relative_errors(rule) for name, rule in formula_study.FAILING.items()}
+    found = {name: formulas.relative_errors(rule) for name, rule in formulas.FAILING.items()}
     assert found["trapezoid, 100"][0] == math.inf
     assert found["trapezoid without its end, 100"][0] == pytest.approx(-0.063, abs=1e-3)
     assert found["midpoint, 100"][0] == pytest.approx(-0.026, abs=5e-4)
@@ -61,15 +61,15 @@ def test_rules_that_fail_do():
 
 
 def test_sixteen_nodes_are_enough_but_for_a_slow_start():
-    errors = formula_study.relative_errors(formula_study.RULES["16 nodes, sin²"])
+    errors = formulas.relative_errors(formulas.RULES["16 nodes, sin²"])
     assert max(map(abs, errors[:3])) < 1e-13
     assert abs(errors[3]) > 1e-5
 
 
 def test_the_reference_has_no_error_and_the_half_space_has():
     ball = Ball(1e-4, 1e7)
-    assert formula_study.sense_errors(LADDER[-1], ball) == [0] * len(formula_study.PLACES)
-    half = formula_study.sense_errors(LADDER[0], ball)
+    assert formulas.sense_errors(LADDER[-1], ball) == [0] * len(formulas.PLACES)
+    half = formulas.sense_errors(LADDER[0], ball)
     assert half[0] == pytest.approx(0.57, abs=0.01)
     assert abs(half[2]) < 0.01
     assert half[-1] < -0.7
@@ -95,7 +95,7 @@ def test_every_foam_is_in_the_page():
 
 
 def test_a_time_is_measured():
-    assert 0 < formula_study.seconds(lambda: np.ones(10), repeats=1) < 1e-3
+    assert 0 < formulas.seconds(lambda: np.ones(10), repeats=1) < 1e-3
 
 
 @pytest.mark.slow
@@ -119,7 +119,7 @@ def test_lines_to_the_names_do_not_cross():
     for _ in range(30):
         starts = [tuple(place) for place in random.random((17, 2))]
         names = [(1.03, y) for y in np.linspace(0.99, 0.05, 17)]
-        ends = study_drawing.uncrossed(starts, names)
+        ends = pictures.uncrossed(starts, names)
         assert sorted(ends) == sorted(names)
         crossed += any(cross(*pair) for pair in itertools.combinations(zip(starts, names), 2))
         assert not any(cross(*pair) for pair in itertools.combinations(zip(starts, ends), 2))

@@ -8,9 +8,8 @@ corrected where they are misprinted. K. L. Johnson, "Contact mechanics" (1985), 
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.patch import Ellipse, Part, Rectangle
-from contactfpga.design.cover.press import MODELS, Cover, Load
-from contactfpga.design.cover.switch import Switch
-from contactfpga.design.cover.table import load as load_cover
+from contactfpga.design.cover.point import Switch
+from contactfpga.design.cover.press import MODELS, Cover, Load, load_cover
 
 __all__ = [
     "MODELS",

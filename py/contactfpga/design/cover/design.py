@@ -12,13 +12,12 @@ import math
 
 import numpy as np
 
-from contactfpga.design.cover import elastic, impact, motion, sense
+from contactfpga.design.cover import arm, elastic, impact, sense
 from contactfpga.design.cover.answer import NoSolution
-from contactfpga.design.cover.foams import Foam
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
 from contactfpga.design.cover.sense import Sense, Sheet
-from contactfpga.design.cover.task import Task
+from contactfpga.design.cover.task import Foam, Task
 from contactfpga.skin.latency import latency_s
 
 FREE = "free modulus"
@@ -50,7 +49,7 @@ class Check:
 
 
 @dataclasses.dataclass(frozen=True)
-class Candidate:
+class FoamDesign:
     """A foam and what follows from it; None where it does not come that far."""
 
     foam: Foam
@@ -102,13 +101,13 @@ class Thin:
 class Design:
     """All candidates, the ones that fit first, lightest and then thinnest in front."""
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[FoamDesign, ...]
     thinning: tuple[Thin, ...]
     sheet_s: float
     """Worst latency of the task's sheet, without host and motor, in s."""
 
     @property
-    def best(self) -> Candidate | None:
+    def best(self) -> FoamDesign | None:
         """None if nothing fits."""
         first = self.candidates[0]
         return first if first.fits else None
@@ -140,7 +139,7 @@ def thinning(task: Task, foam: Foam | None) -> tuple[Thin, ...]:
     return tuple(_thin(task, foam, float(t0)) for t0 in np.geomspace(task.latency_s, lowest, STEPS))
 
 
-def _rank(candidate: Candidate) -> tuple[bool, bool, float, float]:
+def _rank(candidate: FoamDesign) -> tuple[bool, bool, float, float]:
     """What fits by mass, where it is known, and thickness; what does not by how much it is off."""
     if candidate.fits:
         mass = candidate.mass_kg_m2
@@ -149,19 +148,19 @@ def _rank(candidate: Candidate) -> tuple[bool, bool, float, float]:
     return True, candidate.no_solution is not None, len(broken), max(broken, default=0.0)
 
 
-def _free(task: Task) -> Candidate:
+def _free(task: Task) -> FoamDesign:
     found = impact.stiffness_for(task.arm, task.speed_m_s, task.time_s)
     if isinstance(found, NoSolution):
-        return Candidate(Foam(FREE, 1.0, "no modulus gives the time"), no_solution=found.reason)
+        return FoamDesign(Foam(FREE, 1.0, "no modulus gives the time"), no_solution=found.reason)
     modulus = elastic.young_pa(elastic.ball_of(found.stiffness, task.radius_m).modulus_pa, task.poisson)
     return _judge(task, Foam(FREE, modulus, f"follows from a compression of {1e3 * task.time_s:g} ms"), found)
 
 
-def _judge(task: Task, foam: Foam, hit: Impact | None) -> Candidate:
+def _judge(task: Task, foam: Foam, hit: Impact | None) -> FoamDesign:
     ball = _ball(task, foam)
     found = hit or impact.strike(task.arm, task.speed_m_s, elastic.stiffness(ball))
     if isinstance(found, NoSolution):
-        return Candidate(foam, no_solution=found.reason)
+        return FoamDesign(foam, no_solution=found.reason)
     strain = task.strain or foam.strain
     checks = [
         # The free modulus takes exactly that long, but for the last digits.
@@ -191,11 +190,11 @@ def _judge(task: Task, foam: Foam, hit: Impact | None) -> Candidate:
     notes = ("no plate is as thick as that",) if task.plates_m and thickness not in task.plates_m else ()
     sheet = Sheet(task.switch, thickness, ball if task.contact == "patch" else None)
     return _sensed(
-        task, Candidate(foam, found, by_energy, thickness, mass, checks=tuple(checks), notes=notes), sheet, ball
+        task, FoamDesign(foam, found, by_energy, thickness, mass, checks=tuple(checks), notes=notes), sheet, ball
     )
 
 
-def _sensed(task: Task, sofar: Candidate, sheet: Sheet, ball: Ball) -> Candidate:
+def _sensed(task: Task, sofar: FoamDesign, sheet: Sheet, ball: Ball) -> FoamDesign:
     """The force and the pitch, and the limits on them."""
     checks = list(sofar.checks)
     least = sheet.detects(0.0, task.model, _tolerance(task))
@@ -257,7 +256,7 @@ def _pressed_m(task: Task, hit: Impact, seconds: float) -> float:
     """How far the foam is pressed in this long after the touch, at most delta_c."""
     if seconds >= hit.time_s:
         return hit.compression_m
-    course = motion.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)
+    course = arm.course(task.arm, task.speed_m_s, hit.stiffness, hit.compression_m, 256)
     half = len(course.time_s) // 2 + 1
     return float(np.interp(seconds, course.time_s[:half], course.indentation_m[:half]))
 

@@ -13,13 +13,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import elastic, impact, line, medium, motion, point
+from contactfpga.design.cover import arm, elastic, impact, line, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.hertz import Ball
-from contactfpga.design.cover.paper import FIRST_DESIGN, WORST_M
+from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.solve import Floats
-from contactfpga.design.cover.switch import Switch
-from contactfpga.design.cover.task import Task
+from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M, Task
 from contactfpga.picture_style import save
 
 COLORS = {"halfspace": style.BLUE, "bonded": style.VERMILLION, "frictionless": style.GREEN}
@@ -68,7 +67,7 @@ def course(task: Task) -> Figure:
         hit = impact.strike(task.arm, task.speed_m_s, stiffness)
         if isinstance(hit, NoSolution):
             continue
-        over = motion.course(task.arm, task.speed_m_s, stiffness, hit.compression_m)
+        over = arm.course(task.arm, task.speed_m_s, stiffness, hit.compression_m)
         look: dict[str, Any] = {"color": style.PALETTE[number], "linestyle": style.DASHES[number % len(style.DASHES)]}
         for place, values in zip(places, (1e3 * over.indentation_m, over.speed_m_s, over.force_n)):
             place.plot(1e3 * over.time_s, values, label=foam.name, **look)

@@ -41,12 +41,6 @@ def young_pa(effective_pa: float, poisson: float) -> float:
     return positive("effective_pa", effective_pa, "Pa") * (1 - _poisson(poisson) ** 2)
 
 
-def effective_radius_m(radius_m: float, other_m: float = math.inf) -> float:
-    """R* in m of two convex bodies, the other one flat by default: 1/R* = 1/R + 1/R' (paper, III)."""
-    curvature = 1 / positive("radius_m", radius_m, "m")
-    return 1 / (curvature + (0.0 if other_m == math.inf else 1 / positive("other_m", other_m, "m")))
-
-
 def stiffness(ball: Ball) -> float:
     """K_s in N/m^1.5, by which F = K_s delta^1.5: 4/3 E* sqrt(R*) (paper, III.A)."""
     return 4 / 3 * ball.modulus_pa * math.sqrt(ball.radius_m)
@@ -61,11 +55,6 @@ def yield_indentation_m(ball: Ball, yield_pa: float, ratio: float = BETWEEN_SPHE
     """The indentation in m at which the foam first yields, (7): delta_Y = R* (3 pi/4)^2 (nu_Y Y/E*)^2."""
     share = positive("ratio", ratio, "") * positive("yield_pa", yield_pa, "Pa") / ball.modulus_pa
     return ball.radius_m * (0.75 * math.pi * share) ** 2
-
-
-def mean_pressure_pa(ball: Ball, indentation_m: float) -> float:
-    """F/(pi a^2) in Pa, which (6) sets equal to nu_Y Y: 4 E*/(3 pi) sqrt(delta/R*)."""
-    return 4 * ball.modulus_pa / (3 * math.pi) * math.sqrt(indentation_m / ball.radius_m)
 
 
 def resilience(yield_pa: float, modulus_pa: float) -> float:

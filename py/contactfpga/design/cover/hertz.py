@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from contactfpga.design.cover.answer import CoverError, positive
-from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.point import Switch
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,10 +31,6 @@ class Ball:
     def indentation_m(self, force_n: float) -> float:
         """How far the ball sinks in, in m: delta = a^2 / R*."""
         return self.patch_m(force_n) ** 2 / self.radius_m
-
-    def peak_pa(self, force_n: float) -> float:
-        """Pressure in Pa in the middle of the patch: p0 = 3 F / (2 pi a^2)."""
-        return 1.5 * force_n / (math.pi * self.patch_m(force_n) ** 2)
 
     def closing_n(self, switch: Switch, depth_m: float) -> float:
         """The force in N that closes a switch right below, ``depth_m`` deep in a half-space.

@@ -11,9 +11,8 @@ import math
 
 import numpy as np
 
-from contactfpga.design.cover import motion
 from contactfpga.design.cover.answer import CoverError, NoSolution, not_negative, positive
-from contactfpga.design.cover.arm import Arm, slowness, speed2
+from contactfpga.design.cover.arm import Arm, compress, slowness, speed2
 from contactfpga.design.cover.solve import integral, root
 
 COMPRESSION_TIME: float = 0.4 * math.gamma(0.4) * math.gamma(0.5) / math.gamma(0.9)
@@ -79,7 +78,7 @@ def strike(
     elif method == "quadrature":
         seconds = time_s(arm, speed_m_s, stiffness, depth)
     else:
-        depth, seconds = motion.compress(arm, speed_m_s, stiffness)
+        depth, seconds = compress(arm, speed_m_s, stiffness)
     if seconds is None:
         return NoSolution(f"the arm all but stops on the way to {1e3 * depth:.4g} mm: its time is not determined")
     return _impact(arm, stiffness, depth, seconds, method)

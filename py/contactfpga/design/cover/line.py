@@ -14,7 +14,7 @@ from contactfpga.inputs.files import open_regular
 from contactfpga.inputs.values import shown
 
 
-class Line(NamedTuple):
+class StraightLine(NamedTuple):
     """deformation = offset + force / stiffness, by least squares."""
 
     stiffness_n_m: float
@@ -53,7 +53,7 @@ def _refused(path: str | Path, number: int, text: str) -> CoverError:
     return CoverError(f"{path}, line {number}: {shown(text)} is not two numbers, force in N and deformation in m")
 
 
-def fit(force_n: Floats, deformation_m: Floats) -> Line:
+def fit(force_n: Floats, deformation_m: Floats) -> StraightLine:
     """The line through them; raises :class:`CoverError` if they do not vary."""
     force, depth = force_n - force_n.mean(), deformation_m - deformation_m.mean()
     across = float(force @ depth)
@@ -61,4 +61,4 @@ def fit(force_n: Floats, deformation_m: Floats) -> Line:
         raise CoverError("force and deformation do not vary together; there is no line")
     slope = across / float(force @ force)
     offset = float(deformation_m.mean() - slope * force_n.mean())
-    return Line(1 / slope, offset, across / math.sqrt(float(force @ force) * float(depth @ depth)))
+    return StraightLine(1 / slope, offset, across / math.sqrt(float(force @ force) * float(depth @ depth)))

@@ -1,14 +1,34 @@
-"""A point force on the cover: the paper's model of sensitivity, (9) and (10), over any medium."""
+"""A switch under the cover, and a point force above it: the paper's (9) and (10), over any medium."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
 from contactfpga.design.cover import medium
 from contactfpga.design.cover.answer import NoSolution, not_negative, positive
-from contactfpga.design.cover.switch import Switch
+
+
+@dataclasses.dataclass(frozen=True)
+class Switch:
+    """A switch and the face on which the cover presses. The defaults are those of the paper's prototype."""
+
+    force_n: float = 1.0
+    """Force that closes it, in N."""
+    area_m2: float = 12.6e-6
+    """Area of its face in m2."""
+
+    def __post_init__(self) -> None:
+        positive("force_n", self.force_n, "N")
+        positive("area_m2", self.area_m2, "m2")
+
+    @property
+    def closing_pa(self) -> float:
+        """Normal stress in Pa at which it closes: force over area (paper, III.D)."""
+        return self.force_n / self.area_m2
+
 
 LEAST: float = 2 * math.pi / 3 * 2.5**2.5 / 1.5**1.5
 """Least force over the thickness, over stress times offset squared: 11.266052."""

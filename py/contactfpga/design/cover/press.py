@@ -1,17 +1,21 @@
-"""Which switches close: contacts on a cover, through a model chosen by name."""
+"""Which switches close: contacts on a cover, by a model chosen by name; and the table `[cover]` of a Skin's file."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from contactfpga.design.cover import hertz, medium, point
-from contactfpga.design.cover.answer import CoverError, not_negative, positive
+from contactfpga.design.cover.answer import MAX_LENGTH_M, CoverError, not_negative, positive
 from contactfpga.design.cover.patch import Ellipse, Part
-from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.point import Switch
+from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
 MODELS = ("patch", "point", "hertz", "bonded", "frictionless")
@@ -128,3 +132,40 @@ def _superposed(
         distance += np.subtract.outer(places_y[here], at_y) ** 2
         stress[here] = medium.spread(within, np.sqrt(distance) / thickness_m) @ shares
     return (force_n / thickness_m**2 * stress).reshape(x.shape)
+
+
+MIN_LENGTH_M = 1e-6
+"""Nothing is thinner; integrals over a layer run out of numbers long after."""
+
+
+def load_cover(path: str | Path) -> Cover | None:
+    """The cover in a Skin's file; None where it has no table ``[cover]``. Raises CoverError."""
+    return tomlfile.load_table(path, "cover", read_cover, CoverError)
+
+
+def read_cover(values: Any) -> Cover:
+    """The cover that a TOML table describes; its keys are the fields of :class:`Cover`, with a table ``switch``."""
+    given = dict(tomlfile.fields_of(Cover, "cover", values, CoverError))
+    if "switch" in given:
+        given["switch"] = Switch(**tomlfile.fields_of(Switch, "cover.switch", given["switch"], CoverError))
+    cover = Cover(**given)
+    if not MIN_LENGTH_M <= cover.thickness_m <= MAX_LENGTH_M:
+        raise CoverError(
+            f"thickness_m in [cover] is {cover.thickness_m:g}; it must be a length in m, at most {MAX_LENGTH_M:g}; "
+            f"5 mm is 0.005, and the least is {MIN_LENGTH_M:g}"
+        )
+    for name, value, unit in (("force_n", cover.switch.force_n, "N"), ("area_m2", cover.switch.area_m2, "m2")):
+        if not 1e-9 <= value <= 1e6:
+            raise CoverError(f"{name} in [cover.switch] is {value:g}; it must lie between 1e-09 and 1e+06 {unit}")
+    return cover
+
+
+def write_cover(cover: Cover) -> str:
+    """The TOML tables that :func:`read_cover` reads back."""
+    values = dataclasses.asdict(cover)
+    switch = values.pop("switch")
+    return "\n[cover]\n" + _lines(values) + "\n[cover.switch]\n" + _lines(switch)
+
+
+def _lines(values: dict[str, Any]) -> str:
+    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in values.items() if value is not None)

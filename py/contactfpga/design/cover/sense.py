@@ -17,7 +17,7 @@ from typing import NamedTuple
 from contactfpga.design.cover import hertz_layer, medium, point
 from contactfpga.design.cover.answer import CoverError, NoSolution, positive
 from contactfpga.design.cover.hertz import Ball
-from contactfpga.design.cover.switch import Switch
+from contactfpga.design.cover.point import Switch
 
 TOLERANCE = 0.05
 """How far the simplest model's answer may be from the reference's, by default."""

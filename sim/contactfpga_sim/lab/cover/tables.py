@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from contactfpga.design.cover import drawing, formula_study, paper, study_drawing
+from contactfpga.design.cover import drawing
 from contactfpga.design.cover.design import thinning
-from contactfpga.design.cover.foams import FOAMS
+from contactfpga.design.cover.task import FIRST_DESIGN, FOAMS
 from contactfpga_sim.lab import writer
+from contactfpga_sim.lab.cover import formulas, paper, pictures
 
 
 def _cell(error: float) -> str:
@@ -18,19 +19,19 @@ def _cell(error: float) -> str:
         return "none"
     if math.isinf(error) or abs(error) > 1e6:
         return "infinite"
-    if abs(error) < formula_study.FLOOR:
+    if abs(error) < formulas.FLOOR:
         return "< 1e-13"
     if abs(error) >= 1e-3:
         return f"{100 * error:+.1f} %"
     return f"{abs(error):.0e}"
 
 
-def _rule_table(rules: dict[str, formula_study.Rule]) -> str:
-    rows = [["rule", *(blow.name for blow in formula_study.BLOWS), "time"]]
+def _rule_table(rules: dict[str, formulas.Rule]) -> str:
+    rows = [["rule", *(blow.name for blow in formulas.BLOWS), "time"]]
     for name, rule in rules.items():
-        errors = formula_study.relative_errors(rule)
+        errors = formulas.relative_errors(rule)
         with np.errstate(all="ignore"):
-            takes = 1e6 * formula_study.seconds(lambda rule=rule: rule(formula_study.BLOWS[0]))  # type: ignore[misc]
+            takes = 1e6 * formulas.seconds(lambda rule=rule: rule(formulas.BLOWS[0]))  # type: ignore[misc]
         told = f"{takes:.1f}" if takes < 10 else f"{takes:,.0f}"
         rows.append([name, *map(_cell, errors), f"{told} µs"])
     return writer.table_of(rows)
@@ -38,7 +39,7 @@ def _rule_table(rules: dict[str, formula_study.Rule]) -> str:
 
 def sense_table() -> str:
     """Models of sensitivity: error against the reference, and time."""
-    study = formula_study
+    study = formulas
     rows = [["model", "ball", *(f"ρ/h = {place:g}" for place in study.PLACES), "time"]]
     for model in study.LADDER:
         for name, ball in study.BALLS.items():
@@ -66,7 +67,7 @@ def thinning_table() -> str:
         "in all",
     )
     lines = []
-    for one in thinning(paper.FIRST_DESIGN, paper.FIRST_DESIGN.foams[0]):
+    for one in thinning(FIRST_DESIGN, FIRST_DESIGN.foams[0]):
         assert one.modulus_pa is not None
         assert one.compression_m is not None
         assert one.pressed_m is not None
@@ -90,14 +91,14 @@ def foam_table() -> str:
 
 def rules_table() -> str:
     """Rules for the peak force: error against the exact one, and time."""
-    return _rule_table(formula_study.RULES)
+    return _rule_table(formulas.RULES)
 
 
 def failing_table() -> str:
     """The same of rules that fail."""
-    return _rule_table(formula_study.FAILING)
+    return _rule_table(formulas.FAILING)
 
 
 def draw(folder: Path) -> list[Path]:
     """The pictures of the command's answer, and the one of the study."""
-    return [*drawing.draw(folder, "svg"), study_drawing.study(folder / "cover-study.svg")]
+    return [*drawing.draw(folder, "svg"), pictures.study(folder / "cover-study.svg")]

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from contactfpga.design.cover import table
+from contactfpga.design.cover.press import write_cover
 from contactfpga.tools.console import tables, terminal
 from contactfpga_sim.lab.chart.errors import METRICS, Interval
 from contactfpga_sim.lab.fit.cost import DEVICE
@@ -148,7 +148,7 @@ def toml(fit: Fit, command: str) -> str:
     for source, one in zip(fit.task.names, fit.reported[0], strict=True):
         errors = (f"{head} {_error(metric, one.errors[metric])}" for head, metric in zip(METRIC_HEADS, METRICS))
         lines.append(f"{source}, scenes not used to choose: {', '.join(errors)}, {one.speed.worst_us:.0f} us at worst")
-    cover = table.write(fit.task.cover) if fit.task.cover else ""
+    cover = write_cover(fit.task.cover) if fit.task.cover else ""
     return "".join(f"# {line}\n" for line in lines) + fit.answer.skin.to_toml() + cover
 
 

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model
 from contactfpga.design.cover.sense import Sheet as Foam
-from contactfpga.design.cover.switch import Switch
 from contactfpga.robot.haptics import Closing, LoadCells, Locator, Place, Plane, Reach
 from contactfpga.robot.haptics.posterior import radius_95
 from contactfpga.robot.haptics.rate import tripod

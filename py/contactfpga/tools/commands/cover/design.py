@@ -7,7 +7,7 @@ import dataclasses
 from typing import Any
 
 from contactfpga.design.cover.answer import NoSolution
-from contactfpga.design.cover.design import Candidate, Design, Thin, design, margin
+from contactfpga.design.cover.design import Design, FoamDesign, Thin, design, margin
 from contactfpga.design.cover.sense import Sense
 from contactfpga.design.cover.task import Task
 from contactfpga.errors import UNSOLVED
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     return status
 
 
-def _row(one: Candidate) -> tuple[str, ...]:
+def _row(one: FoamDesign) -> tuple[str, ...]:
     hit, bound = one.hit, one.binding
     return (
         one.foam.name,
@@ -116,7 +116,7 @@ def _plain(found: Design) -> dict[str, Any]:
     }
 
 
-def _candidate(one: Candidate) -> dict[str, Any]:
+def _candidate(one: FoamDesign) -> dict[str, Any]:
     hit, bound = one.hit, one.binding
     return {
         "foam": one.foam.name,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from contactfpga.design.cover import line, paper
-from contactfpga.design.cover.task import Task
+from contactfpga.design.cover import line
+from contactfpga.design.cover.task import FIRST_DESIGN, Task
 from contactfpga.tools.commands.cover.printing import MM, say
 from contactfpga.tools.console import flags, outputs
 
@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     folder = outputs.folder(args.output)
     from contactfpga.design.cover import drawing  # matplotlib, which only drawing needs
 
-    task = Task.load(args.design) if args.design else paper.FIRST_DESIGN
+    task = Task.load(args.design) if args.design else FIRST_DESIGN
     data = line.read(args.data) if args.data else None
     files = drawing.draw(folder, args.format, task, data)
     known: dict[str, Any] = {"files": [str(file) for file in files]}

@@ -8,8 +8,8 @@ from typing import Any
 from contactfpga.design.cover import elastic, sense
 from contactfpga.design.cover.answer import CoverError, NoSolution
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import Model, Sense, Sheet
-from contactfpga.design.cover.switch import Switch
 from contactfpga.errors import UNSOLVED
 from contactfpga.tools.commands.cover import units
 from contactfpga.tools.commands.cover.printing import MM, notes, say, table

@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.design.cover import elastic, impact, motion
+from contactfpga.design.cover import arm, elastic, impact
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import Arm, slowness, speed2
 from contactfpga.design.cover.hertz import Ball
+from contactfpga.design.cover.point import Switch
 from contactfpga.design.cover.sense import LADDER, Model, Sheet
 from contactfpga.design.cover.solve import Floats, gauss, legendre
-from contactfpga.design.cover.switch import Switch
 
 FLOOR = 1e-13
 """Errors below this are those of the reference, and written as less than it."""
@@ -144,7 +144,7 @@ def _adaptive(blow: Blow) -> float:
 
 
 def _ode(rtol: float) -> Rule:
-    return lambda blow: motion.compress(blow.arm, blow.speed_m_s, blow.stiffness, rtol)[1]
+    return lambda blow: arm.compress(blow.arm, blow.speed_m_s, blow.stiffness, rtol)[1]
 
 
 RULES: dict[str, Rule] = {

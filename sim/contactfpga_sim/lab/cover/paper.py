@@ -8,37 +8,15 @@ from typing import NamedTuple
 from contactfpga.design.cover import elastic, impact, medium, point
 from contactfpga.design.cover.answer import NoSolution
 from contactfpga.design.cover.arm import GRAVITY, Arm
-from contactfpga.design.cover.foams import find
 from contactfpga.design.cover.hertz import Ball
 from contactfpga.design.cover.impact import Impact
-from contactfpga.design.cover.switch import Switch
-from contactfpga.design.cover.task import Task
+from contactfpga.design.cover.task import FIRST_DESIGN, WORST_M
 
-SWITCH = Switch()
-ARM = Arm.link(0.6, 0.038, 0.15, 0.2)
+ARM, SWITCH = FIRST_DESIGN.arm, FIRST_DESIGN.switch
 HEAVY = Arm.link(2.0, 0.038, 0.15, 0.2)
 PRINTED_PA = 3.65e5
 FOAM_PA = 3.45e5
 RESILIENCE = 4791.0
-WORST_M = 5e-3 * math.sqrt(2)
-"""The farthest place from a switch on the paper's sheet, in m."""
-
-FIRST_DESIGN = Task(
-    arm=ARM,
-    mass_kg=0.6,
-    speed_m_s=0.4,
-    radius_m=0.019,
-    poisson=0.5,
-    time_s=0.008,
-    latency_s=0.006,
-    switch=SWITCH,
-    pitch_m=0.01,
-    force_n=15.0,
-    thickness_m=0.01,
-    foams=(find("paper"),),
-    brake_nm=3.0,
-)
-"""The first design of Section IV, on the foam that was found."""
 
 
 class Row(NamedTuple):

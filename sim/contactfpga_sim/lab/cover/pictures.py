@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from contactfpga import picture_style as style
-from contactfpga.design.cover import formula_study as measured
+from contactfpga_sim.lab.cover import formulas as measured
 
 LEAST_SHARE = 1e-3
 """Errors below are drawn on a linear scale, so that 0 has its place."""
