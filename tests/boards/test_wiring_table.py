@@ -11,7 +11,7 @@ from contactfpga.boards import BOARDS, wiring
 from contactfpga.design.circuit import Circuit
 from contactfpga.skin.derived import Derived
 from contactfpga.tools import cli
-from contactfpga.tools.console.wiring import Table, ohms
+from contactfpga.tools.commands.build import WiringTable, ohms
 from contactfpga_hdl.board import placed, sites
 from contactfpga_hdl.board.build import plan_for
 
@@ -215,5 +215,5 @@ def test_resistances_read_as_on_a_bag(value, text):
 def test_a_circuit_without_series_resistors_names_none():
     board = BOARDS["icestick"]
     wires = wiring.wires(board, board.skin)
-    table = Table(board, board.skin, Circuit(), sites.wire_sites(board, wires))
+    table = WiringTable(board, board.skin, Circuit(), sites.wire_sites(board, wires))
     assert {one["series_ohm"] for one in table.to_dict()["wires"]} == {None}

@@ -15,7 +15,8 @@ import contactfpga
 from contactfpga import Skin
 from contactfpga.design.circuit import Circuit
 from contactfpga.tools import cli
-from contactfpga.tools.console import flags, settling
+from contactfpga.tools.commands.wire import settle
+from contactfpga.tools.console import flags
 from contactfpga_sim.model.board.virtual import VirtualBoard
 from contactfpga_sim.model.sheet.line import Line
 
@@ -57,7 +58,7 @@ def all_but_one():
 def test_the_image_is_what_the_circuit_predicts(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:
-        assert settling.measure(board, arguments(0.07)) == 0
+        assert settle.measure(board, arguments(0.07)) == 0
         assert board.next().cells.tolist() == pressed.tolist(), "it samples at the end of the settle time again"
     answer = json.loads(capsys.readouterr().out)
     expected = predicted(pressed)
@@ -76,7 +77,7 @@ def test_the_image_is_what_the_circuit_predicts(capsys):
 def test_the_image_in_a_terminal(capsys):
     pressed = all_but_one()
     with board_of(lambda _: pressed) as board:
-        assert settling.measure(board, arguments(0.07, in_json=False)) == 0
+        assert settle.measure(board, arguments(0.07, in_json=False)) == 0
     lines = capsys.readouterr().out.splitlines()
     expected = predicted(pressed)
     tenths = [[str((cell - 1) * 10 // SETTLE) if cell else "·" for cell in row] for row in expected.tolist()]
@@ -117,7 +118,7 @@ def test_what_was_found_is_told_and_the_board_left_as_it_was(capsys, error):
         return pressed
 
     with board_of(scene) as board:
-        assert settling.measure(board, arguments(None)) == 0
+        assert settle.measure(board, arguments(None)) == 0
         assert not stops
         for _ in range(3):
             board.next()
@@ -141,7 +142,7 @@ class Dying(DirectPort):
 
 def test_a_board_that_is_unplugged_is_told(capsys):
     with contactfpga.open(Dying(SKIN), skin=SKIN) as board:
-        assert settling.measure(board, arguments(None, in_json=False)) == 1
+        assert settle.measure(board, arguments(None, in_json=False)) == 1
     said = capsys.readouterr().out
     assert "fault the board was unplugged" in said
     assert "may still sample too early, so that pressed switches read released; switch it off and on" in said

@@ -7,14 +7,14 @@ import functools
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
-from typing import Protocol
+from typing import Any, NoReturn, Protocol
 
 from contactfpga import __version__
 from contactfpga.choices.choice import trusted
 from contactfpga.errors import MissingExtra
+from contactfpga.inputs.values import shortened, visible_lines
 from contactfpga.tools import commands
 from contactfpga.tools.console import interrupt, terminal
-from contactfpga.tools.console.parser import Parser
 
 COMMANDS = {
     "zones": "Show the contact zones live.",
@@ -39,7 +39,7 @@ COMMANDS = {
     "study": "Run one of the studies: speed against accuracy, failures, flipped bits, the arm.",
 }
 """Help of each command. The command itself is the module of this name in :mod:`contactfpga.tools.commands`, a
-:class:`Command` or a :class:`Group`; it is imported when the command is called."""
+:class:`Subcommand` or a :class:`TopicGroup`; it is imported when the command is called."""
 
 RENAMED = {
     "chart": "study chart",
@@ -52,7 +52,7 @@ RENAMED = {
 """Old names of commands, which work in this release; the next one refuses them."""
 
 
-class Command(Protocol):
+class Subcommand(Protocol):
     """A command, or a topic of one. Its module loads with the host alone; what else ``run`` needs, it imports."""
 
     @property
@@ -66,8 +66,8 @@ class Command(Protocol):
         """Run the command; returns the exit status."""
 
 
-class Group(Protocol):
-    """A command of several topics: a package in which each topic is a module, a :class:`Command`."""
+class TopicGroup(Protocol):
+    """A command of several topics: a package in which each topic is a module, a :class:`Subcommand`."""
 
     @property
     def TOPICS(self) -> dict[str, str]:  # noqa: N802
@@ -141,7 +141,7 @@ def _add_command(name: str, parser: Parser) -> None:
         _add_flags(module, parser, module.run)
 
 
-def _add_topics(group: Group, package: str, parser: Parser) -> None:
+def _add_topics(group: TopicGroup, package: str, parser: Parser) -> None:
     if group.USUAL is not None:
         parser.usual_topic, instead = group.USUAL
         parser.usage = f"%(prog)s {instead} ...\n       %(prog)s {{{','.join(group.TOPICS)}}} ..."
@@ -151,15 +151,63 @@ def _add_topics(group: Group, package: str, parser: Parser) -> None:
         topics.add_parser(name, help=said, description=said, add=add)
 
 
-def _add_topic(group: Group, module: str, parser: Parser) -> None:
-    topic: Command = import_module(module)
+def _add_topic(group: TopicGroup, module: str, parser: Parser) -> None:
+    topic: Subcommand = import_module(module)
     _add_flags(topic, parser, lambda args: group.run(lambda: topic.run(args)))
 
 
-def _add_flags(command: Command, parser: Parser, run: Callable[[argparse.Namespace], int]) -> None:
+def _add_flags(command: Subcommand, parser: Parser, run: Callable[[argparse.Namespace], int]) -> None:
     command.add_flags(parser)
     parser.add_argument("--trust", action="store_true", help="Import, and so run, modules that Skin files name.")
     parser.set_defaults(run=run, extra=command.EXTRA)
+
+
+class Parser(argparse.ArgumentParser):
+    """Takes options anywhere. By itself argparse refuses a word after an option where it could have been left out, as
+    the port in `contactfpga record FILE --seconds 2 PORT`.
+
+    ``add``: adds the arguments to the parser, once the parser is used. So what they need is not loaded for a parser
+    that is only listed.
+    """
+
+    _within = False
+
+    usual_topic: str | None = None
+    """Topic of a command whose first word names none."""
+
+    def __init__(self, *args: Any, add: Callable[[Parser], None] | None = None, **options: Any):
+        super().__init__(*args, **options)
+        self._add = add
+
+    def complete(self) -> None:
+        """Add the arguments, if that has not been done yet."""
+        add, self._add = self._add, None
+        if add is not None:
+            add(self)
+
+    @property
+    def topics(self) -> dict[str, Parser]:
+        """The parsers of commands or topics below this one, by name."""
+        self.complete()
+        actions = [action for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        return {name: parser for action in actions for name, parser in action.choices.items()}
+
+    def error(self, message: str) -> NoReturn:
+        """End with argparse's message, in which control characters of the arguments are shown as escapes."""
+        super().error(visible_lines(shortened(message)))
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does, but with options anywhere."""
+        topics = self.topics
+        if self.usual_topic is not None and args and args[0] not in ("-h", "--help", *topics):
+            args = [self.usual_topic, *args]
+        if self._within or topics:
+            return super().parse_known_args(args, namespace)
+        self._within = True  # what comes next calls this method, for the options and then for the rest
+        try:
+            return self.parse_known_intermixed_args(args, namespace)
+        finally:
+            self._within = False
 
 
 def leaves(parser: Parser) -> Iterator[Parser]:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from contactfpga.boards import BOARDS, find, wiring
 from contactfpga.boards.spec import BoardSpec, bitstream_path
-from contactfpga.design.circuit import load_checked
+from contactfpga.boards.wiring import Line, Output, Wire
+from contactfpga.design.circuit import Circuit, load_checked
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
 from contactfpga.skin.several import Several, sheets_of
-from contactfpga.tools.console import flags, numbers, outputs
-from contactfpga.tools.console.wiring import Table
+from contactfpga.tools.console import flags, numbers, outputs, terminal
 
 EXTRA = "boards"
 
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     design = flags.designed(args, board.skin)
     circuit = load_checked(args.skin, design) if isinstance(design, Skin) and args.skin else None
     board.check(design)
-    table = Table(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))
+    table = WiringTable(board, design, circuit, sites.wire_sites(board, wiring.wires(board, design)))
     built = {} if args.wiring else _built(args, board, design)
     if args.json:
         described = {"skin": design.changed} if isinstance(design, Skin) else {"sheets": _changed(design)}
@@ -80,3 +81,106 @@ def _described(skin: Skin | Several) -> str:
 def default_folder(board: BoardSpec) -> Path:
     """Where the bitstream of a board is put and looked for."""
     return Path("build") / board.name
+
+
+DIODES = {
+    "col2row": "each diode's cathode toward the row",
+    "row2col": "each diode's cathode toward the column",
+    "none": "no diodes",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class WiringTable:
+    """All wires of a sheet, or of several ones, on a board, with what its circuit states."""
+
+    board: BoardSpec
+    skin: Skin | Several
+    circuit: Circuit | None
+    """None: the Skin's file has no table ``[circuit]``, so resistors have no values here."""
+    sites: Sequence[str]
+    """FPGA pins of the wires."""
+
+    def show(self) -> None:
+        """Print it."""
+        for sheet, skin in self._sheets:
+            terminal.say(
+                f"{self.board.title}, {sheet and f'sheet {sheet}: '}{skin.rows}x{skin.columns}, rows {skin.row_drive}, "
+                f"columns {skin.column_read}, {skin.diodes}: {DIODES[skin.diodes]}"
+            )
+        head = ("wire", "pin", "FPGA", "leads to", "series", "pull")
+        rows = [
+            (wire.port, self.board.label(wire.pin) if wire.pin else "", site, *self._end(wire.line))
+            for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
+        ]
+        _show([head, *rows])
+        chips = ("sheet", "chip", "chain", "number", "output", "leads to", "series", "pull")
+        _show([chips, *((sheet, *one.place, *self._end(one.line)) for sheet, one in self._outputs())])
+        if self.circuit is None:
+            terminal.say("Resistors have values once the Skin's file states them in its table [circuit].", hang=2)
+        terminal.say("Join the grounds of board and sheet. No line may see more than 3.3 V.", hang=2)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON; ohms are null where nothing is fitted or stated."""
+        return {
+            "wires": [
+                {"wire": wire.port, "pin": self.board.label(wire.pin) if wire.pin else None, "fpga": site}
+                | self._dict(wire)
+                for wire, site in zip(wiring.wires(self.board, self.skin), self.sites, strict=True)
+            ],
+            "outputs": [
+                ({"sheet": int(sheet)} if sheet else {})
+                | {"chip": one.chip, "chain": one.chain, "number": one.number, "output": one.name, "pin": one.pin}
+                | self._dict(one)
+                for sheet, one in self._outputs()
+            ],
+        }
+
+    @property
+    def _sheets(self) -> list[tuple[str, Skin]]:
+        """Each Skin with the number of its sheet; "" where there is one."""
+        if isinstance(self.skin, Several):
+            return [(str(number), skin) for number, skin in enumerate(self.skin.skins)]
+        return [("", self.skin)]
+
+    def _outputs(self) -> list[tuple[str, Output]]:
+        return [(sheet, one) for sheet, skin in self._sheets for one in wiring.outputs(skin)]
+
+    def _dict(self, one: Wire | Output) -> dict[str, Any]:
+        line = one.line
+        pull = {"to": line.pull, "ohm": self._pull_ohm(line)} if line.pull else None
+        return {"leads_to": line.leads_to, "series_ohm": self._series_ohm(line), "pull": pull}
+
+    def _end(self, line: Line) -> tuple[str, str, str]:
+        series, pull = self._series_ohm(line), self._pull_ohm(line)
+        to = {"up": "to 3.3 V", "down": "to ground", "": ""}[line.pull]
+        return (
+            line.leads_to,
+            "" if series is None else ohms(series),
+            to if pull is None else f"{ohms(pull)} {to}",
+        )
+
+    def _series_ohm(self, line: Line) -> float | None:
+        return self.circuit.series_ohm or None if self.circuit and line.kind else None
+
+    def _pull_ohm(self, line: Line) -> float | None:
+        if self.circuit is None or not line.pull:
+            return None
+        return self.circuit.row_pull_ohm if line.kind == "row" else self.circuit.column_pull_ohm
+
+
+def _show(rows: Sequence[Sequence[str]]) -> None:
+    """Print the columns that have something in them, where there are lines."""
+    from contactfpga.tools.console import tables  # JSON needs no display
+
+    if len(rows) > 1:
+        filled = [column for column in zip(*rows, strict=True) if any(column[1:])]
+        tables.show(list(zip(*filled, strict=True)), texts=range(len(filled)))
+
+
+def ohms(value: float) -> str:
+    """A resistance as it is printed on a resistor's bag."""
+    for limit, unit in ((1e6, "MΩ"), (1e3, "kΩ")):
+        if value >= limit:
+            return f"{value / limit:g} {unit}"
+    return f"{value:g} Ω"

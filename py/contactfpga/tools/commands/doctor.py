@@ -4,19 +4,38 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
 
 from contactfpga.driver import driver, finding, health, ports
 from contactfpga.driver.address import SheetOf
+from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.driver.stats import Stats
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.tools.console import flags, numbers, self_testing, terminal, watching
+from contactfpga.tools.console import flags, interrupt, live, numbers, terminal
+from contactfpga.zones.self_test import LineFinding, SelfTest, untried
+from contactfpga.zones.suspicion import Cell, Suspicion, named
+from contactfpga.zones.watch import Watch
+from contactfpga.zones.zone import Zones
 
 EXTRA = None
 
 COUNTED_S = 1.0
+
+FAULTS = ("stuck", "flutter")
+"""Kinds of suspicion that are no note: it takes more than a hand to bring them about."""
+
+STUCK_S = 10.0
+"""After which a pressed switch that does not change is told, where the user names no time."""
+
+ZONES_ONLY = (
+    'the board sends zones, so dead and loose switches cannot be told; for these set report = "cells" in the Skin\'s '
+    "file, then `contactfpga build BOARD --skin FILE` and `contactfpga flash BOARD`"
+)
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
@@ -41,11 +60,11 @@ def run(args: argparse.Namespace) -> int:
     if args.watch and args.self_test:
         raise ContactFPGAError("give --watch or --self-test, not both")
     if args.watch:
-        return watching.run(args)
+        return _watch(args)
     if args.stuck_s is not None:
         raise ContactFPGAError("--stuck-s needs --watch")
     if args.self_test:
-        return self_testing.run(args)
+        return _self_test(args)
     report = _Report(silent=args.json)
     _look(args, report)
     if args.json:
@@ -71,7 +90,7 @@ class _Report:
         for one in findings:
             self._findings.append(one)
             if not self._silent:
-                terminal.say(f"{one.verdict:5} {one.sentence}", hang=6)
+                _say(one)
 
     def to_dict(self) -> dict[str, object]:
         return {
@@ -80,6 +99,14 @@ class _Report:
             "lines": self.lines,
             "stats": self.stats and self.stats.to_dict(),
         }
+
+
+def _say(finding: Finding) -> None:
+    terminal.say(_line(finding), hang=6)
+
+
+def _line(finding: Finding) -> str:
+    return f"{finding.verdict:5} {finding.sentence}"
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -133,3 +160,139 @@ def _look(args: argparse.Namespace, report: _Report) -> None:
             report.lines = None if board.faults is None else list(board.faults.names)
     except (ContactFPGAError, ValueError) as error:
         report.add([Finding("fault", str(error))])
+
+
+def _watch(args: argparse.Namespace) -> int:
+    """Watch for ``args.seconds`` or until Ctrl-C; status 1 when a switch is stuck, loose or never read pressed."""
+    with flags.opened(args) as board:
+        skin = flags.known_skin(board)
+        watch = Watch(skin, stuck_s=args.stuck_s or STUCK_S)
+        found: list[Suspicion] = []
+        silent = args.json or terminal.of().live
+        if not args.json:
+            terminal.say(f"Touch every switch of {board.port}, and then nothing. Ctrl-C ends the watch.")
+
+        def take(zones: Zones) -> None:
+            for suspicion in watch.update(zones):
+                found.append(suspicion)
+                if not silent:
+                    _say(_suspected(suspicion))
+
+        def render(zones: Zones, room: Any) -> Any:
+            from contactfpga.tools.console import views  # rich, which scripts do without
+
+            return views.watch_view(board, watch, [_line(_suspected(one)) for one in found], zones, room)
+
+        seconds, end = live.follow(board, args, take, None if args.json else render)
+        findings = [*map(_suspected, found), *_coverage(watch), *_without_mask(skin), *end]
+    mask_line = watch.mask_line
+    faults = sum(finding.verdict == "fault" for finding in findings)
+    if args.json:
+        print(json.dumps(_watched(watch, findings, seconds, faults)), flush=True)
+        return min(faults, 1)
+    for one in findings if terminal.of().live else findings[len(found) :]:
+        _say(one)
+    if mask_line:
+        where = "in the Skin's file" if skin is not None else "in the Skin's file, beside the cells that are there"
+        terminal.say(f"To go on without what is stuck, put this line {where}, and build again:\n{mask_line}")
+    return min(faults, 1)
+
+
+def _suspected(suspicion: Suspicion) -> Finding:
+    return Finding("fault" if suspicion.kind in FAULTS else "note", suspicion.sentence)
+
+
+def _coverage(watch: Watch) -> list[Finding]:
+    seen, never = watch.seen, watch.never
+    if seen is None:
+        return [Finding("note", ZONES_ONLY)]
+    if not seen.any():
+        return [Finding("fault", "no switch read pressed; was the sheet touched?")]
+    if never:
+        return [Finding("fault", f"{_dark(seen, never)} never read pressed: not touched, or dead")]
+    return [Finding("ok", "every switch read pressed at least once")]
+
+
+def _without_mask(skin: Skin | None) -> list[Finding]:
+    if skin is not None:
+        return []
+    return [Finding("note", "the mask of this board is not known, so absent switches look dead; give --skin FILE")]
+
+
+def _dark(seen: np.ndarray, never: tuple[Cell, ...]) -> str:
+    """Whole lines first: these are broken wires rather than dead switches."""
+    rows = sorted({row for row, _ in never if not seen[row].any()})
+    columns = sorted({column for _, column in never if not seen[:, column].any()})
+    left = [(row, column) for row, column in never if row not in rows and column not in columns]
+    lines = [f"{word} {line}" for word, found in (("row", rows), ("column", columns)) for line in found]
+    return ", ".join([*lines, *([named(left)] if left else [])])
+
+
+def _watched(watch: Watch, findings: list[Finding], seconds: float, faults: int) -> dict[str, Any]:
+    seen = watch.seen
+    return {
+        "faults": faults,
+        "findings": [finding._asdict() for finding in findings],
+        "seconds": seconds,
+        "seen": None if seen is None else [[int(cell) for cell in row] for row in seen],
+        "never": watch.never,
+        "stuck": watch.stuck,
+        "fluttering": watch.fluttering,
+        "mask": watch.mask,
+        "mask_line": watch.mask_line,
+    }
+
+
+def _self_test(args: argparse.Namespace) -> int:
+    """Test for ``args.seconds`` or until Ctrl-C; status 1 when lines are joined or a diode is bridged."""
+    with flags.opened(args) as board:
+        known: list[LineFinding] = []
+        last: list[SelfTest] = []
+        tests = 0
+        pressed: frozenset[tuple[int, int]] = frozenset()
+        if not args.json:
+            terminal.say(f"Press every place of {board.port}, one after the other. Ctrl-C ends the test.")
+        for test in _tests(board, args):
+            last, tests, pressed = [test], tests + 1, pressed | test.pressed
+            for finding in test.findings:
+                if finding not in known:
+                    known.append(finding)
+                    if not args.json:
+                        _say(_tested(finding))
+        end = _tests_end(known, tests, pressed, last)
+    faults = sum(finding.kind == "fault" for finding in known)
+    if args.json:
+        found = [finding._asdict() for finding in [*map(_tested, known), *end]]
+        answer = {"faults": faults, "findings": found, "tests": tests, "pressed": sorted(pressed)}
+        print(json.dumps(answer), flush=True)
+        return min(faults, 1)
+    for said in end:
+        _say(said)
+    return min(faults, 1)
+
+
+def _tests(board: Board, args: argparse.Namespace) -> Iterator[SelfTest]:
+    until = None if args.seconds is None else board.clock() + args.seconds
+    with interrupt.usual_end():
+        while True:
+            yield board.self_test(max(2.0, args.timeout))
+            if until is not None and board.clock() >= until:
+                return
+
+
+def _tests_end(
+    known: list[LineFinding], tests: int, pressed: frozenset[tuple[int, int]], last: list[SelfTest]
+) -> Iterator[Finding]:
+    if not last:
+        yield Finding("note", "no self-test was completed")
+        return
+    if not any(finding.kind == "fault" for finding in known):
+        yield Finding("ok", f"no line follows another one in {tests} self-tests")
+    if left := untried(last[0], pressed):
+        yield Finding("note", f"{left} switches were not seen pressed by a self-test, so their diodes are not tested")
+    else:
+        yield Finding("ok", "every switch was pressed in a self-test")
+
+
+def _tested(finding: LineFinding) -> Finding:
+    return Finding("fault" if finding.kind == "fault" else "note", finding.sentence)

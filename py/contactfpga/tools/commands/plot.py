@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from contactfpga.tools.console import outputs, reading, terminal
+from contactfpga.tools.console import outputs, progress, terminal
 
 EXTRA = "view"
 
@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.tools.view import plot, replayed
 
-    with reading.told(args.recording) as tell:
+    with progress.reading(args.recording) as tell:
         recording = replayed.load(args.recording, args.link, reading=tell)
     path = Path(args.output or f"{Path(args.recording).stem}.png")
     if path.suffix.lower() not in ENDINGS:

@@ -7,7 +7,7 @@ import contextlib
 import os
 import sys
 
-from contactfpga.tools.console import flags, interrupt, numbers, reading, terminal
+from contactfpga.tools.console import flags, interrupt, numbers, progress, terminal
 
 EXTRA = "view"
 
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from contactfpga.tools.view.player import Player
 
     with contextlib.ExitStack() as stack:
-        with reading.told(args.port or "") as tell:
+        with progress.reading(args.port or "") as tell:
             named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
             shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
         stack.enter_context(interrupt.usual_end())

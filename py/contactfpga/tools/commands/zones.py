@@ -5,19 +5,15 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-from typing import TYPE_CHECKING
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.robot.haptics import WithReadings
-from contactfpga.tools.console import flags, interrupt
+from contactfpga.tools.console import flags, interrupt, live
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.zone import Zones
-
-if TYPE_CHECKING:
-    from contactfpga.tools.console.live import Frames  # which needs rich
 
 EXTRA = None
 
@@ -41,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     flags.check_forces(args)
     if args.json:
         return _json(args)
-    from contactfpga.tools.console import live, views  # rich, which scripts do without
+    from contactfpga.tools.console import views  # rich, which scripts do without
 
     with flags.opened(args, args.record) as board:
         follow = _Follow(args, Forces.of(board, args.units, args.friction))
@@ -63,9 +59,9 @@ class _Follow:
         self.tracks: Tracks | None = None
         self.forces = forces
 
-    def frames(self, board: Board) -> Frames:
+    def frames(self, board: Board) -> live.FrameSource:
         """The board's frames, to the end that was asked for; with forces, each once its readings are known."""
-        frames: Frames = board if self.forces is None else WithReadings(board)
+        frames: live.FrameSource = board if self.forces is None else WithReadings(board)
         return frames if self._seconds is None else _Limited(frames, self._seconds)
 
     def take(self, zones: Zones) -> None:
@@ -78,7 +74,7 @@ class _Follow:
 class _Limited:
     """Yield frames for this many seconds of device time, then end as a recording does."""
 
-    def __init__(self, frames: Frames, seconds: float):
+    def __init__(self, frames: live.FrameSource, seconds: float):
         self._frames, self._left_us = frames, seconds * 1e6
         self._before_us: int | None = None
 

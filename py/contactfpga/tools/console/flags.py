@@ -79,6 +79,14 @@ def opened(args: argparse.Namespace, record: str | None = None) -> Board:
     return driver.open(args.port, args.skin, baud=args.baud, record=record, timeout=args.timeout)
 
 
+def known_skin(board: Board) -> Skin | None:
+    """The board's Skin; None where only its hello is known."""
+    try:
+        return board.skin
+    except ContactFPGAError:
+        return None
+
+
 def workers(parser: argparse.ArgumentParser) -> None:
     """Where the pieces of a long computation run."""
     parser.add_argument("--jobs", type=numbers.JOBS, metavar="N", help="Number of processes (default: one per core).")

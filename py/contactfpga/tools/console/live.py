@@ -1,23 +1,25 @@
-"""A display that follows a board."""
+"""Follow a board frame by frame, and draw some of them. What draws needs rich, which scripts do without."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Protocol
-
-from rich.console import Console, RenderableType
-from rich.live import Live
+from typing import TYPE_CHECKING, Protocol
 
 from contactfpga.driver.board import Board
+from contactfpga.driver.health import Finding
 from contactfpga.driver.silence import Silence, longest_pause_s
-from contactfpga.errors import ReadTimeout, ReplayEnded
+from contactfpga.errors import PortLost, ReadTimeout, ReplayEnded
 from contactfpga.tools.console import interrupt, terminal
 from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
 
 REFRESH_US = 66_667
 
@@ -43,7 +45,7 @@ class Room:
         return self if self.height is None else dataclasses.replace(self, height=max(1, self.height - lines))
 
 
-Render = Callable[[Zones, Room], RenderableType]
+Render = Callable[[Zones, Room], "RenderableType"]
 
 Take = Callable[[Zones], None]
 """Gets every frame, also those that are not shown."""
@@ -53,14 +55,14 @@ def _ignore(zones: Zones) -> None:
     pass
 
 
-class Frames(Protocol):
+class FrameSource(Protocol):
     """What gives the frames of a board in order."""
 
     def next(self, timeout: float = 1.0) -> Zones: ...
 
 
 def show(
-    board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: Frames | None = None
+    board: Board, args: argparse.Namespace, render: Render, take: Take = _ignore, frames: FrameSource | None = None
 ) -> int:
     """Show one frame with ``--once``, otherwise fifteen per second until Ctrl-C or the recording ends, and one per
     second where nothing can be redrawn; ``frames``: what gives the board's, by default it does."""
@@ -72,12 +74,12 @@ def show(
         console.print(render(zones, room(console, endless=True)))
         return 0
     with interrupt.usual_end():
-        _follow(board, args, render, take, frames, console)
+        _display(board, args, render, take, frames, console)
     return 0
 
 
-def _follow(
-    board: Board, args: argparse.Namespace, render: Render, take: Take, frames: Frames, console: Console
+def _display(
+    board: Board, args: argparse.Namespace, render: Render, take: Take, frames: FrameSource, console: Console
 ) -> None:
     """Show frames until there are no more."""
     if not terminal.of().live:
@@ -86,10 +88,60 @@ def _follow(
             terminal.say(what, sys.stderr, hang=2)
         _list(board, frames, args, console, render, take)
         return
+    from rich.live import Live
+
     with Live(console=console, auto_refresh=False) as live:
         for found in _paced(board, frames, args.timeout, take, tell_silence=True):
             shown = str(found) if isinstance(found, Silence) else render(found, room(console))
             live.update(shown, refresh=True)
+
+
+def follow(
+    board: Board, args: argparse.Namespace, take: Callable[[Zones], None], render: Render | None = None
+) -> tuple[float, list[Finding]]:
+    """Hand every frame to ``take`` until ``args.seconds`` of device time are over (None: no limit), the recording ends,
+    no frame comes any more, or Ctrl-C. Where the terminal can be redrawn it shows what ``render`` makes of fifteen
+    frames per second.
+
+    Returns the device time that was followed, in s, and what is to be said of its end and of frames that were lost.
+    """
+    first_us: int | None = None
+    time_us = 0
+    findings: list[Finding] = []
+    with shown(render) as show, interrupt.usual_end(), contextlib.suppress(ReplayEnded):
+        try:
+            while args.seconds is None or first_us is None or time_us - first_us < args.seconds * 1e6:
+                zones = board.next(args.timeout)
+                if first_us is None or zones.time_us < time_us:  # the board started again
+                    first_us = zones.time_us
+                time_us = zones.time_us
+                take(zones)
+                show(zones)
+        except (PortLost, ReadTimeout) as error:  # what was found is worth having all the same
+            findings.append(Finding("fault", str(error)))
+    lost = board.stats.lost + board.stats.dropped
+    if lost:
+        findings.append(Finding("note", f"{lost} frames were lost on the way; what they held is not known"))
+    return 0.0 if first_us is None else (time_us - first_us) / 1e6, findings
+
+
+@contextlib.contextmanager
+def shown(render: Render | None) -> Iterator[Take]:
+    """Draws what ``render`` makes of the frames that it is given, where the terminal can be redrawn."""
+    if render is None or not terminal.of().live:
+        yield lambda zones: None
+        return
+    from rich.live import Live
+
+    console = terminal.console()
+    with Live(console=console, auto_refresh=False) as display:
+        refresh = _Refresh()
+
+        def show(zones: Zones) -> None:
+            if refresh.due(zones):
+                display.update(render(zones, room(console)), refresh=True)
+
+        yield show
 
 
 def room(console: Console, endless: bool = False) -> Room:
@@ -98,7 +150,9 @@ def room(console: Console, endless: bool = False) -> Room:
     return Room(console, shown.width, None if endless else shown.height, shown.unicode)
 
 
-def _list(board: Board, frames: Frames, args: argparse.Namespace, console: Console, render: Render, take: Take) -> None:
+def _list(
+    board: Board, frames: FrameSource, args: argparse.Namespace, console: Console, render: Render, take: Take
+) -> None:
     """Show one frame per second below the other, at once the first, and at the end the last, be it that of a recording
     or the one at which Ctrl-C comes."""
     waits: Zones | None = None  # the last one, while it is not shown
@@ -121,14 +175,14 @@ def _list(board: Board, frames: Frames, args: argparse.Namespace, console: Conso
 
 
 def _paced(
-    board: Board, frames: Frames, timeout: float, take: Take, tell_silence: bool = False
+    board: Board, frames: FrameSource, timeout: float, take: Take, tell_silence: bool = False
 ) -> Iterator[Zones | Silence]:
     """One frame every REFRESH_US of device time, and the last one of a recording in any case.
 
     With ``tell_silence`` no table stands still: where no frame comes what is yielded says so, until the timeout.
     """
     wait_s = min(timeout, SILENT_S + longest_pause_s(board.hello, None)) if tell_silence else timeout
-    pace = Pace()
+    refresh = _Refresh()
     skipped = None
     while True:
         try:
@@ -143,14 +197,14 @@ def _paced(
                 yield skipped  # the last frame is shown in any case
             return
         take(zones)
-        if pace.due(zones):
+        if refresh.due(zones):
             skipped = None
             yield zones
         else:
             skipped = zones
 
 
-class Pace:
+class _Refresh:
     """Of frames that are shown: one every REFRESH_US of device time, not faster than that in real time.
 
     A board on a port keeps that pace by itself; the simulated one and a recording would run ahead.

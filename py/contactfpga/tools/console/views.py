@@ -12,13 +12,10 @@ from rich.text import Text
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError, MissingExtra
 from contactfpga.robot.haptics import Contact, Contacts
-from contactfpga.skin import Skin
-from contactfpga.skin.derived import Derived
-from contactfpga.tools.console import drawn_settling, drawn_sheet, terminal
+from contactfpga.tools.console import drawn_sheet, terminal
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tools.console.live import Room
 from contactfpga.tracking.tracks import Track, Tracks
-from contactfpga.zones.settling import Settling
 from contactfpga.zones.watch import Watch
 from contactfpga.zones.zone import Zones
 
@@ -53,11 +50,11 @@ def zones_view(
     shown: list[RenderableType]
     if beside:
         both = Table.grid(padding=(0, BESIDE))
-        both.add_row(_styled(drawing), listed)
+        both.add_row(styled(drawing), listed)
         shown = [both]
     else:
         high = drawn_sheet.size(zones, scale)[1]
-        shown = [_styled(drawing), table(zones, left.without(high).height, tracks, found)]
+        shown = [styled(drawing), table(zones, left.without(high).height, tracks, found)]
     return Group(*shown, Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
@@ -69,7 +66,7 @@ def watch_view(board: Board, watch: Watch, suspected: list[str], zones: Zones, r
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
     scale = drawn_sheet.scales(zones, left.width, left.height)[0]
     drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board), _marks(watch))
-    return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
+    return Group(styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
 def _marks(watch: Watch) -> drawn_sheet.Marks | None:
@@ -94,16 +91,7 @@ def cells_view(board: Board, zones: Zones, room: Room) -> RenderableType:
     left = room.without(below.count("\n") + 1 + LEGEND_LINES)
     scale = drawn_sheet.scales(zones, left.width, left.height)[0]
     drawing = drawn_sheet.draw(zones, scale, room.unicode, _mask(board))
-    return Group(_styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
-
-
-def settling_view(found: Settling, skin: Skin, room: Room) -> RenderableType:
-    """What a measurement of settle times found up to now."""
-    wide = 2 * skin.columns <= room.width
-    drawing = drawn_settling.draw(found, Derived(skin).clocks_per_us, skin.mask, wide, room.unicode)
-    known = int((found.clocks > 0).sum())
-    below = f"{drawing.legend}\n{known} of {skin.rows * skin.columns - len(skin.mask)} cells measured"
-    return Group(_styled(drawing), Text(terminal.wrapped(below, room.width)))
+    return Group(styled(drawing), Text(terminal.wrapped(drawing.legend, room.width)), Text(below))
 
 
 def _layout(zones: Zones, room: Room, table_wide: int) -> tuple[int, bool]:
@@ -170,7 +158,8 @@ def _mask(board: Board) -> drawn_sheet.Mask:
         return ()
 
 
-def _styled(drawing: drawn_sheet.Drawing) -> Text:
+def styled(drawing: drawn_sheet.Drawing) -> Text:
+    """A drawing with its colors."""
     text = Text(no_wrap=True)
     for number, (characters, kinds) in enumerate(zip(drawing.characters, drawing.kinds.tolist())):
         if number:

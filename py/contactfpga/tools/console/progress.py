@@ -16,7 +16,7 @@ LIVE_S, LINES_S = 0.2, 10.0
 
 
 @contextlib.contextmanager
-def told(name: str) -> Iterator[Callable[[int, int], None]]:
+def reading(name: str) -> Iterator[Callable[[int, int], None]]:
     """To be called now and then with the bytes that have been read of a file, and those in it."""
     live = terminal.of(sys.stderr).live
     due_s, said = time.monotonic() + SOON_S, False

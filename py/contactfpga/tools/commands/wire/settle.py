@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,11 +14,17 @@ from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError, NoSuchCommand, PortLost, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
-from contactfpga.tools.console import drawn_settling, interrupt, terminal
-from contactfpga.tools.console.bouncing import NAMED, bare_skin
-from contactfpga.tools.console.following import shown
+from contactfpga.tools.commands.wire.bounce import NAMED, bare_skin
+from contactfpga.tools.console import interrupt, live, terminal
+from contactfpga.tools.console.drawn_sheet import CELL, FREE, MASKED, STUCK, Drawing, Mask
 from contactfpga.zones.settling import Settling
 from contactfpga.zones.zone import Zones
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+STEPS = 10
+"""Digits of the drawing."""
 
 
 def measure(board: Board, args: argparse.Namespace) -> int:
@@ -31,12 +37,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
             f"Press every place of {board.port} for a moment, or lay a plate on the sheet. Ctrl-C ends the measurement."
         )
 
-    def render(_: Zones, room: Any) -> Any:
-        from contactfpga.tools.console import views  # rich, which scripts do without
-
-        return views.settling_view(found, skin, room)
-
-    seconds, end = _follow(board, args, found, None if args.json else render)
+    seconds, end = _follow(board, args, found, None if args.json else lambda _, room: _view(found, skin, room))
     if args.json:
         print(json.dumps(_answer(found, skin, seconds, end)), flush=True)
     else:
@@ -55,13 +56,15 @@ def _settling(board: Board, skin: Skin) -> Settling:
     return Settling((skin.rows, skin.columns), first, settle, skips=skin.reads_rows, guard=skin.guard)
 
 
-def _follow(board: Board, args: argparse.Namespace, found: Settling, render: Any) -> tuple[float, list[Finding]]:
+def _follow(
+    board: Board, args: argparse.Namespace, found: Settling, render: live.Render | None
+) -> tuple[float, list[Finding]]:
     """Measure until the end, and leave the board as it was; returns the seconds that it took and what is to be said of
     the end."""
     findings: list[Finding] = []
     zones, past_us = board.sample_at(0, args.timeout), 0
     found.start(_cells(zones))
-    with shown(render) as show:
+    with live.shown(render) as show:
         try:
             with interrupt.usual_end():
                 while args.seconds is None or past_us < args.seconds * 1e6:
@@ -135,7 +138,7 @@ def _show(found: Settling, skin: Skin, end: list[Finding]) -> None:
         terminal.say("Nothing was measured: no cell read pressed for long enough at the full settle time.")
         return
     place = terminal.of()
-    drawing = drawn_settling.draw(found, per_us, skin.mask, 2 * skin.columns <= place.width, place.unicode)
+    drawing = drawn(found, per_us, skin.mask, 2 * skin.columns <= place.width, place.unicode)
     print(drawing.text)
     terminal.say(drawing.legend)
     terminal.say(
@@ -193,3 +196,42 @@ def _propose(found: Settling, skin: Skin) -> None:
         )
         return
     terminal.say(f"Proposed, {MARGIN:g} times the longest of the measured cells:\nsettle_us = {settle_us:g}")
+
+
+def _view(found: Settling, skin: Skin, room: live.Room) -> RenderableType:
+    """What was found up to now."""
+    from rich.console import Group
+    from rich.text import Text
+
+    from contactfpga.tools.console import views  # rich, which scripts do without
+
+    wide = 2 * skin.columns <= room.width
+    drawing = drawn(found, Derived(skin).clocks_per_us, skin.mask, wide, room.unicode)
+    known = int((found.clocks > 0).sum())
+    below = f"{drawing.legend}\n{known} of {skin.rows * skin.columns - len(skin.mask)} cells measured"
+    return Group(views.styled(drawing), Text(terminal.wrapped(below, room.width)))
+
+
+def drawn(found: Settling, clocks_per_us: int, mask: Mask = (), wide: bool = True, unicode: bool = True) -> Drawing:
+    """The sheet, row 0 on top, with a digit for each cell.
+
+    The digit d: a cell reads pressed after d to d + 1 tenths of the settle time. Slow ones have the kind STUCK.
+    ``wide``: with a space between cells."""
+    clocks, free = found.clocks, "·" if unicode else "."
+    digits = np.array([str(digit) for digit in range(STEPS)])
+    shown = np.where(clocks > 0, digits[np.maximum(clocks - 1, 0) * STEPS // found.settle], free)
+    kinds = np.where(clocks > 0, CELL, FREE)
+    for row, column in found.slow().cells:
+        kinds[row, column] = STUCK
+    for row, column in mask:
+        shown[row, column], kinds[row, column] = " ", MASKED
+    if wide:
+        rows, columns = shown.shape
+        spaced, of = np.full((rows, 2 * columns), " "), np.full((rows, 2 * columns), FREE)
+        spaced[:, ::2], of[:, ::2] = shown, kinds
+        shown, kinds = spaced, of
+    legend = (
+        f"d: reads pressed after d to d + 1 tenths of the settle time of {found.settle} clocks "
+        f"({found.settle / clocks_per_us:g} us); {free} not measured"
+    )
+    return Drawing(shown, kinds, legend + ("; blank: no switch" if tuple(mask) else ""))

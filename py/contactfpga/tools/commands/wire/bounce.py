@@ -14,8 +14,7 @@ from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
 from contactfpga.errors import ContactFPGAError
 from contactfpga.skin import Skin
-from contactfpga.tools.console import terminal
-from contactfpga.tools.console.following import follow, known_skin
+from contactfpga.tools.console import flags, live, terminal
 from contactfpga.zones.bounce import QUIET_US, Bounce
 from contactfpga.zones.zone import Zones
 
@@ -41,7 +40,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
         return views.cells_view(board, zones, room)
 
-    seconds, end = follow(board, args, bounce.update, None if args.json else render)
+    seconds, end = live.follow(board, args, bounce.update, None if args.json else render)
     bounce.finish()
     end += _overwritten(board)
     if args.json:
@@ -53,7 +52,7 @@ def measure(board: Board, args: argparse.Namespace) -> int:
 
 def bare_skin(board: Board, hidden: str) -> Skin:
     """The board's Skin, in which no debounce hides something."""
-    skin = known_skin(board)
+    skin = flags.known_skin(board)
     if skin is None:
         raise ContactFPGAError(
             f"{board.port}: a hello does not tell whether the board debounces, which would hide {hidden}; give the "

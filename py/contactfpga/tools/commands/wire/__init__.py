@@ -6,7 +6,8 @@ import argparse
 
 from contactfpga.driver.board import Board
 from contactfpga.errors import ContactFPGAError
-from contactfpga.tools.console import bouncing, flags, numbers, settling
+from contactfpga.tools.commands.wire import bounce, settle
+from contactfpga.tools.console import flags, live, numbers
 
 EXTRA = None
 
@@ -15,10 +16,10 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     """Add the command's flags to its parser."""
     flags.connection(parser)
     flags.once(parser)
-    bounce = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
-    parser.add_argument("--bounce", action="store_true", help=bounce)
-    settle = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
-    parser.add_argument("--settle", action="store_true", help=settle)
+    bounces = 'Measure how long each switch bounces, and propose a debounce; needs debounce = "none" and --skin.'
+    parser.add_argument("--bounce", action="store_true", help=bounces)
+    settles = "Measure how many clocks each switch takes to read pressed, and propose settle_us; needs the same."
+    parser.add_argument("--settle", action="store_true", help=settles)
     seconds = "Seconds of device time to measure for (default: until Ctrl-C)."
     parser.add_argument("--seconds", type=numbers.SECONDS, metavar="S", help=seconds)
     parser.add_argument("--json", action="store_true", help="Print one JSON object with what was measured.")
@@ -42,11 +43,11 @@ def _measure(args: argparse.Namespace) -> int:
         raise ContactFPGAError(f"--once shows one frame, which tells of no {what}; leave it out")
     with flags.opened(args) as board:
         _check_cells(board)
-        return bouncing.measure(board, args) if args.bounce else settling.measure(board, args)
+        return bounce.measure(board, args) if args.bounce else settle.measure(board, args)
 
 
 def _show(args: argparse.Namespace) -> int:
-    from contactfpga.tools.console import live, views
+    from contactfpga.tools.console import views  # rich, which scripts do without
 
     with flags.opened(args) as board:
         _check_cells(board)
