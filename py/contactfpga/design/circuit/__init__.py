@@ -4,11 +4,9 @@ One model for all that asks: `contactfpga settle`, the check of a Skin that stat
 study of failures. SI units; capacitances in pF and times in us where a name says so.
 """
 
-from contactfpga.design.circuit.static import Problem, check, problems
-from contactfpga.design.circuit.table import load as load_circuit
-from contactfpga.design.circuit.table import load_checked
+from contactfpga.design.circuit.static import Problem, check, load_checked, problems
 from contactfpga.design.circuit.times import Needs, needed
-from contactfpga.design.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode
+from contactfpga.design.circuit.values import DIODES, SCHOTTKY, SILICON, Circuit, CircuitError, Diode, load_circuit
 
 __all__ = [
     "DIODES",

@@ -66,7 +66,7 @@ class Phase:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Passed:
+class PhaseResult:
     """What happened in the last drive of a phase."""
 
     phase: Phase
@@ -83,7 +83,7 @@ def rest_volts(phase: Phase) -> np.ndarray:
     return transient.at_rest(phase.network, phase.drives[-1]).lines
 
 
-def passed(phase: Phase) -> Passed:
+def passed(phase: Phase) -> PhaseResult:
     """Let the phase pass; the time ends when nothing that matters can happen any more."""
     network = phase.network
     state = transient.at_rest(network, phase.drives[0])
@@ -101,7 +101,7 @@ def passed(phase: Phase) -> Passed:
         trace = dataclasses.replace(
             trace, seconds=np.append(trace.seconds, 2 * longest_s(network)), volts=np.vstack([trace.volts, rest])
         )
-    return Passed(phase, trace)
+    return PhaseResult(phase, trace)
 
 
 def longest_s(network: Network) -> float:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from contactfpga.design.circuit import patterns, phases, transient
 from contactfpga.design.circuit.network import Network
 from contactfpga.design.circuit.phases import Levels, Phase
-from contactfpga.design.circuit.values import Circuit, CircuitError
+from contactfpga.design.circuit.values import Circuit, CircuitError, load_circuit
+from contactfpga.skin import Skin
 
 NOISE_V = 0.3
 """Between a level and VIL or VIH at least."""
@@ -153,3 +155,15 @@ def check(circuit: Circuit, rows: int, columns: int, diodes: str = "col2row", pr
     found: Sequence[Problem] = problems(circuit, rows, columns, diodes, projects)
     if found:
         raise CircuitError(str(found[0]))
+
+
+def load_checked(path: str | Path, skin: Skin) -> Circuit | None:
+    """The circuit in a Skin's file, if it works with a board of this Skin; None where it has no table. Raises
+    CircuitError for a sheet whose pins would carry more than they may, or whose levels are too near to VIL or VIH."""
+    circuit = load_circuit(path)
+    if circuit is not None:
+        try:
+            check(circuit, skin.rows, skin.columns, skin.diodes, skin.reads_rows)
+        except CircuitError as error:
+            raise CircuitError(f"{path}: {error}; `contactfpga settle --skin {path}` shows all") from None
+    return circuit

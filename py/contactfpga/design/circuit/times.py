@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from contactfpga.design.circuit import patterns, phases, static
 from contactfpga.design.circuit.network import Network
-from contactfpga.design.circuit.phases import Levels, Passed, Phase
+from contactfpga.design.circuit.phases import Levels, Phase, PhaseResult
 from contactfpga.design.circuit.values import Circuit
 
 MARGIN = 1.3
@@ -100,19 +100,19 @@ class _Sheet:
         self.circuit, self.levels = circuit, Levels.of(circuit, diodes)
         self.patterns: Mapping[str, object] = patterns.named(rows, columns)
 
-    def worst(self, names: Iterable[str], phase: Callable[[Network], Phase]) -> tuple[Time, list[Passed]]:
+    def worst(self, names: Iterable[str], phase: Callable[[Network], Phase]) -> tuple[Time, list[PhaseResult]]:
         found = {name: phases.passed(phase(Network(self.circuit, self.patterns[name]))) for name in names}  # type: ignore[arg-type]
         worst = max(found, key=lambda name: found[name].seconds)
         return Time(found[worst].seconds, worst), list(found.values())
 
 
-def _lowest(passed: Passed) -> float:
+def _lowest(passed: PhaseResult) -> float:
     """Volts of the column without a pressed switch that is pulled farthest."""
     network, least = passed.phase.network, passed.phase.least[: passed.phase.network.columns]
     unpressed = passed.trace.volts[:, : network.columns][:, least > -math.inf]
     return float(unpressed.min(initial=network.circuit.supply_v))
 
 
-def _peak_ma(passed: Passed) -> float:
+def _peak_ma(passed: PhaseResult) -> float:
     amperes = passed.phase.network.pin_amperes(passed.trace.volts[1:], passed.phase.drives[-1])
     return 1e3 * float(abs(amperes).max(initial=0.0))

@@ -57,7 +57,7 @@ def _solved(matrix: np.ndarray, right: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([alone - across @ rest, rest])
 
 
-class _Driven:
+class _DriveEquations:
     """A network under a drive."""
 
     def __init__(self, network: Network, drive: Drive):
@@ -125,10 +125,10 @@ class _Driven:
 
 def at_rest(network: Network, drive: Drive) -> State:
     """The state that does not change any more."""
-    driven = _Driven(network, drive)
+    equations = _DriveEquations(network, drive)
     start = network.unpressed()
-    rates = driven.rates(start)
-    found = driven.solved(start, FOREVER_S, rates.line_c, rates.cell_c)
+    rates = equations.rates(start)
+    found = equations.solved(start, FOREVER_S, rates.line_c, rates.cell_c)
     if found is None:
         raise CircuitError("no state of rest was found for these values; take less extreme ones")
     return found[0]
@@ -142,14 +142,14 @@ def run(
     enough: Callable[[np.ndarray], bool] = lambda volts: False,
 ) -> Trace:
     """What the lines do for this long, or until ``enough`` says so of their volts."""
-    driven = _Driven(network, drive)
-    state, rates = start, driven.rates(start)
+    equations = _DriveEquations(network, drive)
+    state, rates = start, equations.rates(start)
     times, volts, now, step = [0.0], [start.lines], 0.0, FIRST_S
     for _ in range(STEPS):
         if now >= seconds * (1 - 1e-9) or enough(state.lines):
             return Trace(np.array(times), np.array(volts), state)
         step = min(step, seconds - now)
-        middle_end = _step(driven, state, rates, step)
+        middle_end = _step(equations, state, rates, step)
         if middle_end is None:
             step /= 8
             continue
@@ -173,16 +173,16 @@ def _ahead(diode: Diode, start: State, middle: State) -> State:
 
 
 def _step(
-    driven: _Driven, state: State, rates: _Rates, step: float
+    equations: _DriveEquations, state: State, rates: _Rates, step: float
 ) -> tuple[tuple[State, _Rates], tuple[State, _Rates], float] | None:
     """The middle and the end of a step, and its error in volts."""
     share = GAMMA * step / 2
-    middle = driven.solved(state, share, rates.line_c - share * rates.line_a, rates.cell_c - share * rates.cell_a)
+    middle = equations.solved(state, share, rates.line_c - share * rates.line_a, rates.cell_c - share * rates.cell_a)
     if middle is None:
         return None
     half = middle[1]
-    end = driven.solved(
-        _ahead(driven.diode, state, middle[0]),
+    end = equations.solved(
+        _ahead(equations.diode, state, middle[0]),
         share,
         SHARE_1 * half.line_c - SHARE_0 * rates.line_c,
         SHARE_1 * half.cell_c - SHARE_0 * rates.cell_c,
@@ -197,5 +197,5 @@ def _step(
             (rates.cell_a, half.cell_a, last.cell_a),
         )
     ]
-    error = driven.correction(last, share, *parts)
+    error = equations.correction(last, share, *parts)
     return middle, end, float(np.abs(error.lines).max())

@@ -1,12 +1,14 @@
-"""The values of a sheet's circuit. They only say what is there; nothing is computed here."""
+"""The values of a sheet's circuit, and the table `[circuit]` in a Skin's file that holds them; nothing is computed."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import Any
 
 from contactfpga.errors import ContactFPGAError
+from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite, shown
 
 
@@ -136,3 +138,25 @@ def knee_v(diode: Diode) -> float:
     """Above this Newton's method is held back: the exponential outruns it."""
     step = diode.emission * THERMAL_V
     return step * math.log(step / (math.sqrt(2) * diode.saturation_a))
+
+
+def load_circuit(path: str | Path) -> Circuit | None:
+    """The circuit in a Skin's file; None where it has no table ``[circuit]``. Raises CircuitError."""
+    return tomlfile.load_table(path, "circuit", _read, CircuitError)
+
+
+def _read(values: Any) -> Circuit:
+    """The circuit that a TOML table describes; its keys are the fields of :class:`Circuit`. ``diode`` is a name or a
+    table with the fields of :class:`Diode`."""
+    given = dict(tomlfile.fields_of(Circuit, "circuit", values, CircuitError))
+    if isinstance(diode := given.get("diode"), str):
+        if diode not in DIODES:
+            raise CircuitError(f"diode is {shown(diode)}; it must be one of {', '.join(DIODES)}, or [circuit.diode]")
+        given["diode"] = DIODES[diode]
+    elif diode is not None:
+        fields = tomlfile.fields_of(Diode, "circuit.diode", diode, CircuitError)
+        missing = [field.name for field in dataclasses.fields(Diode) if field.name not in fields]
+        if missing:
+            raise CircuitError(f"{missing[0]} is missing in [circuit.diode]; it needs all of its fields")
+        given["diode"] = Diode(**fields)
+    return Circuit(**given)

@@ -79,7 +79,7 @@ def _gauss(count: int) -> tuple[Floats, Floats]:
 
 
 @dataclasses.dataclass(frozen=True)
-class _Placed:
+class _Shape:
     half_x_m: float
     """Half its extent along its own x axis, in m."""
     half_y_m: float
@@ -120,7 +120,7 @@ class _Placed:
 
 
 @dataclasses.dataclass(frozen=True)
-class Ellipse(_Placed):
+class Ellipse(_Shape):
     """A rounded body's patch: the pressure is Hertz's, p0 sqrt(1 - (x/a)^2 - (y/b)^2) (Johnson 3.5)."""
 
     @property
@@ -170,7 +170,7 @@ class Ellipse(_Placed):
 
 
 @dataclasses.dataclass(frozen=True)
-class Rectangle(_Placed):
+class Rectangle(_Shape):
     """A flat body's patch: the pressure is the same everywhere."""
 
     @property
