@@ -9,7 +9,7 @@ from bench import Bench, Drive
 from reversal import Slot, frames, projected, slots, small
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan import precharge, reversal, stuck
+from contactfpga_hdl.scan import frame_clock, precharge, reversal
 from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.model.golden import guard
 
@@ -243,7 +243,7 @@ def soon(monkeypatch) -> int:
 
 
 def test_retries_are_every_65_ms():
-    assert stuck.RETRY_BIT == reversal.RETRY_BIT == 16
+    assert frame_clock.RETRY_BIT == reversal.RETRY_BIT == 16
     assert guard.RETRY_US == 2**16
 
 

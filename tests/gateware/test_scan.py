@@ -11,7 +11,7 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga import Skin
 from contactfpga.skin.derived import EPOCH_BITS, TIME_BITS
-from contactfpga_hdl.scan import raster
+from contactfpga_hdl.scan.frame_clock import watch_epoch
 from contactfpga_hdl.scan.raster import Scanner
 
 SKINS = {
@@ -274,7 +274,7 @@ class Epochs(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        raster.watch_epoch(m, self.time, self.epoch, self.late)
+        watch_epoch(m, self.time, self.epoch, self.late)
         return m
 
 

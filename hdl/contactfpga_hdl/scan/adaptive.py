@@ -5,13 +5,12 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import HEARD_BITS, TIME_BITS, Derived
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, scan_ports
-from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.seek import Seek
 from contactfpga_hdl.scan.shift import RowChain
 from contactfpga_hdl.scan.stuck import Stuck, anywhere, present
-from contactfpga_hdl.util.upset import upset_count
 
 
 class _Sample:
@@ -176,31 +175,25 @@ class AdaptiveScanner(wiring.Component):
         with m.Elif(seek.ends & ~seen):
             m.d.sync += self.contact.eq(0)
 
-    def _tag_frame(self, m: Module, seek: Seek, driver: DirectRows | RowChain) -> None:
-        """Time and request at the first strobe, and how many slots there were up to the last."""
-        per_us = self.derived.clocks_per_us
-        prescaler = Signal(range(max(2, per_us)))
-        time = Signal(TIME_BITS)
-        begun = Signal(TIME_BITS)
-        waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
+    def _tag_frame(self, m: Module, seek: Seek, driver: wiring.Component) -> None:
+        """A frame begins with its first strobe; the tag also says how many slots there were up to the last."""
+        m.submodules.frame_clock = clock = FrameClock(self.skin)
         slots = Signal.like(self.tag.slots)
-        m.d.sync += prescaler.eq(prescaler + 1)
-        with m.If(prescaler == per_us - 1):
-            m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
+        m.d.comb += [
+            clock.frame_begins.eq(seek.strobe & seek.first),
+            clock.request.eq(self.request),
+            clock.heard.eq(self.heard),
+            self.epoch.eq(clock.epoch),
+        ]
         if not self.skin.dual:
-            m.d.comb += self.upset.eq(driver.upset | upset_count(m, "time", time, prescaler == per_us - 1))
-        watch_epoch(m, time, self.epoch)
+            m.d.comb += self.upset.eq(driver.upset | clock.upset)
         with m.If(seek.strobe):
             m.d.sync += slots.eq(slots + 1)
-        with m.If(seek.strobe & seek.first):
-            m.d.sync += [begun.eq(time), requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]
-        with m.Elif(self.request):
-            m.d.sync += waiting.eq(1)
         with m.If(seek.ends):
             m.d.sync += [
-                self.tag.time.eq(begun),
-                self.tag.requested.eq(requested),
-                self.tag.heard.eq(heard),
+                self.tag.time.eq(clock.begun),
+                self.tag.requested.eq(clock.requested),
+                self.tag.heard.eq(clock.known),
                 self.tag.slots.eq(slots),
                 slots.eq(0),
             ]

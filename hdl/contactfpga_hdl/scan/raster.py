@@ -4,10 +4,11 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, DirectRows, connect_pins, first_row, moves_sample, scan_ports
-from contactfpga_hdl.scan.stuck import RETRY_BIT, Stuck, present
-from contactfpga_hdl.util.upset import upset, upset_count
+from contactfpga_hdl.scan.stuck import Stuck, present
+from contactfpga_hdl.util.upset import upset
 
 
 class _Slots:
@@ -20,7 +21,6 @@ class _Slots:
         self.first = first_row(derived.skin)
         self.clock = Signal(range(slot), init=(slot - shifting) % slot)
         self.scans = Signal(init=begun)  # in the first slot and after it
-        self.ticks = Signal()  # the clock in us does
         self.following = Signal(lines, init=1 << (self.first + begun) % lines)  # row of the next one, one-hot
 
     @property
@@ -92,18 +92,20 @@ class Scanner(wiring.Component):
         self._mask_row(m, levels, sample)
         self._offer_row(m, sample)
         self._watch_contact(m, sample)
-        time = self._tag_frame(m, slots, sample)
+        clock = self._tag_frame(m, slots, sample)
         if skin.precharge_us:
-            self._precharge(m, slots, sample, time)
+            self._precharge(m, slots, sample, clock.time)
         if not skin.dual:
             found = upset(m, "row", slots.following, driver.drive)
-            m.d.comb += self.upset.eq(driver.upset | found | upset_count(m, "time", time, slots.ticks))
+            m.d.comb += self.upset.eq(driver.upset | found | clock.upset)
         m.d.comb += [
             stuck.columns.eq(sample.read),
             stuck.released.eq(sample.of_released),
             stuck.take.eq(sample.of_row & sample.is_last),
             self.tag.stuck.eq(stuck.count),
-            self.tag.fault.eq(stuck.count.any() | (self._check_lines(m, sample, stuck, time) if skin.guard else 0)),
+            self.tag.fault.eq(
+                stuck.count.any() | (self._check_lines(m, sample, stuck, clock.time) if skin.guard else 0)
+            ),
         ]
         return m
 
@@ -253,44 +255,31 @@ class Scanner(wiring.Component):
                 self.contact.eq(now | Mux(sample.is_last, seen, self.contact)),
             ]
 
-    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> Value:
-        """Time and request at the sample of row 0; the tag takes them over with the last row's strobe. Returns the
-        clock in us."""
-        per_us, late = self.derived.clocks_per_us, self.derived.column_shift_clocks
-        # The clock starts with the first slot of the last row, so that at this row's strobe it gives the time of row
+    def _tag_frame(self, m: Module, slots: _Slots, sample: _Sample) -> FrameClock:
+        """The clock. The tag takes over what it knows of the frame, and its time, with the last row's strobe."""
+        late = self.derived.column_shift_clocks
+        # The time starts with the first slot of the last row, so that at this row's strobe it gives the time of row
         # 0's sample: no register has to keep that.
         guarded = self.derived.row_clocks if self.skin.guard else 0
-        ahead = self.derived.row_shift_clocks + guarded - late
-        prescaler = Signal(range(max(2, per_us)), init=ahead % per_us)
-        time = Signal(TIME_BITS, init=ahead // per_us % (1 << TIME_BITS))
-        runs = Signal()
+        clock = FrameClock(self.skin, ahead=self.derived.row_shift_clocks + guarded - late)
+        m.submodules.frame_clock = clock
+        started = Signal()
         with m.If(slots.is_last):
-            m.d.sync += runs.eq(1)
-        m.d.comb += slots.ticks.eq((runs | slots.is_last) & (prescaler == per_us - 1))
-        with m.If(runs | slots.is_last):
-            m.d.sync += [prescaler.eq(Mux(slots.ticks, 0, prescaler + 1)), time.eq(time + slots.ticks)]
-        watch_epoch(m, time, self.epoch, late=ahead < 0)
-        waiting, requested, heard = Signal(), Signal(), Signal(HEARD_BITS)
+            m.d.sync += started.eq(1)
         # What comes while columns are shifted in came after their sample: it asks for the next frame. Where the sample
         # moves so does what comes after the first clock.
         moves = moves_sample(self.derived)
         begins = slots.begins_rows if moves else (sample.begins if late else sample.of_row) & sample.is_first
-        asked, heard_now = requested, heard
-        if not late and not moves:
-            asked, heard_now = Mux(begins, waiting, requested), Mux(begins, self.heard, heard)
-        with m.If(begins):
-            m.d.sync += [requested.eq(waiting), waiting.eq(self.request), heard.eq(self.heard)]
-        with m.Elif(self.request):
-            m.d.sync += waiting.eq(1)
+        m.d.comb += [
+            clock.runs.eq(started | slots.is_last),
+            clock.frame_begins.eq(begins),
+            clock.request.eq(self.request),
+            clock.heard.eq(self.heard),
+            self.epoch.eq(clock.epoch),
+        ]
+        requested, heard = clock.requested, clock.known
+        if not late and not moves:  # the only row is the last one, too
+            requested, heard = Mux(begins, clock.waiting, requested), Mux(begins, self.heard, heard)
         with m.If(sample.of_row & sample.is_last):
-            m.d.sync += [self.tag.time.eq(time), self.tag.requested.eq(asked), self.tag.heard.eq(heard_now)]
-        return time
-
-
-def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:
-    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
-    highest = time[EPOCH_BITS - 1]
-    counts = Signal(init=not late)  # not when 0 is first reached
-    before = Signal(name="before_epoch")
-    m.d.sync += [counts.eq(counts | ~highest), before.eq(highest & counts)]
-    m.d.comb += epoch.eq(before & ~highest)
+            m.d.sync += [self.tag.time.eq(clock.time), self.tag.requested.eq(requested), self.tag.heard.eq(heard)]
+        return clock

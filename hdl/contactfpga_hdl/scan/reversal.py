@@ -7,9 +7,9 @@ from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import TIME_BITS, Derived
+from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
 from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways, scan_ports
 from contactfpga_hdl.scan.precharge import Precharge
-from contactfpga_hdl.scan.raster import watch_epoch
 from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, tag_faults, turned
 from contactfpga_hdl.scan.reversal_rows import (
     clean_rows,
@@ -21,8 +21,7 @@ from contactfpga_hdl.scan.reversal_rows import (
 from contactfpga_hdl.scan.reversal_state import Sheet, Turn
 from contactfpga_hdl.scan.reversal_turns import take_turns
 from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
-from contactfpga_hdl.scan.stuck import RETRY_BIT, count_columns, present
-from contactfpga_hdl.util.upset import upset_count
+from contactfpga_hdl.scan.stuck import count_columns, present
 
 
 class ReversalScanner(wiring.Component):
@@ -160,23 +159,18 @@ class ReversalScanner(wiring.Component):
 
     def _tag_frame(self, m: Module, turn: Turn) -> None:
         """A frame's tag is what there is when it begins."""
-        per_us = self.derived.clocks_per_us
-        prescaler, waiting = Signal(range(max(2, per_us))), Signal()
-        m.d.sync += prescaler.eq(prescaler + 1)
-        with m.If(prescaler == per_us - 1):
-            m.d.sync += [prescaler.eq(0), self.time.eq(self.time + 1)]
-        if not self.skin.dual:
-            m.d.comb += self.upset.eq(upset_count(m, "time", self.time, prescaler == per_us - 1))
-        watch_epoch(m, self.time, self.epoch)
-        with m.If(turn.begins):
-            m.d.sync += [
-                self.tag.time.eq(self.time),
-                self.tag.requested.eq(waiting),
-                self.tag.heard.eq(self.heard),
-                waiting.eq(self.request),
-            ]
-        with m.Elif(self.request):
-            m.d.sync += waiting.eq(1)
-        m.d.comb += turn.wanted.eq(waiting | self.due if self.skin.send == "on_change" else 1)
+        m.submodules.frame_clock = clock = FrameClock(self.skin)
+        m.d.comb += [
+            clock.frame_begins.eq(turn.begins),
+            clock.request.eq(self.request),
+            clock.heard.eq(self.heard),
+            self.time.eq(clock.time),
+            self.epoch.eq(clock.epoch),
+            self.upset.eq(clock.upset),
+            self.tag.time.eq(clock.begun),
+            self.tag.requested.eq(clock.requested),
+            self.tag.heard.eq(clock.known),
+            turn.wanted.eq(clock.waiting | self.due if self.skin.send == "on_change" else 1),
+        ]
         with m.If(turn.strobe):
-            m.d.sync += self.sampled.eq(self.time)
+            m.d.sync += self.sampled.eq(clock.time)

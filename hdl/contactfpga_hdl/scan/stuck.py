@@ -8,9 +8,6 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import STUCK_BITS, STUCK_MAX
 from contactfpga_hdl.util.bits import popcount
 
-RETRY_BIT = 16
-"""Bit of the clock in microseconds: each time it turns, stuck columns are tried again."""
-
 
 def present(skin: Skin, row: int) -> int:
     """Columns, as bits, in which this row has a switch that is not masked."""

@@ -9,6 +9,7 @@ from contactfpga.skin.derived import TIME_BITS, Derived
 from contactfpga.skin.units import digits_of_reading
 from contactfpga.wire.framing import DIGIT_BITS, FLAG_BITS
 from contactfpga.wire.units import KIND_UNITS, SEQUENCE_BITS, TRAILER_DIGITS, plain_bytes
+from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.units.ports import reading_layout
 
 PLACE_BITS = 6
@@ -68,14 +69,15 @@ class UnitPacker(wiring.Component):
 
     def _write(self, m: Module, write: wiring.PureInterface, filling: Signal) -> Signal:
         """Writes digits; returns the signal that is high in the clock in which a sweep is complete."""
-        time, begun = self._clock(m), Signal(TIME_BITS)
+        m.submodules.frame_clock = clock = FrameClock(self.skin)
+        begun = Signal(TIME_BITS)
         sequence = Signal(SEQUENCE_BITS)
         word = Signal(DIGIT_BITS * max(self._digits, TRAILER_DIGITS))
         left = Signal(range(max(self._digits, TRAILER_DIGITS) + 1))
         place = Signal(PLACE_BITS)
         trails, closes = Signal(), Signal()
         with m.If(self.sampled):
-            m.d.sync += begun.eq(time - self.derived.units.delay_us)
+            m.d.sync += begun.eq(clock.time - self.derived.units.delay_us)
         m.d.sync += closes.eq(0)
         with m.If(self.done):
             m.d.sync += [word.eq(self.reading.value), left.eq(self._digits), trails.eq(0)]
@@ -95,12 +97,3 @@ class UnitPacker(wiring.Component):
             write.en.eq((left != 0) | closes),
         ]
         return closes
-
-    def _clock(self, m: Module) -> Signal:
-        """A clock in us since power-up, the same that frames' times come from."""
-        per_us = self.derived.clocks_per_us
-        prescaler, time = Signal(range(max(2, per_us))), Signal(TIME_BITS)
-        m.d.sync += prescaler.eq(prescaler + 1)
-        with m.If(prescaler == per_us - 1):
-            m.d.sync += [prescaler.eq(0), time.eq(time + 1)]
-        return time

@@ -34,7 +34,8 @@ _GATES = (
     "opt_merge; opt_clean; aigmap; opt_merge; opt_clean; write_aiger -zinit -map names.txt design.aig"
 )
 _STORE = "link.store["  # the frames' memory, by far the most registers
-_CLOCKS = ("scan.clock", "scan.time", "scan.prescaler")  # registers that count clocks between events
+# Registers that count clocks between events.
+_CLOCKS = ("scan.clock", "scan.frame_clock.time", "scan.frame_clock.prescaler")
 # Outputs that say what is handed over, and the one that says when.
 _HANDED = {
     "row_cells": "row_transfer",

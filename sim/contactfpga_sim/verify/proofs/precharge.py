@@ -6,11 +6,11 @@ from typing import Literal
 from amaranth.hdl import Cat, Mux, Signal, Value
 
 from contactfpga.skin import Skin
+from contactfpga_hdl.scan.frame_clock import RETRY_BIT
 from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.precharge import LOOKS, Precharge
 from contactfpga_hdl.scan.raster import Scanner
 from contactfpga_hdl.scan.reversal import ReversalScanner
-from contactfpga_hdl.scan.stuck import RETRY_BIT
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.inside import Inside
@@ -154,7 +154,7 @@ def column_let_go(proof: Proof, dut: Scanner | ReversalScanner) -> None:
         m.d.comb += dut.due.eq(proof.free(1, "due"))
         sampled, time, runs = inside["begins"] | inside["rests"] & inside["settled"], dut.time, 1
     else:
-        sampled, time, runs = inside["of_released"], inside["time"], inside["runs"]
+        sampled, time, runs = inside["of_released"], inside["frame_clock.time"], inside["started"]
         late = proof.before(proof.before((inside["clock"] == dut.derived.row_clocks - 1) & inside["scans"]))
         proof.claim(sampled == late)
         _raster_lemmas(proof, inside, dut, late)

@@ -4,10 +4,9 @@ from functools import partial
 
 from contactfpga.choices import scans
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.adaptive import AdaptiveScanner
+from contactfpga_hdl.scan.frame_clock import FrameClock
 from contactfpga_hdl.scan.pins import DirectRows
 from contactfpga_hdl.scan.raster import Scanner
-from contactfpga_hdl.scan.reversal import ReversalScanner
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -34,12 +33,11 @@ def none_is_found(proof: Proof, scan: str) -> None:
 
 _ROW = Bug("a row turns", DirectRows, "selected",
     lambda rows, inside: rows ^ ~(inside.component.drive | inside.component.release))  # fmt: skip
-_SCANNERS = {"raster": Scanner, "adaptive": AdaptiveScanner, "reversal": ReversalScanner}
 
 
 def _bugs(scan: str) -> tuple[Bug, ...]:
     def time(bit: int) -> Bug:
-        return Bug(f"bit {bit} of the time turns", _SCANNERS[scan], "time",
+        return Bug(f"bit {bit} of the time turns", FrameClock, "time",
             lambda time, inside: time ^ inside.component.request << bit)  # fmt: skip
 
     slot = Bug("a bit of the slot's row turns", Scanner, "following",

@@ -1,0 +1,77 @@
+"""Device time in microseconds, and what of it and of requests belongs to a frame."""
+
+from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from contactfpga.skin import Skin
+from contactfpga.skin.derived import EPOCH_BITS, HEARD_BITS, TIME_BITS, Derived
+from contactfpga_hdl.util.upset import upset_count
+
+RETRY_BIT = 16
+"""Bit of the time: each time it toggles, stuck columns are tried again."""
+
+
+class FrameClock(wiring.Component):
+    """Counts microseconds, and keeps what was known as the last frame began.
+
+    runs (in): the time goes on. It is ``ahead`` clocks above 0 at power-up, or below.
+    request (in): high for a clock when one is received; ``heard`` (in): lowest bits of the number of the last one.
+    frame_begins (in): high for a clock.
+    time (out): in us.
+    epoch (out): high in the first clock of each further 2^``EPOCH_BITS`` us.
+    waiting (out): a request was received, and no frame has begun since.
+    begun, requested, known (out): ``time``, ``waiting`` and ``heard`` as the last frame began.
+    upset (out): a bit of the time flipped by itself, see :func:`~contactfpga_hdl.util.upset.upset`; not with ``dual``.
+    """
+
+    def __init__(self, skin: Skin, ahead: int = 0):
+        self.skin = skin
+        self.ahead = ahead
+        self._per_us = Derived(skin).clocks_per_us
+        super().__init__(
+            {
+                "runs": In(1, init=1),
+                "request": In(1),
+                "heard": In(HEARD_BITS),
+                "frame_begins": In(1),
+                "time": Out(TIME_BITS, init=ahead // self._per_us % (1 << TIME_BITS)),
+                "epoch": Out(1),
+                "waiting": Out(1),
+                "begun": Out(TIME_BITS),
+                "requested": Out(1),
+                "known": Out(HEARD_BITS),
+                "upset": Out(1),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        time = self.time
+        prescaler = Signal(range(max(2, self._per_us)), init=self.ahead % self._per_us)
+        ticks = Signal()
+        m.d.comb += ticks.eq(self.runs & (prescaler == self._per_us - 1))
+        with m.If(self.runs):
+            m.d.sync += [prescaler.eq(Mux(ticks, 0, prescaler + 1)), time.eq(time + ticks)]
+        if not self.skin.dual:
+            m.d.comb += self.upset.eq(upset_count(m, "time", time, ticks))
+        watch_epoch(m, time, self.epoch, late=self.ahead < 0)
+        with m.If(self.frame_begins):
+            m.d.sync += [
+                self.begun.eq(time),
+                self.requested.eq(self.waiting),
+                self.waiting.eq(self.request),
+                self.known.eq(self.heard),
+            ]
+        with m.Elif(self.request):
+            m.d.sync += self.waiting.eq(1)
+        return m
+
+
+def watch_epoch(m: Module, time: Signal, epoch: Signal, late: bool = False) -> None:
+    """``epoch`` is high in the first clock of each further 2^``EPOCH_BITS`` us; ``late``: the time begins below 0."""
+    highest = time[EPOCH_BITS - 1]
+    counts = Signal(init=not late)  # not when 0 is first reached
+    before = Signal(name="before_epoch")
+    m.d.sync += [counts.eq(counts | ~highest), before.eq(highest & counts)]
+    m.d.comb += epoch.eq(before & ~highest)
