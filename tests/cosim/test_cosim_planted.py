@@ -9,6 +9,7 @@ from sample import sample
 from contactfpga.skin import Skin
 from contactfpga_hdl import top
 from contactfpga_hdl.label import run, serial
+from contactfpga_hdl.report import divide
 from contactfpga_hdl.scan import raster
 from contactfpga_sim.model.golden import Timeline, predict
 from contactfpga_sim.verify.cosim import bench_amaranth
@@ -18,7 +19,12 @@ SKIN = Skin(rows=4, columns=6)
 CYCLES = 4 * 72 * 8
 
 # Stages that a Skin chooses, and where their classes are; the others are in the top.
-CHOSEN = {"scan": (raster, "Scanner"), "run": (run, "RunLabeller"), "serial": (serial, "SerialLabeller")}
+CHOSEN = {
+    "scan": (raster, "Scanner"),
+    "run": (run, "RunLabeller"),
+    "serial": (serial, "SerialLabeller"),
+    "Divider": (divide, "Divider"),
+}
 
 # boundary: the stage whose output it is, and the name of that output
 STAGES = {

@@ -85,34 +85,34 @@ FAULTS = {
         (f"{GATEWARE}/test_self_test.py::test_what_is_told_follows_from_each_slot_of_one_test_after_the_other",),
     ),
     "a long precharge is cut": Fault(
-        "scan/reversal_turns.py",
-        "min(charge - 1, charge - derived.precharge_clocks + self.listened)",
+        "scan/reversal_cycle.py",
+        "min(charge - 1, charge - derived.precharge_clocks + self._listened)",
         "charge - 1",
         (f"{GATEWARE}/test_reversal.py::test_gateware_does_what_the_golden_model_says_and_frames_are_true",),
     ),
     **{
         f"motion without {left_out}": Fault(
             "scan/reversal_rows.py",
-            "m.If(turn.strobe & ~pressed.any() & counts)",
+            "m.If(self.strobe & ~self.pressed & counts)",
             f"m.If({condition})",
             (f"{GATEWARE}/test_reversal_scanner.py",),
         )
         for left_out, condition in {
-            "a sample": "~pressed.any() & counts",
-            "an empty row": "turn.strobe & counts",
-            "a whole row": "turn.strobe & ~pressed.any()",
+            "a sample": "~self.pressed & counts",
+            "an empty row": "self.strobe & counts",
+            "a whole row": "self.strobe & ~self.pressed",
         }.items()
     },
     "motion stays": Fault(
         "scan/reversal_rows.py",
-        "        m.d.sync += moved.eq(0)\n",
-        "        m.d.sync += moved.eq(moved)\n",
+        "            m.d.sync += self.motion.eq(0)\n",
+        "            m.d.sync += self.motion.eq(self.motion)\n",
         (f"{GATEWARE}/test_reversal_scanner.py",),
     ),
     "a turn in a check asks for another one": Fault(
         "scan/reversal_guard.py",
-        "checks.asked.eq((checks.asked | turned(m, scan.time[CHECK_BIT])) & ~checks.starts)",
-        "checks.asked.eq(checks.asked & ~checks.starts | turned(m, scan.time[CHECK_BIT]))",
+        "self.asked.eq((self.asked | self.due) & ~self.starts)",
+        "self.asked.eq(self.asked & ~self.starts | self.due)",
         (f"{GATEWARE}/test_reversal_guard.py::test_checks_at_rest_wait_for_a_turn_after_the_check_of_a_frame",),
     ),
     "a turn in a round's last clock is lost": Fault(

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-MOST_MODULES, MOST_LINES = 25, 2870
+MOST_MODULES, MOST_LINES = 25, 2930
 LOADED = """
 import json, sys
 from amaranth.back import rtlil

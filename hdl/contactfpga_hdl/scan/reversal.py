@@ -8,19 +8,12 @@ from amaranth.lib.wiring import In, Out
 from contactfpga.skin import Skin
 from contactfpga.skin.derived import TIME_BITS, Derived
 from contactfpga_hdl.scan.frame_clock import RETRY_BIT, FrameClock
-from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways, scan_ports
+from contactfpga_hdl.scan.pins import DirectColumns, drives_columns_both_ways, moves_sample, scan_ports
 from contactfpga_hdl.scan.precharge import Precharge
-from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks, check_lines, tag_faults, turned
-from contactfpga_hdl.scan.reversal_rows import (
-    clean_rows,
-    offer_all_rows,
-    offer_driven_rows,
-    watch_contact,
-    watch_motion,
-)
-from contactfpga_hdl.scan.reversal_state import Sheet, Turn
-from contactfpga_hdl.scan.reversal_turns import take_turns
-from contactfpga_hdl.scan.self_test import SelfTest, test_lines, test_ports
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
+from contactfpga_hdl.scan.reversal_guard import CHECK_BIT, Checks
+from contactfpga_hdl.scan.reversal_rows import AllRows, Contact, DrivenRows, Motion, clean_rows
+from contactfpga_hdl.scan.self_test import SelfTest, test_ports
 from contactfpga_hdl.scan.stuck import count_columns, present
 
 
@@ -69,99 +62,99 @@ class ReversalScanner(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        sheet, turn, checks = Sheet(self.skin), Turn(self.derived), Checks(self.derived)
-        test = SelfTest(self.skin) if self.skin.self_test else None
-        self._read_sheet(m, sheet)
-        precharge = self._drive_sheet(m, sheet, turn, checks, test)
-        take_turns(m, self, sheet, turn, checks)
-        pressed = self._mask(m, sheet, turn)
-        offer_rows = offer_driven_rows if self.derived.skips else offer_all_rows
-        offer_rows(m, self, sheet, turn, pressed)
-        watch_contact(m, self, sheet, turn, pressed)
-        watch_motion(m, self, sheet, turn, pressed)
-        self._tag_frame(m, turn)
-        if self.skin.guard:
-            check_lines(m, self, sheet, turn, checks, precharge)
+        skin = self.skin
+        m.submodules.cycle = cycle = ReversalCycle(skin)
+        m.submodules.frame_clock = clock = FrameClock(skin)
+        m.submodules.precharge = precharge = Precharge(skin)
+        read, pressed = Signal(skin.rows), Signal(skin.column_lines)  # rows that read touched, columns pressed
+        rows = self._read_sheet(m, pressed)
+        m.d.comb += [
+            read.eq(rows & sum(1 << row for row in range(skin.rows) if present(skin, row))),
+            cycle.touched.eq(read | (self.busy if self.derived.debounced else 0)),
+            cycle.packed.eq(self.packed),
+            cycle.wanted.eq(clock.waiting | self.due if skin.send == "on_change" else 1),
+        ]
+        if moves_sample(self.derived):
+            m.d.comb += [cycle.moves.eq(self.moves), cycle.clocks.eq(self.clocks)]
+        self._hand_on(m, cycle, (rows & clean_rows(skin)).any(), read, pressed)
+        toggles = self._tag_frame(m, cycle, clock)
+        test = SelfTest(skin) if skin.self_test else None
+        self._drive_sheet(m, cycle, precharge, pressed, test)
+        if skin.guard:
+            self._check_lines(m, cycle, precharge, toggles, read, pressed)
         else:
-            m.d.comb += self.watched.eq(turned(m, self.time[CHECK_BIT]) & turn.rests)
+            m.d.comb += self.watched.eq(toggles & cycle.rests)
         if test is not None:
-            test_lines(m, self, sheet, turn, test)
-        tag_faults(m, self, turn)
+            self._test_lines(m, cycle, test, read, pressed)
         return m
 
-    def _read_sheet(self, m: Module, sheet: Sheet) -> None:
+    def _read_sheet(self, m: Module, pressed: Signal) -> Value:
+        """Returns rows that read touched, with those that are masked whole."""
         skin = self.skin
-        counts = sum(1 << row for row in range(skin.rows) if present(skin, row))
         rows = Signal(skin.rows)
         at_pins = self.pins.rows_read[: skin.rows]
         m.submodules.rows = FFSynchronizer(at_pins, rows, init=0 if skin.selects_low else -1)
         m.submodules.reader = reader = DirectColumns(skin)
-        touched = rows if skin.selects_low else ~rows
         m.d.comb += [
             reader.pins.columns.eq(self.pins.columns),
-            sheet.pressed.eq(~reader.levels if skin.selects_low else reader.levels),
-            sheet.read.eq(touched & counts),
-            sheet.touched.eq(sheet.read | (self.busy if self.derived.debounced else 0)),
-            sheet.clean.eq((touched & clean_rows(skin)).any()),
+            pressed.eq(~reader.levels if skin.selects_low else reader.levels),
         ]
+        return rows if skin.selects_low else ~rows
 
-    def _drive_sheet(self, m: Module, sheet: Sheet, turn: Turn, checks: Checks, test: SelfTest | None) -> Precharge:
-        """All pins come from registers; at power-up none is driven."""
+    def _hand_on(self, m: Module, cycle: ReversalCycle, wakes: Value, read: Value, pressed: Value) -> None:
+        """Rows that were driven, the contact pin, and what moved."""
         skin = self.skin
-        m.submodules.precharge = precharge = Precharge(skin)
-        begun = Signal()
-        m.d.sync += begun.eq(turn.begins)
-        selected, inverts = Cat(sheet.selected, sheet.guard)[: skin.row_lines], sheet.inverts
-        if skin.guard:
-            m.d.comb += precharge.guard_pressed.eq(checks.of_guard & sheet.pressed[-1])
-        if test is not None:
-            inverts = inverts | test.discharges
-        if drives_columns_both_ways(skin):
-            inverted = Signal()
-            m.d.sync += inverted.eq(inverts)
-            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
+        m.submodules.offer = offer = DrivenRows(skin) if self.derived.skips else AllRows(skin)
+        m.submodules.contact = contact = Contact()
+        m.submodules.motion = motion = Motion(skin)
+        counted, clean, last = self._mask(m, cycle, pressed), Signal(), ~cycle.todo.any()
+        untouched = cycle.begins & ~cycle.touched.any()
+        wiring.connect(m, offer.rows, wiring.flipped(self.rows))
         m.d.comb += [
-            self.pins.rows.eq(~selected if skin.selects_low else selected),
-            self.pins.columns_drive.eq(precharge.pins),
-            precharge.drive.eq(sheet.charges),
-            precharge.columns.eq(sheet.pressed),
-            precharge.looks.eq(turn.begins | turn.rests & turn.settled),
-            precharge.turn.eq(self.time[RETRY_BIT]),
+            clean.eq(wakes),
+            cycle.offers.eq(offer.rows.valid),
+            offer.untouched.eq(untouched),
+            offer.strobe.eq(cycle.strobe),
+            offer.pressed.eq(counted),
+            offer.y.eq(cycle.y),
+            offer.following.eq(cycle.following),
+            offer.last.eq(last),
+            self.alone.eq(offer.alone),
+            contact.begins.eq(cycle.begins),
+            contact.untouched.eq(untouched),
+            contact.wakes.eq(cycle.rests & cycle.settled & clean),
+            contact.strobe.eq(cycle.strobe),
+            contact.pressed.eq(counted.any()),
+            contact.last.eq(last),
+            self.contact.eq(contact.contact),
+            motion.begins.eq(cycle.begins),
+            motion.read.eq(read),
+            motion.strobe.eq(cycle.strobe),
+            motion.pressed.eq(counted.any()),
+            motion.y.eq(cycle.y),
+            self.tag.motion.eq(motion.motion),
         ]
-        self._let_go(m, sheet, turn, precharge, test)
-        count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
-        return precharge
 
-    def _let_go(self, m: Module, sheet: Sheet, turn: Turn, precharge: Precharge, test: SelfTest | None) -> None:
-        """Which rows are driven: all or none, and a guard row but in a self-test; this drives single lines."""
-        skin = self.skin
-        if test is None:
-            drives_rows = Signal()
-            holds = Signal()  # from the first clock on
-            m.d.sync += [drives_rows.eq(~sheet.listens), holds.eq(1)]
-            m.d.comb += self.pins.rows_drive.eq(Cat(drives_rows.replicate(skin.rows), holds))
-            return
-        rows, columns = test.drives()
-        every = Cat((~sheet.listens).replicate(skin.rows), ~turn.tests)[: skin.row_lines]
-        drives = Signal(skin.row_lines)
-        m.d.sync += drives.eq(every | rows)
-        m.d.comb += [self.pins.rows_drive.eq(drives), precharge.others.eq(columns)]
-
-    def _mask(self, m: Module, sheet: Sheet, turn: Turn) -> Value:
+    def _mask(self, m: Module, cycle: ReversalCycle, pressed: Value) -> Value:
         """Columns that read pressed and are not masked in the row."""
-        pressed = Signal(self.skin.columns)
-        m.d.comb += pressed.eq(sheet.pressed)
-        with m.Switch(turn.y):
+        masked = Signal(self.skin.columns)
+        m.d.comb += masked.eq(pressed)
+        with m.Switch(cycle.y):
             for row in sorted({row for row, _ in self.skin.mask}):
                 with m.Case(row):
-                    m.d.comb += pressed.eq(sheet.pressed & present(self.skin, row))
-        return pressed
+                    m.d.comb += masked.eq(pressed & present(self.skin, row))
+        return masked
 
-    def _tag_frame(self, m: Module, turn: Turn) -> None:
-        """A frame's tag is what there is when it begins."""
-        m.submodules.frame_clock = clock = FrameClock(self.skin)
+    def _tag_frame(self, m: Module, cycle: ReversalCycle, clock: FrameClock) -> Value:
+        """A frame's tag is what there is when it begins; of faults what is told when its stuck columns are counted.
+
+        Returns what is high for a clock when bit ``CHECK_BIT`` of the time has toggled.
+        """
+        before, toggles = Signal(), Signal()
+        m.d.sync += before.eq(clock.time[CHECK_BIT])
         m.d.comb += [
-            clock.frame_begins.eq(turn.begins),
+            toggles.eq(before ^ clock.time[CHECK_BIT]),
+            clock.frame_begins.eq(cycle.begins),
             clock.request.eq(self.request),
             clock.heard.eq(self.heard),
             self.time.eq(clock.time),
@@ -170,7 +163,85 @@ class ReversalScanner(wiring.Component):
             self.tag.time.eq(clock.begun),
             self.tag.requested.eq(clock.requested),
             self.tag.heard.eq(clock.known),
-            turn.wanted.eq(clock.waiting | self.due if self.skin.send == "on_change" else 1),
         ]
-        with m.If(turn.strobe):
+        with m.If(cycle.strobe):
             m.d.sync += self.sampled.eq(clock.time)
+        at_begin, counted = Signal(), Signal(2)  # the last bit: the columns are counted in the next clock
+        if "faults" in self.signature.members:
+            m.d.sync += counted.eq(Cat(cycle.begins, counted))
+            with m.If(counted[1]):
+                m.d.sync += at_begin.eq(self.faults.as_value().any())
+        m.d.comb += self.tag.fault.eq(self.tag.stuck.any() | at_begin)
+        return toggles
+
+    def _drive_sheet(
+        self, m: Module, cycle: ReversalCycle, precharge: Precharge, pressed: Value, test: SelfTest | None
+    ) -> None:
+        """All pins come from registers; at power-up none is driven."""
+        skin = self.skin
+        begun = Signal()
+        m.d.sync += begun.eq(cycle.begins)
+        selected = Cat(cycle.selected, cycle.guard)[: skin.row_lines]
+        if drives_columns_both_ways(skin):
+            inverted = Signal()
+            m.d.sync += inverted.eq(cycle.inverts | (0 if test is None else test.discharges))
+            m.d.comb += self.pins.columns_level.eq(inverted ^ skin.selects_low)
+        m.d.comb += [
+            self.pins.rows.eq(~selected if skin.selects_low else selected),
+            self.pins.columns_drive.eq(precharge.pins),
+            precharge.drive.eq(cycle.charges),
+            precharge.columns.eq(pressed),
+            precharge.looks.eq(cycle.begins | cycle.rests & cycle.settled),
+            precharge.turn.eq(self.time[RETRY_BIT]),
+        ]
+        self._let_go(m, cycle, precharge, test)
+        count_columns(m, precharge.held[: skin.columns], begun, self.tag.stuck)
+
+    def _let_go(self, m: Module, cycle: ReversalCycle, precharge: Precharge, test: SelfTest | None) -> None:
+        """Which rows are driven: all or none, and a guard row but in a self-test; this drives single lines."""
+        skin = self.skin
+        if test is None:
+            drives_rows = Signal()
+            holds = Signal()  # from the first clock on
+            m.d.sync += [drives_rows.eq(~cycle.listens), holds.eq(1)]
+            m.d.comb += self.pins.rows_drive.eq(Cat(drives_rows.replicate(skin.rows), holds))
+            return
+        rows, columns = test.drives()
+        every = Cat((~cycle.listens).replicate(skin.rows), ~cycle.tests)[: skin.row_lines]
+        drives = Signal(skin.row_lines)
+        m.d.sync += drives.eq(every | rows)
+        m.d.comb += [self.pins.rows_drive.eq(drives), precharge.others.eq(columns)]
+
+    def _check_lines(
+        self, m: Module, cycle: ReversalCycle, precharge: Precharge, toggles: Value, read: Value, pressed: Value
+    ) -> None:
+        m.submodules.checks = checks = Checks(self.skin)
+        m.d.comb += [
+            checks.due.eq(toggles),
+            checks.starts.eq(cycle.check_starts),
+            checks.checked.eq(cycle.checked),
+            checks.rows.eq(read),
+            checks.columns.eq(pressed),
+            checks.held.eq(precharge.held),
+            checks.retry.eq(self.time[RETRY_BIT]),
+            cycle.check_asked.eq(checks.asked),
+            cycle.of_rows.eq(checks.of_rows),
+            precharge.guard_pressed.eq(checks.of_guard & pressed[-1]),
+            self.faults.eq(checks.faults),
+            self.watched.eq(cycle.checked & cycle.rests),
+        ]
+
+    def _test_lines(self, m: Module, cycle: ReversalCycle, test: SelfTest, read: Value, pressed: Value) -> None:
+        """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it."""
+        m.submodules.test = test
+        wiring.connect(m, test.slots, wiring.flipped(self.slots))
+        m.d.comb += [
+            test.command.eq(self.command),
+            test.begin.eq(cycle.lets_go),
+            test.rows.eq(read),
+            test.columns.eq(~pressed),
+            cycle.test_asked.eq(test.asks),
+            cycle.tested.eq(test.ends),
+            cycle.discharges.eq(test.discharges),
+            self.faults.joined.eq(test.joined),
+        ]

@@ -1,81 +1,149 @@
 """Line reversal: which rows are handed on, the contact pin, and what moved within a frame."""
 
-from amaranth.hdl import Const, Module, Mux, Signal, Value
-from amaranth.lib import wiring
+from amaranth.hdl import Const, Module, Mux, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.wiring import In, Out
 
 from contactfpga.skin import Skin
-from contactfpga_hdl.scan.reversal_state import Sheet, Turn
+from contactfpga.skin.derived import Derived
+from contactfpga_hdl.payloads import row_bits, row_layout
 from contactfpga_hdl.scan.stuck import present
 
 
-def offer_driven_rows(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, pressed: Value) -> None:
-    rows, row = scan.rows, scan.rows.payload
-    below, follows = Signal(), Signal()  # an empty row is on offer, or comes next
-    m.d.comb += [row.y.eq(turn.y + below), scan.alone.eq(~below)]
-    with m.If(rows.valid & rows.ready):
-        m.d.sync += [rows.valid.eq(follows), below.eq(follows), follows.eq(0), row.cells.eq(0)]
-    with m.If(turn.strobe):
-        apart = turn.following != turn.y + 1
-        m.d.sync += [rows.valid.eq(1), row.cells.eq(pressed), row.last.eq(~turn.todo.any())]
-        m.d.sync += follows.eq(apart & turn.todo.any())
-    with m.If(turn.begins & ~sheet.touched.any()):
-        m.d.sync += [rows.valid.eq(1), below.eq(1), row.last.eq(1)]
+def offer_ports(derived: Derived) -> dict[str, wiring.Member]:
+    """The ports of what hands rows on.
+
+    untouched (in): high for a clock: a frame begins in which no row is driven.
+    strobe (in): high for a clock: ``pressed`` (in) are the columns that read pressed in row ``y`` (in), the frame's
+    ``last`` (in) one, or row ``following`` (in) is the next.
+    rows (out), alone (out): see :class:`~contactfpga_hdl.scan.reversal.ReversalScanner`.
+    """
+    number = row_bits(derived)
+    return {
+        "untouched": In(1),
+        "strobe": In(1),
+        "pressed": In(derived.skin.columns),
+        "y": In(number),
+        "following": In(number),
+        "last": In(1),
+        "rows": Out(stream.Signature(row_layout(derived))),
+        "alone": Out(1),
+    }
 
 
-def offer_all_rows(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, pressed: Value) -> None:
-    rows, row = scan.rows, scan.rows.payload
-    place = Signal(range(max(2, scan.skin.rows)))  # of the row on offer
-    driven = Signal()  # rows up to the one that was driven are known
-    rest = Signal()  # all others are
-    cells = Signal(scan.skin.columns)
-    m.d.comb += [
-        rows.valid.eq(driven | rest),
-        scan.alone.eq(driven & (place == turn.y)),
-        row.cells.eq(Mux(scan.alone, cells, 0)),
-        row.last.eq(place == scan.skin.rows - 1),
-    ]
-    with m.If(rows.valid & rows.ready):
-        m.d.sync += place.eq(Mux(row.last, 0, place + 1))
-        with m.If(scan.alone):
-            m.d.sync += driven.eq(0)
-        with m.If(row.last):
-            m.d.sync += rest.eq(0)
-    with m.If(turn.strobe):
-        m.d.sync += [driven.eq(1), rest.eq(~turn.todo.any()), cells.eq(pressed)]
-    with m.If(turn.begins & ~sheet.touched.any()):
-        m.d.sync += rest.eq(1)
+class DrivenRows(wiring.Component):
+    """Hands on the rows that were driven, and an empty one after a row whose neighbor was not."""
+
+    def __init__(self, skin: Skin):
+        super().__init__(offer_ports(Derived(skin)))
+
+    def elaborate(self, platform):
+        m = Module()
+        rows, row = self.rows, self.rows.payload
+        below, follows = Signal(), Signal()  # an empty row is on offer, or comes next
+        m.d.comb += [row.y.eq(self.y + below), self.alone.eq(~below)]
+        with m.If(rows.valid & rows.ready):
+            m.d.sync += [rows.valid.eq(follows), below.eq(follows), follows.eq(0), row.cells.eq(0)]
+        with m.If(self.strobe):
+            m.d.sync += [rows.valid.eq(1), row.cells.eq(self.pressed), row.last.eq(self.last)]
+            m.d.sync += follows.eq((self.following != self.y + 1) & ~self.last)
+        with m.If(self.untouched):
+            m.d.sync += [rows.valid.eq(1), below.eq(1), row.last.eq(1)]
+        return m
 
 
-def watch_contact(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, pressed: Value) -> None:
-    seen = Signal()  # in this frame's rows so far
-    with m.If(turn.begins):
-        m.d.sync += seen.eq(0)
-        with m.If(~sheet.touched.any()):
-            m.d.sync += scan.contact.eq(0)
-    with m.If(turn.rests & turn.settled & sheet.clean):
-        m.d.sync += scan.contact.eq(1)
-    with m.If(turn.strobe):
-        m.d.sync += seen.eq(seen | pressed.any())
-        with m.If(pressed.any()):
-            m.d.sync += scan.contact.eq(1)
-        with m.Elif(~turn.todo.any() & ~seen):
-            m.d.sync += scan.contact.eq(0)
+class AllRows(wiring.Component):
+    """Hands on all rows, those that were not driven as empty."""
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        super().__init__(offer_ports(Derived(skin)))
+
+    def elaborate(self, platform):
+        m = Module()
+        rows, row = self.rows, self.rows.payload
+        place = Signal(range(max(2, self.skin.rows)))  # of the row on offer
+        driven = Signal()  # rows up to the one that was driven are known
+        rest = Signal()  # all others are
+        cells = Signal(self.skin.columns)
+        m.d.comb += [
+            rows.valid.eq(driven | rest),
+            self.alone.eq(driven & (place == self.y)),
+            row.cells.eq(Mux(self.alone, cells, 0)),
+            row.last.eq(place == self.skin.rows - 1),
+        ]
+        with m.If(rows.valid & rows.ready):
+            m.d.sync += place.eq(Mux(row.last, 0, place + 1))
+            with m.If(self.alone):
+                m.d.sync += driven.eq(0)
+            with m.If(row.last):
+                m.d.sync += rest.eq(0)
+        with m.If(self.strobe):
+            m.d.sync += [driven.eq(1), rest.eq(self.last), cells.eq(self.pressed)]
+        with m.If(self.untouched):
+            m.d.sync += rest.eq(1)
+        return m
 
 
-def watch_motion(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, pressed: Value) -> None:
-    """A row without a masked switch read touched as the frame began, and empty when it was driven."""
-    skin, moved = scan.skin, scan.tag.motion
-    whole = clean_rows(skin)
-    counts = Const(whole, skin.rows).bit_select(turn.y, 1) if whole != (1 << skin.rows) - 1 else 1
-    if scan.derived.debounced:  # others are driven, too
-        touched = Signal(skin.rows)
-        with m.If(turn.begins):
-            m.d.sync += touched.eq(sheet.read & whole)
-        counts = touched.bit_select(turn.y, 1)
-    with m.If(turn.begins):
-        m.d.sync += moved.eq(0)
-    with m.If(turn.strobe & ~pressed.any() & counts):
-        m.d.sync += moved.eq(1)
+class Contact(wiring.Component):
+    """The contact pin.
+
+    begins, untouched (in): high for a clock when a frame does, and when no row is driven in it.
+    wakes (in): a row without a masked switch of a sheet at rest reads touched.
+    strobe, pressed, last (in): high for a clock: a row's columns are there; a switch is pressed; the row is the last.
+    contact (out): rises with ``wakes`` or ``pressed``, and falls with a frame without a pressed switch.
+    """
+
+    def __init__(self) -> None:
+        inputs = ("begins", "untouched", "wakes", "strobe", "pressed", "last")
+        super().__init__({**dict.fromkeys(inputs, In(1)), "contact": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        seen = Signal()  # in this frame's rows so far
+        with m.If(self.begins):
+            m.d.sync += seen.eq(0)
+        with m.If(self.untouched):
+            m.d.sync += self.contact.eq(0)
+        with m.If(self.wakes):
+            m.d.sync += self.contact.eq(1)
+        with m.If(self.strobe):
+            m.d.sync += seen.eq(seen | self.pressed)
+            with m.If(self.pressed):
+                m.d.sync += self.contact.eq(1)
+            with m.Elif(self.last & ~seen):
+                m.d.sync += self.contact.eq(0)
+        return m
+
+
+class Motion(wiring.Component):
+    """Whether a row without a masked switch read touched as the frame began, and empty when it was driven.
+
+    begins (in): high for a clock; ``read`` (in): rows that then read touched.
+    strobe, pressed, y (in): high for a clock: a row's columns are there; a switch is pressed; the row's number.
+    motion (out): since the frame began.
+    """
+
+    def __init__(self, skin: Skin):
+        self.skin = skin
+        self.derived = Derived(skin)
+        inputs = dict.fromkeys(("begins", "strobe", "pressed"), In(1))
+        super().__init__({**inputs, "read": In(skin.rows), "y": In(row_bits(self.derived)), "motion": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        rows, whole = self.skin.rows, clean_rows(self.skin)
+        counts = Const(whole, rows).bit_select(self.y, 1) if whole != (1 << rows) - 1 else 1
+        if self.derived.debounced:  # others are driven, too
+            touched = Signal(rows)
+            with m.If(self.begins):
+                m.d.sync += touched.eq(self.read & whole)
+            counts = touched.bit_select(self.y, 1)
+        with m.If(self.begins):
+            m.d.sync += self.motion.eq(0)
+        with m.If(self.strobe & ~self.pressed & counts):
+            m.d.sync += self.motion.eq(1)
+        return m
 
 
 def clean_rows(skin: Skin) -> int:

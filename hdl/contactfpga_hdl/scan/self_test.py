@@ -13,7 +13,6 @@ from contactfpga.skin import Skin
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.payloads import slots_layout
 from contactfpga_hdl.scan.guard import checked_rows
-from contactfpga_hdl.scan.reversal_state import Sheet, Turn
 from contactfpga_hdl.scan.stuck import anywhere
 
 SEEN = 2
@@ -157,21 +156,3 @@ class SelfTest(wiring.Component):
 def test_ports(derived: Derived) -> dict[str, wiring.Member]:
     """Of a scan with a self-test, as :class:`SelfTest` has them."""
     return {"command": In(1), "slots": Out(stream.Signature(slots_layout(derived)))}
-
-
-def test_lines(m: Module, scan: wiring.Component, sheet: Sheet, turn: Turn, test: SelfTest) -> None:
-    """The scan lets go of the sheet for each slot, and a frame that is wanted waits for it. No row is to be driven in a
-    frame then."""
-    m.submodules.test = test
-    wiring.connect(m, test.slots, wiring.flipped(scan.slots))
-    m.d.comb += [
-        test.command.eq(scan.command),
-        test.begin.eq(turn.lets_go),
-        test.rows.eq(sheet.read),
-        test.columns.eq(~sheet.pressed),
-        turn.asked.eq(test.asks),
-        turn.tested.eq(test.ends),
-        scan.faults.joined.eq(test.joined),
-    ]
-    with m.If(test.discharges):
-        m.d.sync += [sheet.selected.eq(-1), sheet.guard.eq(1)]

@@ -9,6 +9,7 @@ from contactfpga.skin import Skin
 from contactfpga_hdl.scan.pins import released_levels
 from contactfpga_hdl.scan.precharge import Precharge
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.stuck import present
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -68,8 +69,8 @@ class Sheet:
         counts = sum(1 << row for row in range(skin.rows) if present(skin, row))
         self.wanted = Signal(skin.rows)
         m.d.comb += self.wanted.eq(self.read_2 & counts | busy)
-        self.state, self.clock = self.inside["turn_state"], self.inside["clock"]
-        self.begins = self.inside["begins"]
+        self.state, self.clock = self.inside["cycle.cycle_state"], self.inside["cycle.clock"]
+        self.begins = self.inside["cycle.begins"]
 
 
 def pins(proof: Proof, **changes: Any) -> None:
@@ -97,7 +98,9 @@ def pin_lemmas(sheet: Sheet) -> None:
     before = proof.before(state, init=LISTEN)
     selects = (state == SELECT) & (clock != 0)
     started = proof.before(1)
-    proof.lemma(inside["selected"] == Mux(selects, (Const(1, sheet.skin.rows) << inside["y"])[: sheet.skin.rows], 0))
+    proof.lemma(
+        inside["cycle.selected"] == Mux(selects, (Const(1, sheet.skin.rows) << inside["cycle.y"])[: sheet.skin.rows], 0)
+    )
     proof.lemma((sheet.dut.pins.columns_drive == 0) | (before == LISTEN) | (before == CHARGE))
     proof.lemma(sheet.dut.pins.rows_drive == Mux(before == LISTEN, 0, (1 << sheet.skin.rows) - 1))
     proof.lemma((state != SELECT) | (before == Mux(clock == 0, GAP, SELECT)))
@@ -111,7 +114,7 @@ def pin_lemmas(sheet: Sheet) -> None:
 def _clock_lemmas(sheet: Sheet) -> None:
     """How far a state is, and what is on its way through the synchronizer then."""
     proof, state, clock, inside = sheet.proof, sheet.state, sheet.clock, sheet.inside
-    derived, due = sheet.dut.derived, inside["due"]
+    derived, due = sheet.dut.derived, inside["cycle.due"]
     charge, settled = derived.release_clocks - 2, derived.project_clocks + 2
     proof.lemma((state != LISTEN) | (clock <= settled))
     proof.lemma((state != CHARGE) | (clock < charge))
@@ -120,7 +123,7 @@ def _clock_lemmas(sheet: Sheet) -> None:
     proof.lemma((due == 0) | (state == LISTEN) | (state == CHARGE))
     proof.lemma((due != 1) | (clock == 0))
     proof.lemma((due != 2) | (clock == min(1, charge - 1)) & (state == CHARGE) | (clock == 1) & (state == LISTEN))
-    proof.lemma(~inside["rests"] | (state == LISTEN) & (clock == settled))
+    proof.lemma(~inside["cycle.rests"] | (state == LISTEN) & (clock == settled))
 
 
 def synchronizer_lemmas(sheet: Sheet) -> None:
@@ -172,9 +175,12 @@ def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> No
     proof.lemma(sheet.dut.pins.columns_drive[0] == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
     proof.lemma((charged <= precharge) & (projected <= project))
     proof.lemma(
-        (sheet.inside["y"] < sheet.skin.rows) & ((state == LISTEN) | (state == SELECT) | sheet.inside["todo"].any())
+        (sheet.inside["cycle.y"] < sheet.skin.rows)
+        & ((state == LISTEN) | (state == SELECT) | sheet.inside["cycle.todo"].any())
     )
-    now = Mux(state == SELECT, Mux(clock == 0, 0, clock - 1), Mux(sheet.inside["due"] == 1, derived.settle_clocks, 0))
+    now = Mux(
+        state == SELECT, Mux(clock == 0, 0, clock - 1), Mux(sheet.inside["cycle.due"] == 1, derived.settle_clocks, 0)
+    )
     proof.lemma(selected == now)
     with proof.m.If(state == LISTEN):
         proof.lemma((clock < 2) | ~sheet.pressed_1[0])
@@ -192,22 +198,23 @@ def _lasts_lemmas(sheet: Sheet, selected, charged, projected, projected_1) -> No
 
 _PIN_BUGS = (
     Bug("driven while a row is selected", Precharge, "pins", lambda _, inside: inside["free"]),
-    Bug("no gap before a row", ReversalScanner, "charges",
-        lambda charges, inside: charges | (inside["turn_state"] == GAP)),
-    Bug("no gap after a row", ReversalScanner, "charges",
-        lambda charges, inside: charges | (inside["turn_state"] == SELECT)
+    Bug("no gap before a row", ReversalCycle, "charges",
+        lambda charges, inside: charges | (inside["cycle_state"] == GAP)),
+    Bug("no gap after a row", ReversalCycle, "charges",
+        lambda charges, inside: charges | (inside["cycle_state"] == SELECT)
         & (inside["clock"] == inside.component.derived.settle_clocks)),
-    Bug("two rows at once", ReversalScanner, "selected", lambda rows, _: rows | rows << 1),
-    Bug("let go while selected", ReversalScanner, "listens", lambda listens, inside: inside["todo"] == 0),
+    Bug("two rows at once", ReversalCycle, "selected", lambda rows, _: rows | rows << 1),
+    Bug("let go while selected", ReversalCycle, "listens", lambda listens, inside: inside["todo"] == 0),
 )  # fmt: skip
 _LASTS_BUGS = (
-    Bug("driven for a clock more", ReversalScanner, "clock",
-        lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
-    Bug("a short precharge", ReversalScanner, "clock",
+    Bug("driven for a clock more", ReversalCycle, "clock",
+        lambda clock, inside: clock
+        - ((inside["cycle_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
+    Bug("a short precharge", ReversalCycle, "clock",
         lambda clock, inside: Mux(inside["due"][0], inside.component.derived.release_clocks - 3, clock)),
-    Bug("rows are read too early", ReversalScanner, "settled",
+    Bug("rows are read too early", ReversalCycle, "settled",
         lambda _, inside: inside["clock"] == inside.component.derived.project_clocks + 1),
-    Bug("rows are let go too late", ReversalScanner, "listens",
+    Bug("rows are let go too late", ReversalCycle, "listens",
         lambda listens, inside: listens & (inside["clock"] != 0)),
 )  # fmt: skip
 CASES = (

@@ -6,7 +6,8 @@ from typing import Any
 
 from amaranth.hdl import Const, Mux, Signal, Value
 
-from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
+from contactfpga_hdl.scan.reversal_rows import AllRows, DrivenRows
 from contactfpga_hdl.scan.stuck import present
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -92,7 +93,7 @@ def waits_to_be_taken(sheet: Sheet) -> Value:
     """A row that was selected was sampled and is not taken."""
     if sheet.dut.derived.skips:
         return sheet.dut.rows.valid & sheet.dut.alone
-    return sheet.inside["driven"]
+    return sheet.inside["offer.driven"]
 
 
 def _say(sheet: Sheet, spec: Frames, say: Say) -> None:
@@ -138,7 +139,7 @@ def _say_of_all_rows(sheet: Sheet, spec: Frames, say: Say) -> None:
 
 def _frame_lemmas(sheet: Sheet, spec: Frames) -> None:
     proof, dut, inside, skin = sheet.proof, sheet.dut, sheet.inside, sheet.skin
-    state, clock, due, todo, y = sheet.state, sheet.clock, inside["due"], inside["todo"], inside["y"]
+    state, clock, due, todo, y = sheet.state, sheet.clock, inside["cycle.due"], inside["cycle.todo"], inside["cycle.y"]
     valid = dut.rows.valid
     row = Signal(skin.rows)  # that of the last slot
     proof.m.d.comb += row.eq((Const(1, skin.rows) << y)[: skin.rows])
@@ -152,7 +153,7 @@ def _frame_lemmas(sheet: Sheet, spec: Frames) -> None:
     proof.lemma(y < skin.rows)
     proof.lemma(spec.left == todo | Mux(open_row, row, 0))
     proof.lemma(spec.underway == ((state != LISTEN) | (due != 0) | valid))
-    proof.lemma(inside["underway"] == (spec.underway | spec.packing))
+    proof.lemma(inside["cycle.underway"] == (spec.underway | spec.packing))
     proof.lemma(~(spec.underway & spec.packing))
     proof.lemma(((state == LISTEN) == (todo == 0)) | selects)
     with proof.m.If(fresh):
@@ -178,7 +179,7 @@ def _frame_lemmas(sheet: Sheet, spec: Frames) -> None:
 def _driven_rows_lemmas(sheet: Sheet, spec: Frames, row: Value, above: Value) -> None:
     proof, dut, inside = sheet.proof, sheet.dut, sheet.inside
     valid, alone, last, cells = dut.rows.valid, dut.alone, dut.rows.payload.last, dut.rows.payload.cells
-    todo, follows, y = inside["todo"], inside["follows"], inside["y"]
+    todo, follows, y = inside["cycle.todo"], inside["offer.follows"], inside["cycle.y"]
     proof.lemma(alone | valid)
     with proof.m.If(valid & alone):
         proof.lemma(cells == spec.masked(sheet))
@@ -193,40 +194,40 @@ def _driven_rows_lemmas(sheet: Sheet, spec: Frames, row: Value, above: Value) ->
 
 def _all_rows_lemmas(sheet: Sheet, spec: Frames, row: Value, above: Value) -> None:
     proof, inside, skin = sheet.proof, sheet.inside, sheet.skin
-    driven, rest, todo = inside["driven"], inside["rest"], inside["todo"]
+    driven, rest, todo = inside["offer.driven"], inside["offer.rest"], inside["cycle.todo"]
     first = (Const(1, skin.rows) << spec.place)[: skin.rows]
-    proof.lemma((spec.place == inside["place"]) & (spec.place < skin.rows))
+    proof.lemma((spec.place == inside["offer.place"]) & (spec.place < skin.rows))
     proof.lemma(spec.left & (first - 1) == 0)
     proof.lemma(spec.underway | (spec.place == 0))
     proof.lemma(~rest | (todo == 0))
     with proof.m.If(driven):
-        proof.lemma(inside["cells"] == spec.masked(sheet))
+        proof.lemma(inside["offer.cells"] == spec.masked(sheet))
         proof.lemma(rest == (todo == 0))
-    with proof.m.Elif((sheet.state == LISTEN) & (inside["due"] == 0)):
+    with proof.m.Elif((sheet.state == LISTEN) & (inside["cycle.due"] == 0)):
         proof.lemma(spec.underway == rest)
 
 
 _FRAME_BUGS = (
-    Bug("the next row although one waits", ReversalScanner, "waits", lambda *_: 0),
-    Bug("a row is left out", ReversalScanner, "todo",
+    Bug("the next row although one waits", ReversalCycle, "waits", lambda *_: 0),
+    Bug("a row is left out", ReversalCycle, "todo",
         lambda rows, inside: Mux(inside["begins"], rows & (rows - 1), rows)),
-    Bug("a row twice", ReversalScanner, "todo", lambda rows, inside: rows | inside["todo"] & inside["selected"]),
-    Bug("the empty row is forgotten", ReversalScanner, "follows", lambda *_: 0),
-    Bug("an empty row everywhere", ReversalScanner, "follows",
-        lambda follows, inside: follows | inside["strobe"] & (inside["todo"] != 0)),
-    Bug("rows after the first are forgotten", ReversalScanner, "todo",
+    Bug("a row twice", ReversalCycle, "todo", lambda rows, inside: rows | inside["todo"] & inside["selected"]),
+    Bug("the empty row is forgotten", DrivenRows, "follows", lambda *_: 0),
+    Bug("an empty row everywhere", DrivenRows, "follows",
+        lambda follows, inside: follows | inside["strobe"] & ~inside["last"]),
+    Bug("rows after the first are forgotten", ReversalCycle, "todo",
         lambda rows, inside: Mux(inside["due"][0], 0, rows)),
-    Bug("out of order", ReversalScanner, "following", lambda row, _: row ^ 1),
-    Bug("selected for a clock less", ReversalScanner, "selected",
+    Bug("out of order", ReversalCycle, "following", lambda row, _: row ^ 1),
+    Bug("selected for a clock less", ReversalCycle, "selected",
         lambda rows, inside: Mux(inside["clock"] == inside.component.derived.settle_clocks - 1, 0, rows)),
-    Bug("offered a clock early", ReversalScanner, "strobe", lambda _, inside: inside["due"][0]),
-    Bug("offered for one clock", ReversalScanner, "rows__valid", lambda valid, inside: inside["strobe"]),
-    Bug("a frame before the last is packed", ReversalScanner, "underway", lambda *_: 0),
+    Bug("offered a clock early", ReversalCycle, "strobe", lambda _, inside: inside["due"][0]),
+    Bug("offered for one clock", DrivenRows, "rows__valid", lambda valid, inside: inside["strobe"]),
+    Bug("a frame before the last is packed", ReversalCycle, "underway", lambda *_: 0),
 )  # fmt: skip
 _CELLS_BUGS = (
-    Bug("a row is passed over", ReversalScanner, "place", lambda place, inside: place + (inside["place"] == 0)),
-    Bug("a driven row is empty", ReversalScanner, "alone", lambda *_: 0),
-    Bug("others before it is read", ReversalScanner, "rest", lambda rest, inside: rest | (inside["due"][0])),
+    Bug("a row is passed over", AllRows, "place", lambda place, inside: place + (inside["place"] == 0)),
+    Bug("a driven row is empty", AllRows, "alone", lambda *_: 0),
+    Bug("others before it is read", AllRows, "rest", lambda rest, inside: rest | inside["strobe"]),
 )  # fmt: skip
 CASES = (
     Case("frames of a line reversal", "3x2, col2row",

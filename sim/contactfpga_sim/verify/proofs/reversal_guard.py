@@ -6,6 +6,8 @@ from typing import Any
 from amaranth.hdl import Const, Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
+from contactfpga_hdl.scan.reversal_guard import Checks
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.precharge import apart
@@ -50,11 +52,11 @@ def pin_lemmas(sheet: Sheet) -> None:
     derived, rows = sheet.dut.derived, sheet.skin.rows
     before, started = proof.before(state, init=LISTEN), proof.before(1)
     lets_go = (before == LISTEN) | (before == ANSWER)
-    selects, of_guard = (state == SELECT) & (clock != 0), inside["selects"]
-    row = (Const(1, rows) << inside["y"])[:rows]
+    selects, of_guard = (state == SELECT) & (clock != 0), inside["cycle.selects"]
+    row = (Const(1, rows) << inside["cycle.y"])[:rows]
     proof.lemma(state <= SELECT)
-    proof.lemma(inside["selected"] == Mux(selects & ~of_guard, row, 0))
-    proof.lemma(inside["guard"] == (selects & of_guard))
+    proof.lemma(inside["cycle.selected"] == Mux(selects & ~of_guard, row, 0))
+    proof.lemma(inside["cycle.guard"] == (selects & of_guard))
     proof.lemma((sheet.dut.pins.columns_drive == 0) | lets_go | (before == CHARGE))
     proof.lemma(sheet.dut.pins.rows_drive[:rows] == Mux(lets_go, 0, (1 << rows) - 1))
     proof.lemma(inside["inverted"] == (before == ANSWER))
@@ -98,7 +100,7 @@ def whole(proof: Proof, **changes: Any) -> None:
     told = sheet.dut.faults
     proof.claim(~lines.of_row(told.rows) & ~lines.of_column(told.columns))
     owed, last = Signal(), Signal(init=1)  # a check, since a frame with a row began; the last one was of the rows
-    checked, of_rows = inside["checked"], inside["of_rows"]
+    checked, of_rows = inside["cycle.checks_due"], inside["checks.of_rows"]
     with m.If(sheet.begins & sheet.wanted.any()):
         m.d.sync += owed.eq(1)
     with m.If(checked[1]):
@@ -116,12 +118,17 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
     derived, before = sheet.dut.derived, proof.before(state, init=LISTEN)
     settle, checks = derived.settle_clocks, max(derived.settle_clocks, derived.project_clocks)
     spared = checks - settle
-    checked, of_rows, selects, blind = inside["checked"], inside["of_rows"], inside["selects"], told.stuck[-1]
+    checked, of_rows, selects, blind = (
+        inside["cycle.checks_due"],
+        inside["checks.of_rows"],
+        inside["cycle.selects"],
+        told.stuck[-1],
+    )
     proof.lemma(~inside["precharge.guard_stuck"] | blind)
     proof.lemma((checked != 3) & ((checked == 0) | (state == LISTEN) & (clock == checked - 1)))
     proof.lemma((state != ANSWER) | ~of_rows & (clock <= checks) & ((clock <= spared) | (before == ANSWER)))
     proof.lemma(~selects | of_rows & ((state == CHARGE) | (state == GAP) | (state == SELECT)))
-    proof.lemma(~((state == LISTEN) | (state == ANSWER) | selects) | (inside["todo"] == 0))
+    proof.lemma(~((state == LISTEN) | (state == ANSWER) | selects) | (inside["cycle.todo"] == 0))
     proof.lemma(~owed | (state != LISTEN) | (checked != 0))
     pending = (state == ANSWER) | selects | (checked != 0)
     proof.lemma(last == (of_rows ^ ~pending))
@@ -136,28 +143,28 @@ def _check_lemmas(sheet: Sheet, lines: Lines, owed: Signal, last: Signal) -> Non
 
 
 _PIN_BUGS = (
-    Bug("the guard row with another one", ReversalScanner, "guard",
-        lambda guard, inside: guard | (inside["turn_state"] == SELECT)),
-    Bug("the guard row while rows are let go", ReversalScanner, "guard",
-        lambda guard, inside: guard | (inside["turn_state"] == ANSWER)),
+    Bug("the guard row with another one", ReversalCycle, "guard",
+        lambda guard, inside: guard | (inside["cycle_state"] == SELECT)),
+    Bug("the guard row while rows are let go", ReversalCycle, "guard",
+        lambda guard, inside: guard | (inside["cycle_state"] == ANSWER)),
     Bug("the guard row is let go", ReversalScanner, "holds", lambda holds, inside: ~inside["listens"]),
-    Bug("no gap before the guard row", ReversalScanner, "charges",
-        lambda charges, inside: charges | (inside["turn_state"] == GAP) & inside["selects"]),
-    Bug("no gap after a row", ReversalScanner, "inverts",
-        lambda inverts, inside: inverts | (inside["turn_state"] == SELECT)),
-    Bug("rows are held against the guard column", ReversalScanner, "listens",
+    Bug("no gap before the guard row", ReversalCycle, "charges",
+        lambda charges, inside: charges | (inside["cycle_state"] == GAP) & inside["selects"]),
+    Bug("no gap after a row", ReversalCycle, "inverts",
+        lambda inverts, inside: inverts | (inside["cycle_state"] == SELECT)),
+    Bug("rows are held against the guard column", ReversalCycle, "listens",
         lambda listens, inside: listens & ~inside["inverts"]),
 )  # fmt: skip
 _WHOLE_BUGS = (
-    Bug("the next frame without a check", ReversalScanner, "checked",
-        lambda checked, inside: Mux(inside["turn_state"] == SELECT, 0, checked)),
-    Bug("rows are read too early", ReversalScanner, "clock",
-        lambda clock, inside: clock + (inside["starts"] & inside["of_rows"])),
-    Bug("told by a stuck guard column", ReversalScanner, "checks_rows",
+    Bug("the next frame without a check", ReversalCycle, "checks_due",
+        lambda checked, inside: Mux(inside["cycle_state"] == SELECT, 0, checked)),
+    Bug("rows are read too early", ReversalCycle, "clock",
+        lambda clock, inside: clock + (inside["check_starts"] & inside["of_rows"])),
+    Bug("told by a stuck guard column", Checks, "checks_rows",
         lambda _, inside: inside["of_guard"].replicate(len(inside["checks_rows"]))),
-    Bug("columns are told by the rows' check", ReversalScanner, "checks_columns",
-        lambda _, inside: inside["checked"][1]),
-    Bug("rows only", ReversalScanner, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
+    Bug("columns are told by the rows' check", Checks, "checks_columns",
+        lambda _, inside: inside["checked"]),
+    Bug("rows only", Checks, "of_rows", lambda of_rows, inside: of_rows | inside["of_rows"]),
 )  # fmt: skip
 CASES = (
     Case("pins never meet", "3x2, guard lines, col2row", partial(pins, rows=3, columns=2), 2, _PIN_BUGS, 40),

@@ -6,6 +6,7 @@ from typing import Any
 from amaranth.hdl import Const, Mux, Signal
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
 from contactfpga_sim.verify.proofs.proof import Proof
@@ -81,13 +82,13 @@ def closed(proof: Proof, **changes: Any) -> None:
 
 def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) -> None:
     """What the pins have shown of the switch, and what became of it."""
-    proof, inside, state, due = sheet.proof, sheet.inside, sheet.state, sheet.inside["due"]
+    proof, inside, state, due = sheet.proof, sheet.inside, sheet.state, sheet.inside["cycle.due"]
     before, row = proof.before(state, init=LISTEN), switch.row
     driven = switch.of_column(sheet.dut.pins.columns_drive)
-    now = (Const(1, sheet.skin.rows) << inside["y"])[: sheet.skin.rows]  # row of this slot, or of the last one
+    now = (Const(1, sheet.skin.rows) << inside["cycle.y"])[: sheet.skin.rows]  # row of this slot, or of the last one
     proof.lemma(~switch.of_column(inside["precharge.stuck"]))
     proof.lemma(driven == (proof.before(1) & ((before == LISTEN) | (before == CHARGE))))
-    proof.lemma(report.unread == inside["todo"] | Mux((state == SELECT) | (due == 1), now, 0))
+    proof.lemma(report.unread == inside["cycle.todo"] | Mux((state == SELECT) | (due == 1), now, 0))
     pressed_1, pressed_2 = switch.of_column(sheet.pressed_1), switch.of_column(sheet.pressed_2)
     with proof.m.If(state == LISTEN):
         proof.lemma((sheet.clock < 2) | (~switch.closed_1 | (sheet.read_1 & row).any()) & ~pressed_1)
@@ -99,13 +100,13 @@ def closed_lemmas(sheet: Sheet, spec: Frames, switch: Switch, report: Report) ->
 
 
 _CLOSED_BUGS = (
-    Bug("rows are read too early", ReversalScanner, "settled", lambda settled, inside: inside["clock"] >= 2),
-    Bug("a row is left out", ReversalScanner, "todo",
+    Bug("rows are read too early", ReversalCycle, "settled", lambda settled, inside: inside["clock"] >= 2),
+    Bug("a row is left out", ReversalCycle, "todo",
         lambda rows, inside: Mux(inside["begins"], rows & (rows - 1), rows)),
     Bug("a touch is overlooked", ReversalScanner, "touched",
         lambda rows, inside: Mux(inside["rests"], rows, rows & (rows - 1))),
-    Bug("columns are driven less", ReversalScanner, "charges", lambda charges, inside: charges & (inside["clock"] > 2)),
-    Bug("selected for a clock less", ReversalScanner, "selected",
+    Bug("columns are driven less", ReversalCycle, "charges", lambda charges, inside: charges & (inside["clock"] > 2)),
+    Bug("selected for a clock less", ReversalCycle, "selected",
         lambda rows, inside: Mux(inside["clock"] == inside.component.derived.settle_clocks - 1, 0, rows)),
 )  # fmt: skip
 CASES = (

@@ -6,6 +6,8 @@ from typing import Any
 from amaranth.hdl import Mux, Signal, Value
 
 from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
+from contactfpga_hdl.scan.reversal_rows import Contact
 from contactfpga_hdl.util.bits import popcount
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -79,7 +81,7 @@ def next_frame(proof: Proof, **changes: Any) -> None:
     with m.If(sheet.begins & ((awake >= 2) | sheet.wanted.any())):
         m.d.sync += awake.eq(0)
     with m.Elif(awake == 0):
-        m.d.sync += awake.eq(proof.free(1, "this_touch") & sheet.inside["rests"] & sheet.read.any())
+        m.d.sync += awake.eq(proof.free(1, "this_touch") & sheet.inside["cycle.rests"] & sheet.read.any())
     with m.Else():
         m.d.sync += awake.eq(awake + 1)
     reach = 2 + sheet.dut.derived.project_clocks
@@ -92,7 +94,7 @@ def next_frame(proof: Proof, **changes: Any) -> None:
 
 def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
     """Clocks until a frame may begin, as far as packing goes, once the last row was sampled."""
-    m, due = sheet.proof.m, sheet.inside["due"]
+    m, due = sheet.proof.m, sheet.inside["cycle.due"]
     packing = Signal(range(PACKED + 8))
     with m.If(due != 0):
         m.d.comb += packing.eq(PACKED + 4 - due)
@@ -107,12 +109,12 @@ def _packing(sheet: Sheet, spec: Frames, prompt: Prompt) -> Value:
 
 def _handing(sheet: Sheet) -> Value:
     """Clocks until no row waits."""
-    m, due = sheet.proof.m, sheet.inside["due"]
+    m, due = sheet.proof.m, sheet.inside["cycle.due"]
     handing = Signal(range(8))
     with m.If(due != 0):
         m.d.comb += handing.eq(5 - due)
     with m.Elif(sheet.dut.rows.valid):
-        m.d.comb += handing.eq(1 + sheet.inside["follows"])
+        m.d.comb += handing.eq(1 + sheet.inside["offer.follows"])
     return handing
 
 
@@ -120,7 +122,7 @@ def _frame_time_lemmas(sheet: Sheet, prompt: Prompt, packing, since, bound) -> N
     """What is left of the frame, in each state."""
     m, proof, derived, inside = sheet.proof.m, sheet.proof, sheet.dut.derived, sheet.inside
     clock, handing = sheet.clock, _handing(sheet)
-    after = popcount(inside["todo"]) * prompt.slot + prompt.end
+    after = popcount(inside["cycle.todo"]) * prompt.slot + prompt.end
     row = derived.settle_clocks + 1
     proof.lemma((since != 0) | (sheet.state == LISTEN))
     left = Signal(range(1 << len(bound)))
@@ -135,11 +137,11 @@ def _frame_time_lemmas(sheet: Sheet, prompt: Prompt, packing, since, bound) -> N
         with m.Case(LISTEN):
             listens = derived.project_clocks + 2 - clock
             m.d.comb += left.eq(Mux(listens > packing, listens, packing))
-    proof.lemma((since == 0) | (since + left <= bound) & ~inside["rests"])
+    proof.lemma((since == 0) | (since + left <= bound) & ~inside["cycle.rests"])
 
 
 def _awake_lemmas(sheet: Sheet, spec: Frames, packing, awake, alone, since) -> None:
-    proof, rests, project = sheet.proof, sheet.inside["rests"], sheet.dut.derived.project_clocks
+    proof, rests, project = sheet.proof, sheet.inside["cycle.rests"], sheet.dut.derived.project_clocks
     with proof.m.If(awake != 0):
         proof.lemma((sheet.state == LISTEN) & (since == 0))
         proof.lemma(rests | (awake <= sheet.clock) | (sheet.clock == project + 2))
@@ -175,7 +177,7 @@ def in_two_frames(proof: Proof, **changes: Any) -> None:
 def _age_lemmas(
     sheet: Sheet, switch: Switch, report: Report, prompt: Prompt, underway, packing, age, since, bound
 ) -> None:
-    proof, rests, clock = sheet.proof, sheet.inside["rests"], sheet.clock
+    proof, rests, clock = sheet.proof, sheet.inside["cycle.rests"], sheet.clock
     listened = sheet.dut.derived.project_clocks + 2
     proof.lemma(bound <= prompt.longest)
     proof.lemma(~report.due | report.told | underway)
@@ -200,7 +202,7 @@ def rises(proof: Proof, **changes: Any) -> None:
     """
     sheet = Sheet(proof, skin_of(**changes))
     spec = Frames(sheet)
-    touch = sheet.inside["rests"] & (sheet.read != 0)
+    touch = sheet.inside["cycle.rests"] & (sheet.read != 0)
     proof.claim(~proof.before(proof.before(proof.before(touch))) | sheet.dut.contact)
     keep_frames(sheet, spec)
 
@@ -210,22 +212,23 @@ def _wakes(inside: Inside):
 
 
 _NEXT_BUGS = (
-    Bug("rests though something is touched", ReversalScanner, "rests", lambda rests, inside: rests | inside["begins"]),
-    Bug("waits for nothing", ReversalScanner, "waits", lambda waits, inside: waits | inside["touched"].any()),
-    Bug("does not wake", ReversalScanner, "rests", lambda rests, inside: rests | inside["rests"]),
-    Bug("listens anew once awake", ReversalScanner, "clock", lambda clock, inside: Mux(_wakes(inside), 0, clock)),
-    Bug("driven for a clock more", ReversalScanner, "clock",
-        lambda clock, inside: clock - ((inside["turn_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
+    Bug("rests though something is touched", ReversalCycle, "rests", lambda rests, inside: rests | inside["begins"]),
+    Bug("waits for nothing", ReversalCycle, "waits", lambda waits, inside: waits | inside["touched"].any()),
+    Bug("does not wake", ReversalCycle, "rests", lambda rests, inside: rests | inside["rests"]),
+    Bug("listens anew once awake", ReversalCycle, "clock", lambda clock, inside: Mux(_wakes(inside), 0, clock)),
+    Bug("driven for a clock more", ReversalCycle, "clock",
+        lambda clock, inside: clock
+        - ((inside["cycle_state"] == SELECT) & (inside["todo"] & inside["selected"]).any())),
 )  # fmt: skip
 _TWO_BUGS = (
-    Bug("does not wake", ReversalScanner, "rests", lambda rests, inside: rests | inside["rests"]),
-    Bug("one row at most", ReversalScanner, "todo",
+    Bug("does not wake", ReversalCycle, "rests", lambda rests, inside: rests | inside["rests"]),
+    Bug("one row at most", ReversalCycle, "todo",
         lambda rows, inside: Mux(inside["begins"], rows & (~rows + 1), rows)),
 )  # fmt: skip
 _CONTACT_BUGS = (
-    Bug("with the row", ReversalScanner, "contact",
+    Bug("with the row", Contact, "contact",
         lambda contact, inside: Mux(inside["strobe"] | inside["contact"], contact, 0)),
-    Bug("for one clock", ReversalScanner, "contact", lambda contact, inside: contact & ~inside["contact"]),
+    Bug("for one clock", Contact, "contact", lambda contact, inside: contact & ~inside["contact"]),
     Bug("of row 0 alone", ReversalScanner, "clean", lambda _, inside: inside["touched"][0]),
 )  # fmt: skip
 CASES = (

@@ -5,7 +5,7 @@ from typing import Any
 
 from amaranth.hdl import Cat, Const, Mux, Signal, Value
 
-from contactfpga_hdl.scan.reversal import ReversalScanner
+from contactfpga_hdl.scan.reversal_cycle import ReversalCycle
 from contactfpga_hdl.scan.self_test import SEEN, SelfTest
 from contactfpga_sim.verify.proofs.bugs import Bug
 from contactfpga_sim.verify.proofs.case import Case
@@ -40,7 +40,7 @@ class Tested:
         ]
         self.discharges = Signal()
         proof.m.d.comb += self.discharges.eq(selecting & pins.columns_drive.any())
-        self.tests_1 = proof.before(sheet.inside["tests"])
+        self.tests_1 = proof.before(sheet.inside["cycle.tests"])
         self.ends = sheet.inside["test.ends"]
 
     def line(self) -> Value:
@@ -97,8 +97,8 @@ def pin_lemmas(tested: Tested) -> None:
     proof.lemma((state == TEST) == (slot != REST))
     every, discharged = (1 << skin.rows) - 1, slot_before == DISCHARGE
     alone = Mux(slot_before == DRIVE, proof.before(tested.line()), 0)
-    selected = Mux(selects, (Const(1, skin.rows) << inside["y"])[: skin.rows], 0)
-    proof.lemma(inside["selected"] == Mux(discharged, every, selected))
+    selected = Mux(selects, (Const(1, skin.rows) << inside["cycle.y"])[: skin.rows], 0)
+    proof.lemma(inside["cycle.selected"] == Mux(discharged, every, selected))
     charged = Mux(discharged, (1 << skin.columns) - 1, alone[skin.rows :])
     proof.lemma((before == LISTEN) | (before == CHARGE) | (inside["precharge.pins"] == charged))
     proof.lemma((slot_before == REST) == (before != TEST))
@@ -167,10 +167,10 @@ _BUGS = (
     Bug("two lines at once", SelfTest, "alone", lambda alone, _: alone | alone << 1),
     Bug("no gap before a line", SelfTest, "discharges",
         lambda discharges, inside: discharges | (inside["slot_state"] == LET_GO)),
-    Bug("columns are charged meanwhile", ReversalScanner, "charges",
-        lambda charges, inside: charges | (inside["turn_state"] == TEST)),
-    Bug("rows are held meanwhile", ReversalScanner, "listens",
-        lambda listens, inside: listens & (inside["turn_state"] != TEST)),
+    Bug("columns are charged meanwhile", ReversalCycle, "charges",
+        lambda charges, inside: charges | (inside["cycle_state"] == TEST)),
+    Bug("rows are held meanwhile", ReversalCycle, "listens",
+        lambda listens, inside: listens & (inside["cycle_state"] != TEST)),
     Bug("no gap before the discharge", SelfTest, "discharges",
         lambda discharges, inside: discharges | (inside["slot_state"] == IN_GAP)),
     Bug("driven for a clock more", SelfTest, "alone",
