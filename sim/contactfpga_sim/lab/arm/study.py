@@ -12,7 +12,7 @@ STUDY = Study(
         "sheet": Section("tables:sheet_table"),
         "speeds": Section("tables:speed_table"),
         "defense": Section("tables:defense_table"),
-        "pushes": Section("tables:push_table"),
+        "pushes": Section("tables:push_table", sample="tables:push_table"),
         "failures": Section("tables:failure_table"),
         "steps": Section("tables:step_table"),
     },

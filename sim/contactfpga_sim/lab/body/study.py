@@ -10,7 +10,7 @@ STUDY = Study(
     sections={
         "outages": Section("tables:outages_table"),
         "registration": Section("tables:registration_table"),
-        "folds": Section("tables:folds_table"),
+        "folds": Section("tables:folds_table", sample="tables:folds_sample"),
     },
     pictures="tables:draw",
     extra="test",

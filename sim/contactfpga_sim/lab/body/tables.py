@@ -62,11 +62,18 @@ def folds_table() -> str:
     """How many zones are marked."""
     head = ("times over the range", "folds, %", "touches apart from the fold, %", "touches joined with it, %")
     rows: list[tuple[str, ...]] = [(*head, "touches within it, %", "touches, joint straight, %")]
-    for sweeps in SWEEPS:
-        found = folding.rates(sweeps, count=1500)
-        values = (found.folds, found.apart, found.joined, found.within, found.straight)
-        rows.append((str(sweeps), *(f"{100 * value:.1f}" for value in values)))
-    return writer.table_of(rows)
+    return writer.table_of([*rows, *map(_folds, SWEEPS)])
+
+
+def folds_sample() -> str:
+    """The first row of :func:`folds_table`."""
+    return writer.line(_folds(SWEEPS[0]))
+
+
+def _folds(sweeps: int) -> tuple[str, ...]:
+    found = folding.rates(sweeps, count=1500)
+    values = (found.folds, found.apart, found.joined, found.within, found.straight)
+    return (str(sweeps), *(f"{100 * value:.1f}" for value in values))
 
 
 def draw(folder: Path) -> Path:

@@ -8,6 +8,6 @@ STUDY = Study(
     page="clock.md",
     minutes=1,
     sections={
-        "accuracy": Section("tables:accuracy_table"),
+        "accuracy": Section("tables:accuracy_table", sample="tables:slow_sample"),
     },
 )

@@ -8,7 +8,7 @@ STUDY = Study(
     page="labelling.md",
     minutes=5,
     sections={
-        "closed": Section("tables:clocks_table"),
+        "closed": Section("tables:clocks_table", sample="tables:clocks_sample"),
         "closed_size": Section("tables:size_table"),
     },
     extra="boards",

@@ -67,3 +67,9 @@ def luts(labeller: Labeller, connectivity: int, lines: int) -> list[str]:
     """LUT4 on an iCE40UP5K of an open and a closed sheet."""
     skins = (skin_of(lines, connectivity, labeller, closed) for closed in (False, True))
     return [f"{size.luts(functools.partial(labeller.load_gateware(), skin), sizes.UP5K):,}" for skin in skins]
+
+
+def clocks_sample() -> str:
+    """One row of :func:`clocks_table`."""
+    labeller = LABELLERS["run"]
+    return writer.line((*names(labeller, 8), *worst(labeller, 8), *most(labeller, 8)))

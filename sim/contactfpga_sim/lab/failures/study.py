@@ -10,7 +10,7 @@ STUDY = Study(
     sections={
         "failures": Section("tables:table"),
         "unnoticed": Section("tables:unnoticed"),
-        "pictures": Section("tables:pictures"),
+        "pictures": Section("tables:pictures", sample="tables:pictures"),
     },
     compute="tables:compute",
     pictures="tables:draw",

@@ -8,9 +8,9 @@ STUDY = Study(
     page="maker.md",
     minutes=1,
     sections={
-        "diodes": Section("tables:diodes_table"),
-        "pulls": Section("tables:pulls_table"),
-        "series": Section("tables:series_table"),
+        "diodes": Section("tables:diodes_table", sample="tables:diodes_table"),
+        "pulls": Section("tables:pulls_table", sample="tables:pulls_table"),
+        "series": Section("tables:series_table", sample="tables:series_table"),
     },
     pictures="tables:draw",
 )

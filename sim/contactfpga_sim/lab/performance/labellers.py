@@ -133,3 +133,9 @@ def spread(rows: np.ndarray, count: np.ndarray, connectivity: int, labeller: Lab
     reached = np.cumsum(count[order])
     median, most = (clocks[order[np.searchsorted(reached, share * reached[-1])]] for share in (0.5, 0.99))
     return f"{median} / {most} / {clocks.max()}"
+
+
+def labeller_sample() -> str:
+    """The first row of :func:`labeller_table`."""
+    skin = Skin(labeller="run", settle_us=15.0)
+    return labeller_row(skin, every_place(touches(skin)))

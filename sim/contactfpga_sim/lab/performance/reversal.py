@@ -85,3 +85,13 @@ def sides_row(name: str) -> str:
         f"{both.mean():.1f} / {both.max()}",
     )
     return writer.line((name, *counts, f"{100 * saved:.0f} %"))
+
+
+def latency_sample() -> str:
+    """The first row of :func:`latency_table`."""
+    return latency_row("16x16", *CONTACTS["16x16"])
+
+
+def sides_sample() -> str:
+    """The first row of :func:`sides_table`."""
+    return sides_row(next(iter(FAMILIES)))

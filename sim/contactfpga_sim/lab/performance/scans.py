@@ -210,3 +210,13 @@ def scenes_gain_table() -> str:
 def recorded_gain_table() -> str:
     """:func:`gain_table` of the recordings."""
     return gain_table(recorded_scenes())
+
+
+def reference_sample() -> str:
+    """The reference Skin's row of :func:`reference_table`."""
+    return reference_row("reference", Skin())
+
+
+def report_sample() -> str:
+    """Its first row of :func:`report_table`."""
+    return report_row("reference", Skin(report="moments"))

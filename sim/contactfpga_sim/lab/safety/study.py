@@ -10,6 +10,6 @@ STUDY = Study(
     sections={
         "coverage": Section("tables:coverage_table"),
         "faults": Section("tables:faults_table"),
-        "times": Section("tables:times_table"),
+        "times": Section("tables:times_table", sample="tables:times_table"),
     },
 )

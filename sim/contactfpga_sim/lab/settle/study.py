@@ -10,7 +10,7 @@ STUDY = Study(
     sections={
         "needs": Section("tables:needs_table"),
         "breaks": Section("tables:breaks_table"),
-        "shorted": Section("tables:shorted_table"),
+        "shorted": Section("tables:shorted_table", sample="tables:shorted_table"),
         "summary": Section("tables:summary_table", needs=("ngspice",)),
         "agreement": Section("tables:agreement_table", needs=("ngspice",)),
     },

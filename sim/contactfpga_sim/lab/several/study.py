@@ -8,7 +8,7 @@ STUDY = Study(
     page="several.md",
     minutes=3,
     sections={
-        "several_line": Section("tables:line_table"),
+        "several_line": Section("tables:line_table", sample="tables:line_sample"),
         "several_size": Section("tables:size_table"),
     },
     extra="boards",

@@ -70,3 +70,8 @@ def _longest_wait(trace: Trace, begins: list[int]) -> int:
     rows = np.array([cycle for cycle, _, last in trace.rows if last])
     newest = np.searchsorted(rows, np.array(begins)) - 1
     return int(max(np.array(begins) - rows[newest]))
+
+
+def line_sample() -> str:
+    """The first row of :func:`line_table`."""
+    return writer.line(_row(COUNTS[0], BAUDS[0]))

@@ -11,7 +11,7 @@ STUDY = Study(
         "speed": Section("tables:speed_table"),
         "reflex": Section("tables:reflex_table"),
         "breaks": Section("tables:breaks_table"),
-        "scores": Section("tables:scores_table"),
+        "scores": Section("tables:scores_table", sample="tables:scores_sample"),
         "recorded": Section("tables:recorded_table", needs=("../shared/data",)),
     },
     pictures="tables:draw",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from contactfpga import picture_style as style
@@ -16,12 +17,21 @@ LOOKS = {"`Tracker`": (style.BLUE, "solid"), "nearest zone": (style.VERMILLION, 
 
 def scores_table() -> str:
     """Random scenes."""
-    rows = [("scenes", "frames per second", *HEAD)]
+    rows: list[tuple[str, ...]] = [("scenes", "frames per second", *HEAD)]
     for (family, rate), found in scores.all_scenes().items():
-        for number, (tracker, score) in enumerate(found.items()):
-            first = (f"`{family}`", f"{rate:,g}") if number == 0 else ("", "")
-            rows.append((*first, tracker, *score.cells))
+        rows += _scores(family, rate, found)
     return writer.table_of(rows)
+
+
+def scores_sample() -> str:
+    """Two rows of :func:`scores_table`."""
+    return "\n".join(map(writer.line, _scores("meeting", 50.0, scores.of_family("meeting", 50.0))))
+
+
+def _scores(family: str, rate: float, found: scores.Scores) -> Iterator[tuple[str, ...]]:
+    for number, (tracker, score) in enumerate(found.items()):
+        first = (f"`{family}`", f"{rate:,g}") if number == 0 else ("", "")
+        yield (*first, tracker, *score.cells)
 
 
 def recorded_table() -> str:

@@ -8,6 +8,6 @@ STUDY = Study(
     page="units.md",
     minutes=1,
     sections={
-        "units": Section("tables:units_table"),
+        "units": Section("tables:units_table", sample="tables:units_table"),
     },
 )
