@@ -12,7 +12,8 @@ from recorded_stream import StreamPort, recorded
 import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
-from contactfpga.tools.recordings import Recording, table
+from contactfpga.tools.recordings import Recording
+from contactfpga.tools.recordings.export import COLUMNS, pieces
 from contactfpga.wire.protocol import Frame, no_records
 
 
@@ -52,7 +53,7 @@ def test_parquet_has_the_skin_in_its_schema(file, tmp_path, capsys):
 
     assert cli.main(["export", str(file), str(tmp_path / "x.parquet")]) == 0
     read = parquet.read_table(tmp_path / "x.parquet")
-    assert read.column_names == list(table.COLUMNS)
+    assert read.column_names == list(COLUMNS)
     same(list(zip(*(read.column(name).to_pylist() for name in read.column_names))), file)
     facts = json.loads(read.schema.metadata[b"contactfpga"])
     assert Skin(**tomllib.loads(facts["links"]["left hand"]["skin"])) == Skin()
@@ -65,7 +66,7 @@ def test_parquet_has_the_skin_in_its_schema(file, tmp_path, capsys):
 def test_npz(file, tmp_path):
     assert cli.main(["export", str(file), str(tmp_path / "x.npz")]) == 0
     with np.load(tmp_path / "x.npz") as read:
-        same(list(zip(*(read[name].tolist() for name in table.COLUMNS))), file)
+        same(list(zip(*(read[name].tolist() for name in COLUMNS))), file)
         assert json.loads(str(read["contactfpga"]))["links"]["left hand"]["name"] == ""
         assert read["area_mm2"].dtype == np.float64
 
@@ -74,16 +75,16 @@ def test_csv(file, tmp_path):
     assert cli.main(["export", str(file), str(tmp_path / "x.CSV")]) == 0
     with open(tmp_path / "x.CSV", newline="", encoding="utf-8") as opened:
         head, *rows = csv.reader(opened)
-    assert head == list(table.COLUMNS)
+    assert head == list(COLUMNS)
     same([(float(r[0]), r[1], *map(int, r[2:6]), *map(float, r[6:9])) for r in rows], file)
 
 
 def test_pieces_are_one_table(file):
-    whole, *none = table.pieces(Recording(file))
+    whole, *none = pieces(Recording(file))
     assert none == []
-    parts = list(table.pieces(Recording(file), rows=50))
+    parts = list(pieces(Recording(file), rows=50))
     assert len(parts) > 3
-    for name in table.COLUMNS:
+    for name in COLUMNS:
         np.testing.assert_array_equal(np.concatenate([part[name] for part in parts]), whole[name])
 
 
@@ -117,7 +118,7 @@ def test_a_ring_is_named_and_has_no_x():
     cells = np.zeros((4, 8), bool)
     cells[1] = True
     zones = contactfpga.Zones(Frame(0, 0, frozenset(), 0, 0, 0, 8, no_records(skin.sheet), cells), skin.sheet, 0)
-    (piece,) = table.pieces(SimpleNamespace(frames=lambda: [(0.0, "arm", zones)]))
+    (piece,) = pieces(SimpleNamespace(frames=lambda: [(0.0, "arm", zones)]))
     assert piece["winding"].tolist() == ["ring"]
     assert np.isnan(piece["x_mm"]).all()
     assert piece["y_mm"].tolist() == [skin.pitch_y_mm]

@@ -16,9 +16,8 @@ import contactfpga
 from contactfpga import Skin
 from contactfpga.tools import cli
 from contactfpga.tools.recordings import Recording
-from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile
+from contactfpga.tools.recordings.mcap_file import CHUNK_BYTES, FLUSH_S, McapFile, RecordingFailed
 from contactfpga.tools.recordings.recover import recover
-from contactfpga.tools.recordings.whole_file import RecordingFailed
 
 SKIN = Skin()
 LONG = 60.0

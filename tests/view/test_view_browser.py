@@ -17,7 +17,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def seen():
-    named = opening.Named("sim://?scene=nothing")
+    named = opening.ViewRequest("sim://?scene=nothing")
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         requests = []
         visitor.page.on("request", lambda request: requests.append(request.url))

@@ -44,11 +44,11 @@ def test_the_mouses_force_is_felt():
     pytest.importorskip("viser")
     from contactfpga.tools.view import opening
 
-    source, hand = opening._source(opening.Named(f"sim://?scene=nothing&skin={EXAMPLES}/force.toml&units={FLAT}"))
+    source, hand = opening._source(opening.ViewRequest(f"sim://?scene=nothing&skin={EXAMPLES}/force.toml&units={FLAT}"))
     try:
         hand.resize(force_n=8.0)
         hand.click(50, 60)
-        found = [moment.felt[0] for _ in range(20) if (moment := source.turn()) and moment.felt and moment.felt[0]]
+        found = [moment.felt[0] for _ in range(20) if (moment := source.poll()) and moment.felt and moment.felt[0]]
     finally:
         source.close()
     assert isinstance(found[-1], Contacts)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from contactfpga.errors import ContactFPGAError, PortNotFound
-from contactfpga.tools.view.guard import Guard
+from contactfpga.tools.view.server import Guard
 
 pytest.importorskip("viser")
 pytest.importorskip("websockets")

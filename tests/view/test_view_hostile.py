@@ -82,7 +82,7 @@ def test_a_browser_runs_and_loads_nothing(tmp_path, which):
     pytest.importorskip("playwright")
     file, links = record(tmp_path, "h")
     (tmp_path / "secret.png").write_bytes(b"not to be read")
-    named = opening.Named(str(file), link=links["arm"] if which == "link" else None)
+    named = opening.ViewRequest(str(file), link=links["arm"] if which == "link" else None)
     with opening.opened(named, http_port=0) as shown, browser.visit(shown) as visitor:
         asked = []
         visitor.page.on("request", lambda request: asked.append(request.url))

@@ -20,7 +20,7 @@ CELLS, BARYCENTERS, CIRCLES = "/sheet/cells", "/sheet/barycenters", "/sheet/circ
 def shown():
     from contactfpga_sim.lab.view.browser import running
 
-    with opening.opened(opening.Named("sim://?scene=nothing"), http_port=0) as shown, running(shown):
+    with opening.opened(opening.ViewRequest("sim://?scene=nothing"), http_port=0) as shown, running(shown):
         yield shown
 
 
@@ -96,9 +96,9 @@ def test_the_panel_says_how_real_time_is_held(page):
 def test_a_sheet_of_several_is_shown():
     """In real time, with its own latency; the mouse does not reach it."""
     file = contactfpga.examples() / "two-sheets.toml"
-    source, hand = opening._source(opening.Named(f"sim://?scene=palm&sheets={file}#1", timeout=60))
+    source, hand = opening._source(opening.ViewRequest(f"sim://?scene=palm&sheets={file}#1", timeout=60))
     try:
-        (zone,) = next(moment for _ in range(100) if (moment := source.turn())).zones
+        (zone,) = next(moment for _ in range(100) if (moment := source.poll())).zones
         assert (source.sheet.rows, hand, zone.area_cells > 20) == (12, None, True)
         told = dict(source.told())
         assert float(told["latency"].split()[0].replace(",", "")) < 2000
@@ -109,4 +109,4 @@ def test_a_sheet_of_several_is_shown():
 
 def test_a_virtual_board_of_a_skin_is_no_robot():
     with pytest.raises(FileNotFoundError, match=r"/no/skin\.toml"):
-        opening._source(opening.Named("sim://?skin=/no/skin.toml"))
+        opening._source(opening.ViewRequest("sim://?skin=/no/skin.toml"))

@@ -16,7 +16,7 @@ from contactfpga.surfaces import Cone
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view.fingers import Hand
 from contactfpga.tools.view.meter import CHART_S, Meter
-from contactfpga.tools.view.pace import MAX_LAG_S, MOMENT_S, Pace
+from contactfpga.tools.view.sources import MAX_LAG_S, MOMENT_S, SimulatedPace
 from contactfpga.tools.view.tiles import Tiles
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.zones.batch import Batch
@@ -148,7 +148,7 @@ def test_a_finger_that_is_dragged_stays_where_it_is_left():
 
 def test_a_board_that_keeps_up_is_in_real_time():
     now = [100.0]
-    pace = Pace(5.0, lambda: now[0])
+    pace = SimulatedPace(5.0, lambda: now[0])
     simulated = 5.0
     for _ in range(200):
         now[0] += 0.02
@@ -160,7 +160,7 @@ def test_a_board_that_keeps_up_is_in_real_time():
 
 def test_a_board_that_is_slower_slips_and_says_by_how_much():
     now = [0.0]
-    pace = Pace(0.0, lambda: now[0])
+    pace = SimulatedPace(0.0, lambda: now[0])
     simulated = 0.0
     for _ in range(500):
         due = pace.due(simulated)
@@ -251,7 +251,7 @@ def test_a_trail_shows_the_last_second_of_each_contact():
 
 def test_a_slow_machine_simulates_less_at_a_time():
     """And no less than before, however long it takes to draw: else it would come to a stop."""
-    pace = Pace(0.0, lambda: 0.0)
+    pace = SimulatedPace(0.0, lambda: 0.0)
     assert pace.most_s == pytest.approx(MOMENT_S)
     for _ in range(50):
         pace.ran(pace.most_s, pace.most_s / 0.1)  # a tenth of real time
@@ -295,7 +295,10 @@ def test_silence_is_said(board):
     ],
 )
 def test_what_would_be_left_out_is_refused(port, given, says):
-    with pytest.raises(ContactFPGAError, match=f"^{re.escape(says)}$"), opening.opened(opening.Named(port, **given)):
+    with (
+        pytest.raises(ContactFPGAError, match=f"^{re.escape(says)}$"),
+        opening.opened(opening.ViewRequest(port, **given)),
+    ):
         pass
 
 
@@ -304,5 +307,5 @@ def test_no_board_is_opened_for_units_that_cannot_be_read(tmp_path, monkeypatch)
     opened = []
     monkeypatch.setattr(driver, "open", lambda *named, **more: opened.append(named))
     with pytest.raises(OSError, match=r"none\.toml"):
-        opening._source(opening.Named("/dev/ttyUSB0", units=tmp_path / "none.toml"))
+        opening._source(opening.ViewRequest("/dev/ttyUSB0", units=tmp_path / "none.toml"))
     assert not opened

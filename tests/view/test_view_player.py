@@ -9,8 +9,8 @@ from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.tools import cli
 from contactfpga.tools.console import progress
 from contactfpga.tools.view import opening, replayed
-from contactfpga.tools.view import player as playing
-from contactfpga.tools.view.player import Player
+from contactfpga.tools.view import playback as playing
+from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.replayed import ByteRecording, Clock
 
 
@@ -60,49 +60,49 @@ def test_time_goes_on_where_a_board_was_started_again():
 
 def test_it_plays_in_its_own_time(player):
     while player.position_s < 0.3:
-        player.turn()
-    moment = player.turn()
+        player.poll()
+    moment = player.poll()
     assert moment.zones.time_us / 1e6 == pytest.approx(player.position_s, abs=0.002)
     assert player.meter.frames_per_s == pytest.approx(10_400, rel=0.02)
 
 
 def test_it_is_as_fast_as_asked(player):
-    player.turn()
+    player.poll()
     began = player.position_s
     player.speed = 0.01
     for _ in range(10):
-        player.turn()
+        player.poll()
     assert player.position_s - began == pytest.approx(10 * 0.02 * 0.01, rel=0.2)
 
 
 def test_it_can_be_led_to_any_moment(player):
-    player.turn()
+    player.poll()
     player.pause()
     for seconds in (0.4, 0.1, 0.11, -5.0):
         player.seek(seconds)
-        moment = player.turn()
+        moment = player.poll()
         assert player.position_s == max(0.0, seconds)
         assert moment.zones.time_us / 1e6 == pytest.approx(max(0.0, seconds), abs=0.001)
-        assert player.turn() is None
+        assert player.poll() is None
     player.play()
-    player.turn()
+    player.poll()
     assert player.position_s == pytest.approx(0.02, abs=0.001)
 
 
 def test_at_its_end_it_stops_and_begins_again_when_asked(player):
     player.seek(1e9)
-    moment = player.turn()
+    moment = player.poll()
     assert player.position_s == player.duration_s
     assert moment.zones.time_us / 1e6 == pytest.approx(player.duration_s, abs=0.001)
-    player.turn()
+    player.poll()
     assert not player.playing
     player.play()
-    player.turn()
+    player.poll()
     assert player.position_s < 0.1
 
 
 def test_a_contact_keeps_its_id_from_frame_to_frame(player):
-    ids = {track.id for _ in range(10) if (moment := player.turn()) for track in moment.tracks.active}
+    ids = {track.id for _ in range(10) if (moment := player.poll()) for track in moment.tracks.active}
     assert ids == {1}
 
 
@@ -119,7 +119,7 @@ def test_a_recording_that_is_not_there_is_no_port(tmp_path):
     with pytest.raises(
         ContactFPGAError, match=r"none\.mcap cannot be opened: No such file or directory; is the path right"
     ):
-        opening._source(opening.Named(f"{tmp_path}/none.mcap"))
+        opening._source(opening.ViewRequest(f"{tmp_path}/none.mcap"))
 
 
 @pytest.mark.parametrize(("name", "link"), [("{}", "arm"), ("replay://{}?link=arm", None)])

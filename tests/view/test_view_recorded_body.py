@@ -15,9 +15,8 @@ from contactfpga.robot.body.snapshot import on_link
 from contactfpga.tools.recordings import Recording, Session
 from contactfpga.tools.view import opening, picture
 from contactfpga.tools.view import playback as playing
-from contactfpga.tools.view.bodies import pushes
-from contactfpga.tools.view.player import Player
-from contactfpga.tools.view.recorded_body import BodyPlayer
+from contactfpga.tools.view.bodies import BodyPlayer, pushes
+from contactfpga.tools.view.playback import Player
 
 TIMES = "[[links]]\nlate_s = 0.2\nsilent_s = 0.4"
 
@@ -116,12 +115,12 @@ def test_a_robot_that_is_not_whole_is_refused_in_one_line(tmp_path, change, says
 
 
 def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
-    with opening.opened(opening.Named(str(file)), http_port=0) as shown:
+    with opening.opened(opening.ViewRequest(str(file)), http_port=0) as shown:
         assert isinstance(shown.source, BodyPlayer)
         shown.source.pause()  # a busy machine would play on between two turns
         shown.source.seek(0.1)
         for _ in range(10):
-            shown.view.turn()
+            shown.view.step()
         text = shown.view._facts.content
         assert r"**arm** ok \(0\.00" in text
         assert "1 zone" in text
@@ -130,23 +129,23 @@ def test_the_view_takes_the_robot_or_one_link(file, tmp_path):
         assert (chest._colors != picture.UNKNOWN).all()
         shown.source.seek(0.8)
         for _ in range(3):
-            shown.view.turn()
+            shown.view.step()
         assert not chest._points.visible, "what touched then is not drawn where nothing is known"
         assert (chest._colors == picture.UNKNOWN).all()
         assert shown.view._timeline._player is shown.source
-    source, _ = opening._source(opening.Named(str(file), link="chest"))
+    source, _ = opening._source(opening.ViewRequest(str(file), link="chest"))
     assert isinstance(source, Player)
     assert source.title == "x.mcap, chest"
     source.pause()
     source.seek(0.1)
-    shown = source.turn().zones
+    shown = source.poll().zones
     wanted = [zones for t_s, _, zones in Recording(file).frames(link="chest") if t_s <= 0.1]
     assert shown.to_dict() == wanted[-1].to_dict()
 
 
 def test_a_recording_with_the_table_alone_shows_a_link(tmp_path):
     record(tmp_path, about={"toml": "links = []"})
-    source, _ = opening._source(opening.Named(str(tmp_path / "x.mcap")))
+    source, _ = opening._source(opening.ViewRequest(str(tmp_path / "x.mcap")))
     assert source.title == "x.mcap, arm"
 
 

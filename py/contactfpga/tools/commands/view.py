@@ -39,11 +39,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from contactfpga.tools.view import opening
-    from contactfpga.tools.view.player import Player
+    from contactfpga.tools.view.playback import Player
 
     with contextlib.ExitStack() as stack:
         with progress.reading(args.port or "") as tell:
-            named = opening.Named(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
+            named = opening.ViewRequest(args.port, args.skin, args.baud, args.timeout, args.link, args.units, tell)
             shown = stack.enter_context(opening.opened(named, args.host, args.http_port))
         stack.enter_context(interrupt.usual_end())
         terminal.say(f"Open {shown.url}")

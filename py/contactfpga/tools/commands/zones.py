@@ -9,6 +9,7 @@ import json
 from contactfpga.driver.board import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.robot.haptics import WithReadings
+from contactfpga.robot.haptics.live import FrameSource
 from contactfpga.tools.console import flags, interrupt, live
 from contactfpga.tools.console.forces import Forces
 from contactfpga.tracking.tracker import Tracker
@@ -59,10 +60,10 @@ class _Follow:
         self.tracks: Tracks | None = None
         self.forces = forces
 
-    def frames(self, board: Board) -> live.FrameSource:
+    def frames(self, board: Board) -> FrameSource:
         """The board's frames, to the end that was asked for; with forces, each once its readings are known."""
-        frames: live.FrameSource = board if self.forces is None else WithReadings(board)
-        return frames if self._seconds is None else _Limited(frames, self._seconds)
+        frames: FrameSource = board if self.forces is None else WithReadings(board)
+        return frames if self._seconds is None else _TimeLimit(frames, self._seconds)
 
     def take(self, zones: Zones) -> None:
         if self._tracker is not None:
@@ -71,10 +72,10 @@ class _Follow:
             self.forces.take(zones, self.tracks)
 
 
-class _Limited:
+class _TimeLimit:
     """Yield frames for this many seconds of device time, then end as a recording does."""
 
-    def __init__(self, frames: live.FrameSource, seconds: float):
+    def __init__(self, frames: FrameSource, seconds: float):
         self._frames, self._left_us = frames, seconds * 1e6
         self._before_us: int | None = None
 

@@ -9,7 +9,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -20,6 +20,8 @@ from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+
+    from contactfpga.robot.haptics.live import FrameSource
 
 REFRESH_US = 66_667
 
@@ -53,12 +55,6 @@ Take = Callable[[Zones], None]
 
 def _ignore(zones: Zones) -> None:
     pass
-
-
-class FrameSource(Protocol):
-    """What gives the frames of a board in order."""
-
-    def next(self, timeout: float = 1.0) -> Zones: ...
 
 
 def show(

@@ -1,20 +1,54 @@
-"""The messages that a recording holds of a board, for programs that know nothing of us."""
+"""The messages that a recording holds of a board, for programs that know nothing of us.
+
+Those of a board on a robot have places in the robot's frame."""
 
 from __future__ import annotations
+
+import dataclasses
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.told import Told
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.feed import Felt
-from contactfpga.robot.ros.markers import markers, outline
+from contactfpga.robot.ros.markers import Place, markers, outline
+from contactfpga.surfaces.shapes import Vector
 from contactfpga.tools.recordings import messages
-from contactfpga.tools.recordings.mount import Mount
 from contactfpga.tools.recordings.recorder import LinkFile
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
 from contactfpga.wire.faults import Faults
 from contactfpga.zones.units import UnitSamples
-from contactfpga.zones.zone import Zones
+from contactfpga.zones.zone import Zone, Zones
+
+
+@dataclasses.dataclass(frozen=True)
+class Mount:
+    """Messages then have places in the robot's own frame, in place of the sheet's."""
+
+    frame: str
+    """Of the robot's link."""
+    place: Place
+    """In that frame."""
+
+    def zone(self, zone: Zone) -> Zone:
+        """The zone with its place there."""
+        if zone.x_mm is None or zone.y_mm is None:
+            return zone
+        point_m, normal = self.place(zone.x_mm, zone.y_mm)
+        return dataclasses.replace(zone, point_mm=_vector(1e3 * one for one in point_m), normal=_vector(normal))
+
+    def tracks(self, tracks: Tracks) -> Tracks:
+        """The same of all zones in them."""
+        active = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.active)
+        events = tuple(dataclasses.replace(one, zone=self.zone(one.zone)) for one in tracks.events)
+        return dataclasses.replace(tracks, active=active, events=events)
+
+
+def _vector(values) -> Vector:  # type: ignore[no-untyped-def]
+    x, y, z = map(float, values)
+    return x, y, z
+
 
 DRAWN_S = 1 / 30
 """How often what 3-D programs show is written."""

@@ -14,13 +14,13 @@ from contactfpga.driver.subscription import Events
 from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinMismatch, VersionMismatch
 from contactfpga.robot.haptics import WithReadings
 from contactfpga.tools.recordings.link_messages import LinkMessages
+from contactfpga.tools.recordings.mcap_file import RecordingFailed
 from contactfpga.tools.recordings.recorder import LinkFile
-from contactfpga.tools.recordings.whole_file import RecordingFailed
 from contactfpga.zones.zone import Zones
 
 QUEUE = 1 << 16
 """Frames that wait to be written as messages; what they were made of is written first."""
-TURN_S = 0.01
+POLL_S = 0.01
 """How often bytes are written."""
 END_S = 1.0
 """How long frames that wait at the end are written as messages."""
@@ -65,7 +65,7 @@ class Buffer:
 
     def due(self, clock_s: float) -> bool:
         """Whether enough waits, or for long enough."""
-        return self._bytes >= BATCH_BYTES or (bool(self._pieces) and clock_s - self._pieces[0][1] >= TURN_S)
+        return self._bytes >= BATCH_BYTES or (bool(self._pieces) and clock_s - self._pieces[0][1] >= POLL_S)
 
     def drain(self) -> tuple[bytes, float]:
         """All that waits, and when its last byte came."""
@@ -116,7 +116,7 @@ class LinkRecorder:
                 frames = WithReadings(self) if self._late else self
                 while not stop.is_set() and (seconds is None or self.seconds < seconds):
                     try:
-                        self._take(frames.next(TURN_S))
+                        self._take(frames.next(POLL_S))
                     except ReadTimeout:
                         self._pause()
                     except (SkinMismatch, VersionMismatch) as told:
@@ -177,7 +177,7 @@ class LinkRecorder:
     def _pause(self) -> None:
         self._clock_s()
         self._drain()
-        self._link.turn()
+        self._link.poll()
 
     def _clock_s(self) -> float:
         """Now; of a recording, which has no clock, the time of its last frame."""

@@ -72,7 +72,7 @@ class Recorder:
         self._about.append((name, values))
         self.file.metadata(name, values)
 
-    def turn(self) -> None:
+    def poll(self) -> None:
         """Write what waits for long enough, and begin a new file where one is due. Call it often."""
         now_s = time.monotonic()
         with self.lock:
@@ -149,7 +149,7 @@ class LinkFile:
             if after:
                 self.switch()
                 self._bytes(after, clock_s)
-            self._recorder.turn()
+            self._recorder.poll()
 
     def write(self, what: str, kind: str, data: bytes, clock_s: float) -> None:
         """A message; ``what`` ends its topic, or is all of it if it begins with a slash."""
@@ -158,9 +158,9 @@ class LinkFile:
         with self._recorder.lock:
             self.file.write(topic, kind, link, self.time_ns(clock_s), data, time.monotonic())
 
-    def turn(self) -> None:
+    def poll(self) -> None:
         """Nothing comes at the moment: write what waits."""
-        self._recorder.turn()
+        self._recorder.poll()
 
     def wait_for_hello(self) -> None:
         """Go on in the recorder's newest file with the next hello."""

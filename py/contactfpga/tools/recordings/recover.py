@@ -14,12 +14,11 @@ from contactfpga.driver.mcap_part import Summary
 from contactfpga.driver.mcap_records import MAGIC, Cut, RecordingError, Unreadable
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, replaced, told
-from contactfpga.tools.recordings.mcap_file import McapFile
-from contactfpga.tools.recordings.whole_file import RecordingFailed
+from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
 
 
 @dataclasses.dataclass
-class Recovered:
+class RecoveryReport:
     """What was found."""
 
     path: Path
@@ -39,7 +38,7 @@ class Recovered:
     """Bytes after the end of the last one that are no recording."""
 
 
-def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
+def recover(path: str | Path, into: str | Path | None = None) -> RecoveryReport:
     """Copy what is whole into a new file, by default ``touches_recovered.mcap`` for ``touches.mcap``; the old one stays
     as it is. The new one is there once it is whole. Raises :class:`RecordingError` where there is nothing to copy, no
     room, or a file of the new one's name."""
@@ -58,7 +57,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
             raise RecordingError(f"{source} is no MCAP file")
         if os.path.lexists(target):
             raise RecordingError(f"{target} is there already; name a new file, or remove it first")
-        found = Recovered(target)
+        found = RecoveryReport(target)
         try:
             with replaced(target) as new:
                 _copy_all(file, new, found)
@@ -71,7 +70,7 @@ def recover(path: str | Path, into: str | Path | None = None) -> Recovered:
     return found
 
 
-def _copy_all(file: BinaryIO, new: Path, found: Recovered) -> None:
+def _copy_all(file: BinaryIO, new: Path, found: RecoveryReport) -> None:
     definitions = _definitions(file)
     new.unlink()  # as it will be made
     copy = _Copy(new)
@@ -118,7 +117,7 @@ class _Copy:
         """Of each recording that has begun; numbers of the last one count."""
         self._first_ns: int | None = None
 
-    def take(self, record: Any, found: Recovered) -> None:
+    def take(self, record: Any, found: RecoveryReport) -> None:
         """Add a record of the old one."""
         from mcap.records import Message, Metadata
 
@@ -143,7 +142,7 @@ def _definitions(file: BinaryIO) -> list[_Definitions]:
     from mcap.opcode import Opcode
 
     found: list[_Definitions] = []
-    for number, kind, data in _walk(file, counts := Recovered(Path())):
+    for number, kind, data in _walk(file, counts := RecoveryReport(Path())):
         found += [_Definitions() for _ in range(len(found), number + 1)]
         if kind in (Opcode.SCHEMA, Opcode.CHANNEL):
             with contextlib.suppress(Unreadable):
@@ -156,7 +155,7 @@ def _definitions(file: BinaryIO) -> list[_Definitions]:
     return found
 
 
-def _walk(file: BinaryIO, found: Recovered) -> Iterator[tuple[int, int, bytes]]:
+def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, bytes]]:
     """(number of the recording, kind, content) of records up to the end of the last recording, or of what is whole."""
     from mcap.opcode import Opcode
 

@@ -1,9 +1,10 @@
-"""A robot with sheets on its links: each link's newest frame, and sliders for its joints."""
+"""A robot with sheets on its links, live or from a recording: each link's newest frame, and sliders for its joints."""
 
 from __future__ import annotations
 
+import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,30 +12,32 @@ import numpy as np
 
 from contactfpga.driver import driver, transport
 from contactfpga.driver.board import Board
-from contactfpga.robot.body import Body, Contact
+from contactfpga.robot.body import Body, Contact, LinkState, packed
 from contactfpga.robot.body.body import OpenBody
 from contactfpga.robot.body.plan import Plan
 from contactfpga.robot.body.reader import open_board
 from contactfpga.robot.body.snapshot import on_link
-from contactfpga.robot.body.state import LinkState
 from contactfpga.tools.view import picture
 from contactfpga.tools.view.fingers import Hand, Touchable
-from contactfpga.tools.view.panel import Timeline, as_markdown, shortened
+from contactfpga.tools.view.panel import TimelineControls, as_markdown, shortened
 from contactfpga.tools.view.playback import Playback
 from contactfpga.tools.view.robot import RobotStage
 from contactfpga.tools.view.sources import Moment
 from contactfpga.tools.view.tiles import MM
 from contactfpga.tracking.tracker import Tracker
+from contactfpga.zones.zone import Zones
 
 if TYPE_CHECKING:
     import viser
 
-TURN_S = 0.04
+    from contactfpga.tools.recordings import Recording
+
+STEP_S = 0.04
 TOLD_S = 0.25
 TURN_RAD = 3.15
 
 
-class Shown(Protocol):
+class RobotSource(Protocol):
     """A robot with boards, or a recording of them."""
 
     title: str
@@ -79,7 +82,7 @@ class BodySource:
 class BodyView:
     """Shows a body in a server's page."""
 
-    def __init__(self, server: viser.ViserServer, source: Shown):
+    def __init__(self, server: viser.ViserServer, source: RobotSource):
         self._source = source
         self.stage = RobotStage(server, source.body)
         self._moved = dict(source.angles)
@@ -87,12 +90,12 @@ class BodyView:
         self.stage.look(source.angles)
         self._trackers = {name: Tracker(gate_mm=40.0, hold_ms=100.0) for name in source.body.links}
         self.hands: dict[str, Hand] = {}
-        self._turned_s = self._told_s = 0.0
+        self._stepped_s = self._told_s = 0.0
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.set_panel_label("contactfpga")
         self._facts = gui.add_markdown("")
-        self._timeline = Timeline(server, source) if isinstance(source, Playback) else None
+        self._timeline = TimelineControls(server, source) if isinstance(source, Playback) else None
         self._felt: dict[str, LinkState] = {}
         self._add_sliders(server)
 
@@ -106,10 +109,10 @@ class BodyView:
                 slider = server.gui.add_slider(name, -TURN_RAD, TURN_RAD, 0.01, 0.0)
                 slider.on_update(lambda event: angles.__setitem__(event.target.label, event.target.value))
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Wait for a moment and draw it."""
-        time.sleep(max(0.0, TURN_S - (time.monotonic() - self._turned_s)))
-        self._turned_s = time.monotonic()
+        time.sleep(max(0.0, STEP_S - (time.monotonic() - self._stepped_s)))
+        self._stepped_s = time.monotonic()
         source = self._source
         if source.angles != self._moved:
             self._moved = dict(source.angles)
@@ -126,8 +129,8 @@ class BodyView:
                 truth = None if virtual is None else virtual.pressed
                 tracks = self._trackers[name].update(state.zones)
                 stage.draw(Moment(state.zones, tracks, truth, arrows=self._arrows(source.body.links[name], state)))
-        if self._turned_s - self._told_s > TOLD_S:
-            self._told_s = self._turned_s
+        if self._stepped_s - self._told_s > TOLD_S:
+            self._told_s = self._stepped_s
             self._facts.content = as_markdown(facts(source, states, self.stage.unread))
             if self._timeline is not None:
                 self._timeline.write()
@@ -155,7 +158,7 @@ def pushes(plan: Plan, contacts: Iterable[Contact]) -> np.ndarray:
     return np.array(arrows) if arrows else np.zeros((0, 2, 3))
 
 
-def facts(source: Shown, states: dict[str, LinkState], unread: set[str]) -> list[tuple[str, str]]:
+def facts(source: RobotSource, states: dict[str, LinkState], unread: set[str]) -> list[tuple[str, str]]:
     """Names and values, as the panel shows them."""
     rows = [("source", shortened(source.title))]
     if isinstance(source, Playback):
@@ -167,3 +170,57 @@ def facts(source: Shown, states: dict[str, LinkState], unread: set[str]) -> list
         zones = "" if state.zones is None else f", {found} zone{'' if found == 1 else 's'}"
         rows.append((name, f"{state}{zones}"))
     return rows
+
+
+class BodyPlayer(Playback[tuple[str, Zones]]):
+    """Plays all links of a robot. Raises :class:`~contactfpga.ContactFPGAError` where the recording holds no robot."""
+
+    def __init__(self, recording: Recording, clock: Callable[[], float] = time.monotonic):
+        super().__init__(recording.duration_s, clock)
+        self.title = recording.path.name
+        self.virtual: dict[str, Touchable] = {}  # nobody can press what was recorded
+        self._recording = recording
+        self._folder = tempfile.TemporaryDirectory(prefix="contactfpga-")
+        try:
+            self.body = packed.unpack(recording.texts(packed.ROBOT)[0], Path(self._folder.name))
+        except BaseException:
+            self._folder.cleanup()
+            raise
+        kinematics = self.body.kinematics
+        self.angles: dict[str, float] = dict.fromkeys(kinematics.joint_names if kinematics else (), 0.0)
+        self._newest: dict[str, tuple[float, Zones]] = {}
+
+    def begin(self, start_s: float) -> Iterator[tuple[float, tuple[str, Zones]]]:
+        self._newest = {}
+        return ((seconds, (link, zones)) for seconds, link, zones in self._recording.frames(start_s))
+
+    def follow(self, seconds: float, item: tuple[str, Zones]) -> None:
+        link, zones = item
+        if link in self.body.links:
+            self._newest[link] = seconds, zones
+
+    def states(self) -> dict[str, LinkState]:
+        """Of all links, at the next moment."""
+        self.step()
+        return {name: self._state(plan) for name, plan in self.body.links.items()}
+
+    def _state(self, plan: Plan) -> LinkState:
+        if plan.name not in self._newest:
+            return LinkState(None, None, "silent", "no frame up to here")
+        seconds, zones = self._newest[plan.name]
+        age_s = max(0.0, self.position_s - seconds)
+        if zones.sheet != plan.skin.sheet:
+            return LinkState(None, age_s, "mismatch", "a board of another Skin was recorded")
+        if age_s > plan.silent_s:
+            return LinkState(None, age_s, "silent", f"no frame for {age_s:.3f} s")
+        return LinkState(zones, age_s, "ok" if age_s <= plan.late_s else "late", "", seconds)
+
+    def close(self) -> None:
+        super().close()
+        self._folder.cleanup()
+
+
+def holds_robot(recording: Recording) -> bool:
+    """Whether a recording holds a robot with all files of its table; those of earlier versions hold the table alone."""
+    texts = recording.texts(packed.ROBOT)
+    return bool(texts) and set(texts[0]) != {packed.TOML}

@@ -21,24 +21,56 @@ from contactfpga.inputs.files import names_robot
 from contactfpga.robot.haptics import LoadCells
 from contactfpga.skin import Skin
 from contactfpga.tools.view import server
-from contactfpga.tools.view.app import View
-from contactfpga.tools.view.bodies import BodySource, BodyView
+from contactfpga.tools.view.bodies import BodyPlayer, BodySource, BodyView, holds_robot
 from contactfpga.tools.view.fingers import Hand
-from contactfpga.tools.view.guard import Guard
-from contactfpga.tools.view.player import Player
-from contactfpga.tools.view.recorded_body import BodyPlayer, holds_robot
+from contactfpga.tools.view.panel import Panel
+from contactfpga.tools.view.playback import Player
 from contactfpga.tools.view.replayed import LinkRecording, Reading, is_recording, load, silent
-from contactfpga.tools.view.sources import BoardSource, Source
+from contactfpga.tools.view.server import Guard
+from contactfpga.tools.view.sources import BoardSource, Moment, Source
+from contactfpga.tools.view.stage import Stage
+from contactfpga.tools.view.tiles import Tiles
 
 if TYPE_CHECKING:
     import viser
+
+PANEL_S = 0.25
+"""How often the panel is written."""
+
+
+class View:
+    """Shows a source in a server's page."""
+
+    def __init__(self, server: viser.ViserServer, source: Source, hand: Hand | None = None):
+        self._source = source
+        self.stage = Stage(server, Tiles(source.sheet), source.cells)
+        self.panel = Panel(server, source, hand)
+        self._told_s = 0.0
+        self._moment: Moment | None = None
+        self.drawn = 0
+        """Moments drawn."""
+        self.stage.look()
+        if hand is not None:
+            self.stage.press_with(hand)
+
+    def step(self) -> None:
+        """Wait for a moment and draw it."""
+        moment = self._source.poll()
+        if moment is not None:
+            self._moment = moment
+            self.stage.draw(moment)
+            self.drawn += 1
+        if (now := time.monotonic()) - self._told_s > PANEL_S:
+            self._told_s = now
+            self.panel.write(self._moment)
+
 
 SLOW = {"clock_hz": 4_000_000, "baud": 2_000_000, "send": "on_change"}
 """Of the virtual board that is shown where nothing is named: a third of the usual clock, to keep up with real time."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Shown:
+class ServedView:
     """A view that is being served."""
 
     web: viser.ViserServer
@@ -52,7 +84,7 @@ class Shown:
 
 
 @dataclasses.dataclass(frozen=True)
-class Named:
+class ViewRequest:
     """What a user asks to see."""
 
     port: str | None = None
@@ -70,10 +102,12 @@ class Named:
 
 
 @contextlib.contextmanager
-def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int | None = None) -> Iterator[Shown]:
+def opened(
+    named: ViewRequest | None = None, host: str = server.LOCAL, http_port: int | None = None
+) -> Iterator[ServedView]:
     """Open what is named, a virtual board by default, and serve a view of it; raises what :func:`contactfpga.open`
     does."""
-    named = named or Named()
+    named = named or ViewRequest()
     _check(named)
     source, hand = _source(named)
     try:
@@ -83,21 +117,21 @@ def opened(named: Named | None = None, host: str = server.LOCAL, http_port: int 
                 view: View | BodyView = BodyView(web, source)
             else:
                 view = View(web, source, hand)
-            yield Shown(web, guard, view, source, hand, guard.url(web.get_port()))
+            yield ServedView(web, guard, view, source, hand, guard.url(web.get_port()))
         finally:
             server.stop(web)
     finally:
         source.close()
 
 
-def run(shown: Shown, seconds: float | None = None) -> None:
+def run(shown: ServedView, seconds: float | None = None) -> None:
     """Draw moment after moment, for so long; None: until it is interrupted."""
     until = math.inf if seconds is None else time.monotonic() + seconds
     while time.monotonic() < until:
-        shown.view.turn()
+        shown.view.step()
 
 
-def _check(named: Named) -> None:
+def _check(named: ViewRequest) -> None:
     """Raises :class:`~contactfpga.ContactFPGAError` for what is named and would be left out."""
     port = named.port
     is_body = names_robot(port)
@@ -110,7 +144,7 @@ def _check(named: Named) -> None:
         raise ContactFPGAError(f"--link is for a recording; {'name one' if port is None else f'{port} is not one'}")
 
 
-def _source(named: Named) -> tuple[Source | BodySource | BodyPlayer, Hand | None]:
+def _source(named: ViewRequest) -> tuple[Source | BodySource | BodyPlayer, Hand | None]:
     if names_robot(named.port):
         return BodySource(named.port, named.timeout), None
     if named.port is not None and is_recording(named.port):
@@ -132,7 +166,7 @@ def _is_virtual(port: str) -> bool:
     return port.startswith("sim:")
 
 
-def _cells(named: Named) -> LoadCells | None:
+def _cells(named: ViewRequest) -> LoadCells | None:
     """Raises :class:`~contactfpga.robot.haptics.HapticsError`."""
     path = named.units
     if path is None and named.port is not None and _is_virtual(named.port):
@@ -140,7 +174,7 @@ def _cells(named: Named) -> LoadCells | None:
     return None if path is None else LoadCells.load(path)
 
 
-def _virtual(named: Named) -> Any:
+def _virtual(named: ViewRequest) -> Any:
     """A virtual board; with nothing named an untouched one of the Skin, or of the reference Skin at a slower clock."""
     if named.port is not None:
         return transport.virtual_board(named.port)

@@ -55,7 +55,7 @@ class Panel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("contactfpga")
         self._facts = gui.add_markdown("")
-        self._timeline = Timeline(server, source) if isinstance(source, Playback) else None
+        self._timeline = TimelineControls(server, source) if isinstance(source, Playback) else None
         self._chart = self._add_chart(server)
         if hand is not None:
             self._add_mouse(server, hand)
@@ -131,7 +131,7 @@ def _top(values: np.ndarray, least: int) -> int:
     return next(times * power for times in (1, 2, 5, 10) if times * power >= wanted)
 
 
-class Timeline:
+class TimelineControls:
     """Where a recording is, and how fast it goes on."""
 
     def __init__(self, server: viser.ViserServer, player: Playback[Any]):

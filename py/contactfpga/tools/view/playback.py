@@ -1,4 +1,4 @@
-"""What plays: as fast as asked, from where one is led to."""
+"""What plays: a recording as fast as asked, from where one is led to; and one of a board."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
-from contactfpga.tools.view.sources import TURN_S
+from contactfpga.driver.stats import Stats
+from contactfpga.robot.haptics import LoadCells
+from contactfpga.tools.view.meter import Meter
+from contactfpga.tools.view.replayed import BoardRecording
+from contactfpga.tools.view.sources import STEP_S, Moment
+from contactfpga.tracking.tracker import Tracker
+from contactfpga.tracking.tracks import Tracks
+from contactfpga.zones.batch import Batch
+from contactfpga.zones.zone import Zones
 
 Item = TypeVar("Item")
 
@@ -33,7 +41,7 @@ class Playback(abc.ABC, Generic[Item]):
         self._items: Iterator[tuple[float, Item]] = iter(())
         self._next: tuple[float, Item] | None = None
         self._led_to: float | None = 0.0
-        self._turned_s = clock()
+        self._stepped_s = clock()
 
     @abc.abstractmethod
     def begin(self, start_s: float) -> Iterator[tuple[float, Item]]:
@@ -60,12 +68,12 @@ class Playback(abc.ABC, Generic[Item]):
             self._led_to = min(max(0.0, seconds), self.duration_s)
 
     def step(self) -> None:
-        """Wait for the next turn, and follow what came up to its moment."""
-        left = TURN_S - (self._clock() - self._turned_s)
+        """Wait for the next step, and follow what came up to its moment."""
+        left = STEP_S - (self._clock() - self._stepped_s)
         if left > 0:
             time.sleep(left)
         now = self._clock()
-        passed, self._turned_s = now - self._turned_s, now
+        passed, self._stepped_s = now - self._stepped_s, now
         with self._lock:
             led_to, self._led_to = self._led_to, None
             if led_to is not None:
@@ -75,7 +83,7 @@ class Playback(abc.ABC, Generic[Item]):
             elif self.playing:
                 self.position_s = min(self.duration_s, self.position_s + passed * self.speed)
             until_s = self.position_s
-        self._take(until_s, now + 5 * TURN_S)
+        self._take(until_s, now + 5 * STEP_S)
         if self._next is None:
             self.playing = False
         elif self._next[0] <= until_s:  # slower than asked: it goes on from where it is
@@ -92,3 +100,37 @@ class Playback(abc.ABC, Generic[Item]):
     def close(self) -> None:
         """Let the recording go."""
         self._items = iter(())
+
+
+class Player(Playback[Zones]):
+    """Plays one board."""
+
+    cells: LoadCells | None = None
+
+    def __init__(self, recording: BoardRecording, clock: Callable[[], float] = time.monotonic):
+        super().__init__(recording.duration_s, clock)
+        self.title, self.sheet, self.meter = recording.title, recording.sheet, Meter()
+        self._recording = recording
+        self._tracker = Tracker()
+        self._taken: list[Zones] = []
+        self._tracks: Tracks | None = None
+
+    def poll(self) -> Moment | None:
+        """The frame that is to be shown now, after those before it have been counted and followed."""
+        self._taken = []
+        self.step()
+        if not self._taken or self._tracks is None:
+            return None
+        self.meter.take(Batch.of(self._taken), Stats(), 0)
+        return Moment(self._taken[-1], self._tracks)
+
+    def told(self) -> list[tuple[str, str]]:
+        return [("moment", f"{self.position_s:.3f} of {self.duration_s:.3f} s")]
+
+    def begin(self, start_s: float) -> Iterator[tuple[float, Zones]]:
+        self.meter, self._tracker = Meter(), Tracker()
+        return ((when, zones) for when, zones in self._recording.frames(start_s) if zones.sheet == self.sheet)
+
+    def follow(self, seconds: float, item: Zones) -> None:
+        self._taken.append(item)
+        self._tracks = self._tracker.update(item)

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from contactfpga import picture_style as style
-from contactfpga.tools.view.replayed import Recorded
+from contactfpga.tools.view.replayed import BoardRecording
 from contactfpga.tools.view.touches import Touches
 
 HEIGHT_IN = 9.2
 COLORS = "cividis"
 
 
-def draw(recording: Recorded, path: Path) -> Path:
+def draw(recording: BoardRecording, path: Path) -> Path:
     """Write PNG or SVG, by the path's ending."""
     touches = Touches.of(recording)
     with matplotlib.rc_context(style.SETTINGS):
@@ -34,7 +34,7 @@ def draw(recording: Recorded, path: Path) -> Path:
         return style.save(figure, path)
 
 
-def title(recording: Recorded, touches: Touches) -> str:
+def title(recording: BoardRecording, touches: Touches) -> str:
     """What it is of."""
     sheet = touches.sheet
     name = recording.title.rpartition("/")[2]
@@ -79,7 +79,7 @@ def _rows(figure: Figure, axes: Axes, touches: Touches) -> None:
     axes.set(ylabel="row", title="Pressed cells of each row" if cells else "Rows in which barycenters lay")
 
 
-def _losses(axes: Axes, touches: Touches, recording: Recorded) -> None:
+def _losses(axes: Axes, touches: Touches, recording: BoardRecording) -> None:
     late = np.array(list(recording.lateness()))
     axes.stairs(np.cumsum(touches.lost), touches.seconds, color=style.VERMILLION)
     axes.set(xlabel="time, s", ylabel="frames lost", ylim=(0, max(1, touches.lost.sum()) * 1.15))

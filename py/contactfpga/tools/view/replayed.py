@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from contactfpga.tools.recordings import Recording
 
 
-class Recorded(Protocol):
+class BoardRecording(Protocol):
     """A recording of one board."""
 
     title: str
@@ -54,7 +54,7 @@ def is_recording(name: str) -> bool:
     return name.startswith(REPLAY) or name.endswith(SUFFIX) or Path(name).is_file()
 
 
-def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Reading = silent) -> Recorded:
+def load(name: str, link: str | None = None, timeout: float = 1.0, reading: Reading = silent) -> BoardRecording:
     """A recording by its path, or by ``replay://FILE``; ``link``: of several in the file. ``reading``: told how far a
     file is read that has no index.
 
@@ -136,7 +136,7 @@ class ByteRecording:
         return iter(())
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """As :meth:`Recorded.frames`. Frames before ``start_s`` are skipped at once."""
+        """As :meth:`BoardRecording.frames`. Frames before ``start_s`` are skipped at once."""
         clock = Clock()
         with self._opened() as board:
             for piece in self._pieces:
@@ -172,11 +172,11 @@ class LinkRecording:
         return self.recording.duration_s
 
     def frames(self, start_s: float = 0.0, end_s: float | None = None) -> Iterator[tuple[float, Zones]]:
-        """As :meth:`Recorded.frames`."""
+        """As :meth:`BoardRecording.frames`."""
         return ((seconds, zones) for seconds, _, zones in self.recording.frames(start_s, end_s, self._link))
 
     def lateness(self) -> Iterator[tuple[float, float]]:
-        """As :meth:`Recorded.lateness`."""
+        """As :meth:`BoardRecording.lateness`."""
         conversation = Conversation(self.title, live=False)
         found = []
         for seconds, data in self.recording.raw_bytes(self._link):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import dataclasses
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -15,13 +17,66 @@ from contactfpga.robot.haptics import Contacts, LoadCells, felt
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tools.view.fingers import Touchable
 from contactfpga.tools.view.meter import Meter
-from contactfpga.tools.view.pace import Pace
 from contactfpga.tracking.tracker import Tracker
 from contactfpga.tracking.tracks import Tracks
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
-TURN_S = 0.02
+MAX_LAG_S = 0.1
+"""A board that is later than this does not catch up any more: its time has slipped."""
+
+MOMENT_S = 0.04
+"""What one moment may take to simulate."""
+LEAST_S = 0.0005
+SMOOTHING = 0.2
+
+WINDOW_S = 2.0
+"""Over which the share of real time is told."""
+
+
+class SimulatedPace:
+    """Says how much simulated time may pass, so that a board runs in real time, or as near to it as the machine can."""
+
+    def __init__(self, simulated_s: float, clock: Callable[[], float] = time.monotonic):
+        self._clock = clock
+        self._begin = clock() - simulated_s  # when simulated time was 0, slip taken out
+        self.slip_s = 0.0
+        """Seconds by which simulated time has fallen behind for good."""
+        self._speed = 1.0
+        self._seen: collections.deque[tuple[float, float]] = collections.deque([(clock(), simulated_s)])
+
+    def due(self, simulated_s: float) -> float:
+        """Seconds of simulated time that are to pass now; below 0: so long nothing is to."""
+        now = self._clock()
+        behind = now - self._begin - simulated_s
+        if behind > MAX_LAG_S:
+            self.slip_s += behind - MAX_LAG_S
+            self._begin += behind - MAX_LAG_S
+            behind = MAX_LAG_S
+        self._seen.append((now, simulated_s))
+        while now - self._seen[0][0] > WINDOW_S:
+            self._seen.popleft()
+        return behind
+
+    def ran(self, simulated_s: float, seconds: float) -> None:
+        """So long it took to simulate so much."""
+        if seconds > 0:
+            self._speed += SMOOTHING * (simulated_s / seconds - self._speed)
+
+    @property
+    def most_s(self) -> float:
+        """Seconds of simulated time that this machine simulates within :data:`MOMENT_S`. Where it is slow a moment
+        holds less, so that it is shown as soon."""
+        return max(MOMENT_S * self._speed, LEAST_S)
+
+    @property
+    def share(self) -> float:
+        """Of real time that the board reached over the last seconds; 1: it keeps up."""
+        (first, began), (last, ended) = self._seen[0], self._seen[-1]
+        return min(1.0, (ended - began) / (last - first)) if last - first > 0.2 else 1.0
+
+
+STEP_S = 0.02
 """A moment is shown for so long."""
 
 SILENT_S = 0.5
@@ -57,7 +112,7 @@ class Source(Protocol):
     sheet: Sheet
     meter: Meter
 
-    def turn(self) -> Moment | None:
+    def poll(self) -> Moment | None:
         """Wait for a while, and return what is new; None: nothing is. Raises what a board does."""
 
     def told(self) -> list[tuple[str, str]]:
@@ -90,11 +145,11 @@ class BoardSource:
         self.meter = Meter()
         self._board, self._virtual = board, virtual
         self._frames = board.subscribe(WAITING)
-        self._pace = Pace(board.clock()) if simulated or virtual is not None else None
+        self._pace = SimulatedPace(board.clock()) if simulated or virtual is not None else None
         # One frame in many is followed, so a contact may be gone from view for longer than from the board's.
         self._tracker = Tracker(gate_mm=40.0, hold_ms=60.0)
 
-    def turn(self) -> Moment | None:
+    def poll(self) -> Moment | None:
         if not self._wait():
             return None
         zones = self._board.latest()
@@ -111,12 +166,12 @@ class BoardSource:
 
     def _wait(self) -> bool:
         """Whether frames came."""
-        seconds = TURN_S
+        seconds = STEP_S
         if self._pace is not None:
             due = self._pace.due(self._board.clock())
-            if due < TURN_S:
-                time.sleep(TURN_S - due)
-            seconds = min(max(due, TURN_S), self._pace.most_s)
+            if due < STEP_S:
+                time.sleep(STEP_S - due)
+            seconds = min(max(due, STEP_S), self._pace.most_s)
         came = False
         began_s, began = self._board.clock(), time.monotonic()
         with contextlib.suppress(ReadTimeout):
@@ -150,7 +205,7 @@ class BoardSource:
         self._board.close()
 
 
-def paced(pace: Pace) -> str:
+def paced(pace: SimulatedPace) -> str:
     """How the virtual board's time goes."""
     if pace.share > KEEPS_UP:
         return "real time"

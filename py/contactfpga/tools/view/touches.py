@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from contactfpga.skin.sheet import Sheet
-from contactfpga.tools.view.replayed import Recorded
+from contactfpga.tools.view.replayed import BoardRecording
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.zone import Zones
 
@@ -39,7 +39,7 @@ class Touches:
         self._before_s = 0.0
 
     @classmethod
-    def of(cls, recording: Recorded) -> Touches:
+    def of(cls, recording: BoardRecording) -> Touches:
         """A whole recording."""
         found = cls(recording.sheet, recording.duration_s)
         same = ((seconds, zones) for seconds, zones in recording.frames() if zones.sheet == recording.sheet)

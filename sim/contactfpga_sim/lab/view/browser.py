@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from contactfpga.errors import MissingExtra, MissingTool
-from contactfpga.tools.view.app import View
-from contactfpga.tools.view.opening import Shown
+from contactfpga.tools.view.opening import ServedView, View
 from contactfpga.tools.view.tiles import MM
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -63,7 +62,7 @@ def program() -> str | None:
 class Visitor:
     """A page that shows a view."""
 
-    def __init__(self, page: Any, shown: Shown):
+    def __init__(self, page: Any, shown: ServedView):
         self.page, self._shown = page, shown
         page.goto(shown.url)
         until = time.monotonic() + PATIENCE_S
@@ -123,7 +122,7 @@ def turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def visit(shown: Shown, width: int = 1100, height: int = 680) -> Iterator[Visitor]:
+def visit(shown: ServedView, width: int = 1100, height: int = 680) -> Iterator[Visitor]:
     """Open a view in a browser while a thread keeps it going."""
     try:
         from playwright.sync_api import sync_playwright
@@ -141,7 +140,7 @@ def visit(shown: Shown, width: int = 1100, height: int = 680) -> Iterator[Visito
 
 
 @contextlib.contextmanager
-def running(shown: Shown) -> Iterator[None]:
+def running(shown: ServedView) -> Iterator[None]:
     """Draw moments in a thread."""
     ending = threading.Event()
     failed: list[BaseException] = []
@@ -149,7 +148,7 @@ def running(shown: Shown) -> Iterator[None]:
     def run() -> None:
         try:
             while not ending.is_set():
-                shown.view.turn()
+                shown.view.step()
         except BaseException as error:  # raised where it is waited for
             failed.append(error)
 

@@ -16,8 +16,7 @@ from contactfpga.driver import driver
 from contactfpga.driver.link import Link
 from contactfpga.skin.sheet import Sheet
 from contactfpga.tools.view import opening, plot, replayed
-from contactfpga.tools.view.app import View
-from contactfpga.tools.view.opening import Shown
+from contactfpga.tools.view.opening import ServedView, View
 from contactfpga.zones.batch import Batch
 from contactfpga_sim.lab import writer
 from contactfpga_sim.lab.view import browser
@@ -65,7 +64,7 @@ class Click:
 class Stopwatch:
     """Notes when a click passes through the view, in :attr:`times`."""
 
-    def __init__(self, shown: Shown):
+    def __init__(self, shown: ServedView):
         assert shown.hand is not None
         assert isinstance(shown.view, View)
         self._stage = shown.view.stage
@@ -126,13 +125,13 @@ def _method(noted: Any, kept: Any) -> Any:
     return lambda *args: noted(kept, *args)
 
 
-def sheet_of(shown: Shown) -> Sheet:
+def sheet_of(shown: ServedView) -> Sheet:
     """What is shown."""
     assert isinstance(shown.view, View)
     return shown.view.stage.tiles.sheet
 
 
-def clicks(shown: Shown, visitor: browser.Visitor, count: int = CLICKS) -> list[Click]:
+def clicks(shown: ServedView, visitor: browser.Visitor, count: int = CLICKS) -> list[Click]:
     """Click cells one after the other, and lift the finger in between."""
     watch, sheet, found = Stopwatch(shown), sheet_of(shown), []
     assert shown.hand is not None
@@ -172,7 +171,7 @@ class Load:
     """Driver and view, without a browser."""
 
 
-def load_of(shown: Shown, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
+def load_of(shown: ServedView, fingers: Sequence[tuple[float, float]], seconds: float = PACED_S) -> Load:
     """While these fingers press. Processor time does not depend on what else the computer does."""
     assert shown.hand is not None
     virtual: Any = shown.hand.board
@@ -189,14 +188,14 @@ def load_of(shown: Shown, fingers: Sequence[tuple[float, float]], seconds: float
     virtual.read = timed
     began_s, began = virtual.clock(), time.thread_time()
     while virtual.clock() - began_s < seconds:
-        shown.view.turn()
+        shown.view.step()
     passed_s, used = virtual.clock() - began_s, time.thread_time() - began
     virtual.read = read
     shown.hand.lift()
     return Load(spent[0] / passed_s, (used - spent[0]) / passed_s)
 
 
-def load_table(shown: Shown) -> str:
+def load_table(shown: ServedView) -> str:
     """Untouched and touched."""
     rows = [["on the sheet", "simulating the board", "driver and view", "both, of one core"]]
     for name, fingers in (("nothing", ()), ("two fingers", ((40.0, 40.0), (110.0, 90.0)))):
@@ -206,7 +205,7 @@ def load_table(shown: Shown) -> str:
     return writer.table_of(rows)
 
 
-def picture(shown: Shown, visitor: browser.Visitor, path: Path) -> None:
+def picture(shown: ServedView, visitor: browser.Visitor, path: Path) -> None:
     """Three fingers, one of them on its way."""
     pitch_mm = sheet_of(shown).pitch_x_mm
     assert shown.hand is not None
