@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from contactfpga.driver.board import Board
     from contactfpga.driver.driver import open, read_zones
-    from contactfpga.driver.silence import Silence
+    from contactfpga.driver.events import Silence
     from contactfpga.driver.stats import Stats
     from contactfpga.driver.subscription import Events, Subscription
     from contactfpga.errors import (
@@ -96,7 +96,7 @@ __all__ = [
 _NAMES = {
     "driver.board": "Board",
     "driver.driver": "open read_zones",
-    "driver.silence": "Silence",
+    "driver.events": "Silence",
     "driver.stats": "Stats",
     "driver.subscription": "Events Subscription",
     "errors": (

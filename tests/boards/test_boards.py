@@ -7,7 +7,7 @@ import pytest
 
 from contactfpga.boards import BOARDS, find
 from contactfpga.boards.spec import Bridge
-from contactfpga.driver import ports
+from contactfpga.driver import finding
 from contactfpga.skin import Skin, SkinError
 from contactfpga.skin.derived import Derived
 from contactfpga_hdl.board.build import plan_for
@@ -126,7 +126,7 @@ def test_crystal_is_the_clock_of_the_platform(board):
 
 @every_board
 def test_port_is_one_that_the_host_looks_for(board):
-    names = [usb.boards for usb in ports.SUPPORTED if (usb.vid, usb.pid) == board.bridge.usb]
+    names = [usb.boards for usb in finding.SUPPORTED if (usb.vid, usb.pid) == board.bridge.usb]
     assert len(names) == 1
     assert board.title.split()[0] in names[0]
 

@@ -9,7 +9,7 @@ import pytest
 from fake_board import FakeBoard, background, wait_until
 
 import contactfpga
-from contactfpga.driver import health, ports
+from contactfpga.driver import finding, health
 from contactfpga.driver.stats import Stats
 
 SKIN = contactfpga.Skin()
@@ -118,7 +118,7 @@ def test_doctor_of_a_silent_board(board, run):
 
 def test_doctor_lists_candidates(monkeypatch, board, run):
     board.answers = False
-    monkeypatch.setattr(ports, "candidates", lambda: [ports.Candidate(board.path, "ULX3S")])
+    monkeypatch.setattr(finding, "candidates", lambda: [finding.Candidate(board.path, "ULX3S")])
     status, out, _ = run("doctor", "--timeout", 0.2)
     assert status == 1
     assert f"note  {board.path} (ULX3S) may be a board" in out
@@ -151,7 +151,7 @@ def test_no_latency_timer_is_nothing_to_say(tmp_path):
 
 def test_udev_rule_covers_every_supported_board():
     rules = health.udev_rule().splitlines()
-    assert len(rules) == len(ports.SUPPORTED)
-    for rule, usb in zip(rules, ports.SUPPORTED, strict=True):
+    assert len(rules) == len(finding.SUPPORTED)
+    for rule, usb in zip(rules, finding.SUPPORTED, strict=True):
         assert f'ATTRS{{idVendor}}=="{usb.vid:04x}", ATTRS{{idProduct}}=="{usb.pid:04x}"' in rule
         assert 'ATTR{latency_timer}="1", ATTR{event_char}="256"' in rule  # 256: enabled, byte 0

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from contactfpga import ContactFPGAError, Skin, SkinError
 from contactfpga.design.cover.task import Task
-from contactfpga.driver import mcap_part, mcap_records
+from contactfpga.driver import mcap
 from contactfpga.inputs import array_file, tomlfile, values, xmlfile
 from contactfpga.robot.body import Body, BodyError, folds, packed, urdf
 from contactfpga.robot.body.folds import Folds
@@ -378,12 +378,12 @@ def test_the_page_on_security_states_these_limits():
     for row, numbers in {
         "Any TOML": (tomlfile.MAX_BYTES // 10**6, tomlfile.MAX_DEPTH),
         "Skin files of several sheets": (MOST_SHEETS,),
-        "Robot": (mcap_part.MAX_LINKS, mcap_part.MAX_NAME),
+        "Robot": (mcap.MAX_LINKS, mcap.MAX_NAME),
         "URDF": (urdf.MAX_BYTES // 10**6, xmlfile.MAX_ELEMENTS, urdf.MAX_LINKS),
         "Mesh of a robot": (mesh_file.MAX_BYTES // 10**6, mesh_file.MAX_TRIANGLES),
         "Recording (MCAP)": (
-            *(mcap_records.LARGEST >> 20, mcap_records.UNPACKED >> 20, mcap_records.FREE >> 10, mcap_records.RATIO),
-            *(mcap_part.MAX_LINKS, mcap_part.MAX_NAME, mcap_part.MAX_TEXTS),
+            *(mcap.LARGEST >> 20, mcap.UNPACKED >> 20, mcap.FREE >> 10, mcap.RATIO),
+            *(mcap.MAX_LINKS, mcap.MAX_NAME, mcap.MAX_TEXTS),
         ),
         "Frames": (array_file.MAX_BYTES >> 30,),
         "Table of a surface": (mesh.MAX_BYTES,),

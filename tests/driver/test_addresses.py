@@ -9,7 +9,7 @@ from slow_skin import SLOW
 import contactfpga
 from contactfpga.driver import recording
 from contactfpga.driver.address import Sim, parse
-from contactfpga.driver.ports import Candidate
+from contactfpga.driver.finding import Candidate
 from contactfpga.errors import ContactFPGAError, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.tools import cli

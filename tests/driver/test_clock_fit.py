@@ -9,7 +9,7 @@ import pytest
 from model_board import SCAN_US, ModelBoard
 
 import contactfpga
-from contactfpga.driver.clock_fit import PIECE_S, USUAL_PPM, ClockFit
+from contactfpga.driver.clock import PIECE_S, USUAL_PPM, ClockFit
 from contactfpga.driver.conversation import Arrival, Conversation
 from contactfpga.zones.batch import Batch
 from contactfpga.zones.run import Run

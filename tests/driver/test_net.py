@@ -18,9 +18,9 @@ from world import Witness, World
 
 import contactfpga
 import contactfpga.driver.requests
-from contactfpga.driver.lines import Lines
+from contactfpga.driver.clock import Timeline
+from contactfpga.driver.events import Lines
 from contactfpga.driver.requests import Requests
-from contactfpga.driver.timeline import Timeline
 
 SKINS = [
     contactfpga.Skin(),

@@ -12,7 +12,7 @@ from fake_board import FakeBoard
 
 import contactfpga
 from contactfpga.boards import BOARDS
-from contactfpga.driver import finding, ports
+from contactfpga.driver import finding
 from contactfpga.tools import cli
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")
@@ -34,15 +34,15 @@ def test_only_serial_interfaces_of_supported_boards_are_candidates():
         usb("COM7", interface=None),
         SimpleNamespace(device="/dev/ttyS0"),
     ]
-    assert [candidate.device for candidate in ports.choose(listed)] == ["/dev/ttyUSB1", "/dev/ttyUSB3", "COM7"]
+    assert [candidate.device for candidate in finding.choose(listed)] == ["/dev/ttyUSB1", "/dev/ttyUSB3", "COM7"]
 
 
 def test_boards_of_one_chip_are_one_candidate_wherever_they_stand_in_the_table():
     mine = dataclasses.replace(BOARDS["icebreaker"], name="mine", title="Mine")
-    supported = ports.supported([*BOARDS.values(), mine])
+    supported = finding.supported([*BOARDS.values(), mine])
     boards = ["iCEBreaker, iCEStick, Mine", "ULX3S 12F, ULX3S 85F", "ULX3S 12F with FT232H"]
     assert [usb.boards for usb in supported] == boards
-    assert ports.supported(BOARDS.values()) == ports.SUPPORTED
+    assert finding.supported(BOARDS.values()) == finding.SUPPORTED
 
 
 def plug_in(monkeypatch, *boards):
@@ -52,8 +52,8 @@ def plug_in(monkeypatch, *boards):
         if isinstance(board, FakeBoard):
             board.hello_s = 0.05
         path = board.path if isinstance(board, FakeBoard) else board
-        found.append(ports.Candidate(path, "ULX3S", f"A{index + 1}"))
-    monkeypatch.setattr(ports, "candidates", lambda: found)
+        found.append(finding.Candidate(path, "ULX3S", f"A{index + 1}"))
+    monkeypatch.setattr(finding, "candidates", lambda: found)
     monkeypatch.setattr(finding, "LISTEN_S", 1.0)
 
 
@@ -170,8 +170,8 @@ def test_a_search_does_not_disturb_an_open_board(three):
 
 
 def test_more_ports_are_searched_where_they_are_named(monkeypatch, board):
-    monkeypatch.setenv(ports.MORE, os.pathsep.join([board.path, board.path]))
-    named = [one for one in ports.candidates() if one.device == board.path]
+    monkeypatch.setenv(finding.MORE, os.pathsep.join([board.path, board.path]))
+    named = [one for one in finding.candidates() if one.device == board.path]
     assert [str(one) for one in named] == [f"{board.path} (in CONTACTFPGA_PORTS)"]
 
 

@@ -10,8 +10,7 @@ from model_board import SCAN_US, ModelBoard
 from wire import Wire
 
 import contactfpga
-from contactfpga.driver.recording import FileTap
-from contactfpga.driver.transport import RecordingTransport
+from contactfpga.driver.recording import FileTap, RecordingTransport
 from contactfpga.tools import cli
 
 pytestmark = pytest.mark.usefixtures("_closed_ports")

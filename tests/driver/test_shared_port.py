@@ -13,7 +13,7 @@ from contactfpga import ContactFPGAError, PortLost, PortNotFound, Skin
 from contactfpga.driver import finding, sheets
 from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
-from contactfpga.driver.ports import Candidate
+from contactfpga.driver.finding import Candidate
 from contactfpga.tools.cli import main
 from contactfpga.wire.numbered import numbered, sheet_of, unnumbered
 

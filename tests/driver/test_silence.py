@@ -8,7 +8,7 @@ from model_board import ModelBoard
 
 import contactfpga
 from contactfpga.driver import health
-from contactfpga.driver.silence import longest_pause_s
+from contactfpga.driver.events import longest_pause_s
 from contactfpga.tools.console import live
 from contactfpga.wire.faults import Faults
 

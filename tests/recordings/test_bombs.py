@@ -32,8 +32,18 @@ from mcap.records import (
 
 import contactfpga
 from contactfpga import Skin
-from contactfpga.driver import mcap_part, mcap_records
-from contactfpga.driver.mcap_records import MAGIC, RecordingError
+from contactfpga.driver.mcap import (
+    FREE,
+    KIND,
+    MAGIC,
+    MAX_LINKS,
+    MAX_NAME,
+    MAX_TEXTS,
+    UNPACKED,
+    RecordingError,
+    Unreadable,
+    inside,
+)
 from contactfpga.tools.recordings import Recording, Session, messages
 from contactfpga.tools.recordings.mcap_file import McapFile
 from contactfpga.tools.recordings.recover import recover
@@ -76,7 +86,7 @@ def chunk(compression, size, declared=None):
 
 def mcap(chunks, links=("a",), texts=(), repeat=1, in_summary=()):
     """A closed file of these chunks, each named ``repeat`` times at its end."""
-    schema = Schema(1, b"", "ros2msg", mcap_part.KIND)
+    schema = Schema(1, b"", "ros2msg", KIND)
     channels = [Channel(number, f"/{number}", "cdr", {"link": link}, 1) for number, link in enumerate(links)]
     body, index = MAGIC + record(Header("ros2", "x")), b""
     for one in texts:
@@ -101,8 +111,8 @@ BOMBS = {
     "zstd that says little": lambda: mcap([chunk("zstd", BIG, 1000)]),
     "lz4 that says little": lambda: mcap([chunk("lz4", BIG, 1000)]),
     "zstd that says all": lambda: mcap([chunk("zstd", 1000, BIG)]),
-    "one chunk many times": lambda: mcap([chunk("zstd", mcap_records.UNPACKED)], repeat=100),
-    "many chunks": lambda: mcap([chunk("zstd", mcap_records.UNPACKED)] * 60),
+    "one chunk many times": lambda: mcap([chunk("zstd", UNPACKED)], repeat=100),
+    "many chunks": lambda: mcap([chunk("zstd", UNPACKED)] * 60),
 }
 
 
@@ -166,9 +176,9 @@ def test_a_bomb_at_the_end_of_a_file_is_passed_over(tmp_path):
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
-@pytest.mark.parametrize("size", [100, 5_000, mcap_records.FREE])
+@pytest.mark.parametrize("size", [100, 5_000, FREE])
 def test_a_chunk_within_the_limits_is_read(compression, size):
-    (found,) = mcap_records.inside(chunk(compression, size))
+    (found,) = inside(chunk(compression, size))
     assert isinstance(found, Message)
     assert found.data == bytes(size - 31)
 
@@ -176,18 +186,16 @@ def test_a_chunk_within_the_limits_is_read(compression, size):
 @pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
 @pytest.mark.parametrize("more", [-1, 1])
 def test_a_chunk_of_another_size_than_it_says_is_damaged(compression, more):
-    with pytest.raises(mcap_records.Unreadable):
-        list(mcap_records.inside(chunk(compression, 5_000, 5_000 + more)))
+    with pytest.raises(Unreadable):
+        list(inside(chunk(compression, 5_000, 5_000 + more)))
 
 
 def test_an_unknown_way_to_pack_is_damaged():
-    with pytest.raises(mcap_records.Unreadable):
-        list(mcap_records.inside(Chunk("xz", b"", 0, 0, 0, 0)))
+    with pytest.raises(Unreadable):
+        list(inside(Chunk("xz", b"", 0, 0, 0, 0)))
 
 
-@pytest.mark.parametrize(
-    "links", [[str(number) for number in range(mcap_part.MAX_LINKS + 1)], ["x" * (mcap_part.MAX_NAME + 1)]]
-)
+@pytest.mark.parametrize("links", [[str(number) for number in range(MAX_LINKS + 1)], ["x" * (MAX_NAME + 1)]])
 def test_too_many_links_or_names_too_long_are_told(tmp_path, links):
     """Each link is read on its own, and its name stands in each row of a table."""
     path = tmp_path / "x.mcap"
@@ -215,7 +223,7 @@ def test_bytes_without_an_end_of_a_packet_are_no_packet(tmp_path, kind):
 
 def test_very_many_texts_are_refused(tmp_path):
     path = tmp_path / "x.mcap"
-    texts = [Metadata("contactfpga", {"link": str(number)}) for number in range(mcap_part.MAX_TEXTS + 1)]
+    texts = [Metadata("contactfpga", {"link": str(number)}) for number in range(MAX_TEXTS + 1)]
     path.write_bytes(mcap([chunk("zstd", 1000)], texts=texts))
     with pytest.raises(RecordingError, match="damaged"):
         Recording(path)

@@ -3,7 +3,7 @@
 import pytest
 import ros_types
 
-from contactfpga.driver import mcap_part
+from contactfpga.driver import mcap
 from contactfpga.tools.recordings import messages
 from contactfpga.zones.units import UnitSamples
 
@@ -26,7 +26,7 @@ def head(link):
 def test_bytes(link, data):
     message = messages.of_bytes(data, NS, link)
     assert read_back(message, messages.BYTES) == {"header": head(link), "data": data}
-    assert mcap_part.data_of(message) == data
+    assert mcap.data_of(message) == data
 
 
 def test_faults_and_units():

@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from types import TracebackType
-from typing import NoReturn
+from typing import NoReturn, Protocol, runtime_checkable
 
-from contactfpga.driver import self_test
+from contactfpga.driver.events import SideEvent, Silence, checked_deadline
 from contactfpga.driver.link import Link
-from contactfpga.driver.silence import Silence, checked_deadline
 from contactfpga.driver.stats import Stats
 from contactfpga.driver.subscription import Events, Subscription, checked, frame_of
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReplayEnded
+from contactfpga.errors import ContactFPGAError, NoSuchCommand, ReadTimeout, ReplayEnded
 from contactfpga.skin import Skin
-from contactfpga.skin.derived import SAMPLE_AT
+from contactfpga.skin.derived import SAMPLE_AT, SELF_TEST
 from contactfpga.skin.sheet import Sheet
 from contactfpga.wire.command import Command
-from contactfpga.wire.faults import Faults
+from contactfpga.wire.faults import Faults, SelfTestSlot
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.units import UnitFacts, sum_threshold_value, threshold_value, zero_value
 from contactfpga.zones.batch import Batch
+from contactfpga.zones.run import Run
 from contactfpga.zones.self_test import SelfTest
 from contactfpga.zones.units import UnitHistory
 from contactfpga.zones.zone import Zones
@@ -258,7 +258,7 @@ class Board:
         seconds. Raises :class:`NoSuchCommand` if the board has no self-test, and the errors of :meth:`read`. Without
         the board's Skin its mask is not known, so lines that do not rise cannot be distinguished from absent ones.
         """
-        slots = self_test.run(self._link, checked(timeout))
+        slots = _run_self_test(self._link, checked(timeout))
         try:
             mask = frozenset(self.skin.mask)
         except ContactFPGAError:
@@ -317,3 +317,72 @@ class Board:
         except ReplayEnded:
             raise ContactFPGAError(f"{self.port} holds no hello; its frames cannot be read") from None
         self._frames.raise_first()
+
+
+@runtime_checkable
+class Opening(Protocol):
+    """A tap that wants to know whose bytes these are."""
+
+    def opened(self, board: Board) -> None:
+        """Called before the first byte comes."""
+
+
+ATTEMPT_S = 0.5
+"""After which a self-test of which slots were lost is asked for again; more where a slow line needs it."""
+SLOT_BITS = 5000
+"""On the wire from one slot to the next, at most: the slot, a frame and now and then a hello."""
+
+
+class _Slots:
+    """A listener that waits for all slots of one test."""
+
+    all_events = True
+
+    def __init__(self, count: int):
+        self.whole: tuple[SelfTestSlot, ...] | None = None
+        self.count = count
+        self.attempt_s = ATTEMPT_S
+        self._so_far: list[SelfTestSlot] = []
+
+    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
+        if not isinstance(item, SelfTestSlot):
+            return
+        if item.number == 0 or item.number != len(self._so_far):
+            self._so_far = []
+        if item.number == len(self._so_far):
+            self._so_far.append(item)
+        if len(self._so_far) == self.count:
+            self.whole = tuple(self._so_far)
+
+    def look(self) -> bool | None:
+        """Whether all have come."""
+        return True if self.whole is not None else None
+
+
+def _run_self_test(link: Link, timeout: float) -> tuple[SelfTestSlot, ...]:
+    """All slots of a test that begins after this call. Raises :class:`ReadTimeout`, and as a command does."""
+    deadline = link.clock() + timeout
+    while True:
+        slots = _listen_for_slots(link)
+        try:
+            link.command(Command(SELF_TEST), max(1e-3, deadline - link.clock()))
+            link.wait_for(slots.look, min(deadline, link.clock() + slots.attempt_s), timeout)
+        except ReadTimeout as error:
+            if link.clock() >= deadline:
+                raise ReadTimeout(f"{error}; the self-test was not heard as a whole") from None
+        finally:
+            with link.changed:
+                link.listeners.discard(slots)
+        if slots.whole is not None:
+            return slots.whole
+
+
+def _listen_for_slots(link: Link) -> _Slots:
+    with link.changed:
+        hello = link.conversation.hello
+        if hello is None:
+            raise ContactFPGAError(f"{link.transport.name}: no hello has come yet")
+        slots = _Slots(1 + hello.sheet.rows + hello.sheet.columns)
+        slots.attempt_s = max(ATTEMPT_S, slots.count * SLOT_BITS / hello.baud)
+        link.listeners.add(slots)
+    return slots

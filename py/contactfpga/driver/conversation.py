@@ -1,7 +1,7 @@
 """What is said between host and board, without input or output: bytes and the clock in, events out.
 
 Freshness, losses, restarts, hellos and times are decided here and in the two parts
-:mod:`contactfpga.driver.requests` and :mod:`contactfpga.driver.timeline`, and nowhere else.
+:mod:`contactfpga.driver.requests` and :mod:`contactfpga.driver.clock`, and nowhere else.
 """
 
 from __future__ import annotations
@@ -12,12 +12,10 @@ import random
 
 import numpy as np
 
-from contactfpga.driver.host_clock import HostClock
-from contactfpga.driver.lines import Lines
+from contactfpga.driver.clock import MOST_S, HostClock, Timeline, continues
+from contactfpga.driver.events import Lines, UnitLine
 from contactfpga.driver.requests import Requests
 from contactfpga.driver.stats import Stats
-from contactfpga.driver.timeline import MOST_S, Timeline, continues
-from contactfpga.driver.unit_line import UnitLine
 from contactfpga.errors import SkinMismatch, VersionMismatch
 from contactfpga.skin import Skin
 from contactfpga.skin.sheet import Sheet

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from contactfpga.choices.choice import trusted
 from contactfpga.driver import finding, forks, recording
-from contactfpga.driver.board import Board
-from contactfpga.driver.recording import FileTap, Opening, Tap
+from contactfpga.driver.board import Board, Opening
+from contactfpga.driver.recording import FileTap, RecordingTransport, Tap
 from contactfpga.driver.subscription import checked
-from contactfpga.driver.transport import RecordingTransport, SimulatedPort, connect
+from contactfpga.driver.transport import SimulatedPort, connect
 from contactfpga.errors import BoardClosed, PortLost, SkinMismatch
 from contactfpga.inputs.values import shown
 from contactfpga.skin import Skin, limits

@@ -1,26 +1,96 @@
 """Which port a board is on: the only one, the one of a Skin, ``name:LEFT``, ``usb:SERIAL``.
 
-A search only listens: boards say hello twice per second without being asked, and whatever else hangs at a port of the
-same USB chip gets no byte. A port that another program reads is passed over before its settings are touched.
+Serial ports that may be a supported board are known by their USB ids. A search only listens: boards say hello twice per
+second without being asked, and whatever else hangs at a port of the same USB chip gets no byte. A port that another
+program reads is passed over before its settings are touched.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import os
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from contactfpga.driver import ports, sheets
+from contactfpga.boards import BOARDS
+from contactfpga.boards.spec import BoardSpec
+from contactfpga.driver import sheets
 from contactfpga.driver.address import NAME, USB, SheetOf
 from contactfpga.driver.conversation import Conversation
-from contactfpga.driver.ports import Candidate
 from contactfpga.driver.transport import connect
 from contactfpga.errors import BoardSilent, ContactFPGAError, OnlyNoise, PortNotFound
 from contactfpga.inputs.values import visible
 from contactfpga.skin import Skin
 from contactfpga.wire.hello import Hello
 from contactfpga.wire.mismatch import describe
+
+
+@dataclasses.dataclass(frozen=True)
+class Usb:
+    """USB ids of a board's serial port."""
+
+    vid: int
+    pid: int
+    interface: int | None
+    """Interface that carries the serial port where the chip has several; None: any."""
+    boards: str
+
+
+def supported(boards: Iterable[BoardSpec]) -> tuple[Usb, ...]:
+    """The boards by the chip that carries their UART, each chip once."""
+    titles: dict[tuple[int, int, int | None], list[str]] = {}
+    for board in boards:
+        titles.setdefault((*board.bridge.usb, board.bridge.interface), []).append(board.title)
+    return tuple(Usb(*chip, ", ".join(names)) for chip, names in titles.items())
+
+
+SUPPORTED = supported(BOARDS.values())
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A port that could be a board."""
+
+    device: str
+    boards: str
+    serial_number: str | None = None
+
+    def __str__(self) -> str:
+        # A USB device says what it likes of itself.
+        number = f", serial number {visible(self.serial_number)}" if self.serial_number else ""
+        return f"{visible(self.device)} ({self.boards}{number})"
+
+
+MORE = "CONTACTFPGA_PORTS"
+"""Environment variable with more ports to search, separated as in PATH: those that have no USB ids."""
+
+
+def candidates() -> list[Candidate]:
+    """Ports with the USB ids of supported boards, in the order of their names, and those of :data:`MORE`."""
+    from serialx import list_serial_ports
+
+    found = choose(list_serial_ports())
+    there = {one.device for one in found}
+    more = dict.fromkeys(device for device in os.environ.get(MORE, "").split(os.pathsep) if device)
+    return found + [Candidate(device, f"in {MORE}") for device in more if device not in there]
+
+
+def choose(ports: Iterable[object]) -> list[Candidate]:
+    """The ports among ``ports`` (objects like serialx.SerialPortInfo) that may be a supported board.
+
+    Where the system does not tell the interface number, every port of a chip is a candidate.
+    """
+    found = []
+    for port, usb in itertools.product(ports, SUPPORTED):
+        if (getattr(port, "vid", None), getattr(port, "pid", None)) != (usb.vid, usb.pid):
+            continue
+        interface = getattr(port, "interface_num", None)
+        if usb.interface is None or interface is None or interface == usb.interface:
+            found.append(Candidate(str(port.device), usb.boards, getattr(port, "serial_number", None)))  # type: ignore[attr-defined]
+    return sorted(found, key=lambda candidate: candidate.device)
+
 
 LISTEN_S = 1.2
 """How long a port may take to say hello; boards do so every 0.5 s."""
@@ -52,13 +122,13 @@ def find(port: str | None, skin: Skin | None, baud: int) -> str:
     """The device of the one board that is meant. Raises :class:`PortNotFound`, which lists what there is."""
     if port is not None and (sheet := SheetOf.parse(port)) is not None:
         return f"{find(sheet.port, None, baud)}#{sheet.number}"
-    found = ports.candidates()
+    found = candidates()
     if port is not None and port.startswith(USB):
         found = _with_number(port.removeprefix(USB), found)
         if len(found) == 1:
             return found[0].device
     if not found:
-        known = ", ".join(f"{usb.vid:04x}:{usb.pid:04x} ({usb.boards})" for usb in ports.SUPPORTED)
+        known = ", ".join(f"{usb.vid:04x}:{usb.pid:04x} ({usb.boards})" for usb in SUPPORTED)
         raise PortNotFound(
             f"no supported board is plugged in (USB ids {known}); name its port, or 'sim://' for the simulated board"
         )

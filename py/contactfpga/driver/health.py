@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from contactfpga.driver import ports
+from contactfpga.driver import finding
 from contactfpga.driver.driver import Board
 from contactfpga.errors import ReplayEnded
 from contactfpga.wire.faults import STUCK
@@ -80,7 +80,7 @@ def udev_rule() -> str:
         f'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTRS{{idVendor}}=="{usb.vid:04x}", '
         f'ATTRS{{idProduct}}=="{usb.pid:04x}", ATTR{{latency_timer}}="{LATENCY_MS}", '
         f'ATTR{{event_char}}="{EVENT_CHAR}"'
-        for usb in ports.SUPPORTED
+        for usb in finding.SUPPORTED
     )
 
 

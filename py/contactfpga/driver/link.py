@@ -12,11 +12,10 @@ from typing import Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.conversation import Arrival, Conversation, Event
-from contactfpga.driver.silence import Silence
-from contactfpga.driver.timed_out import timed_out
-from contactfpga.driver.told import Told
+from contactfpga.driver.events import SideEvent, Silence
+from contactfpga.driver.stats import NetCounters, refused
 from contactfpga.driver.transport import Transport, counters_of
-from contactfpga.errors import BoardClosed, ContactFPGAError, NoSuchCommand, ReadTimeout
+from contactfpga.errors import BoardClosed, BoardSilent, ContactFPGAError, NoSuchCommand, OnlyNoise, ReadTimeout
 from contactfpga.skin import Skin
 from contactfpga.wire.command import COMMANDS, Command
 from contactfpga.wire.hello import Hello
@@ -38,7 +37,7 @@ ASK_S = 1.0
 SIMULATED_TURN_S = 0.002
 """The most simulated time that passes in one turn, for which :meth:`Link.close` may have to wait."""
 
-Found = Zones | Told | ContactFPGAError | Hello | bool
+Found = Zones | SideEvent | ContactFPGAError | Hello | bool
 """What is waited for."""
 
 
@@ -48,7 +47,7 @@ class Listener(Protocol):
     all_events: bool
     """Also what is told between frames."""
 
-    def put(self, item: Zones | Run | Told | ContactFPGAError) -> None:
+    def put(self, item: Zones | Run | SideEvent | ContactFPGAError) -> None:
         """Add what came; the lock :attr:`Link.changed` is held."""
 
 
@@ -281,7 +280,7 @@ class Link:
             self._log(event)
             return
         item = event.zones if isinstance(event, Arrival) else event
-        between = isinstance(item, Told)
+        between = isinstance(item, SideEvent)
         for listener in self.listeners:
             if listener.all_events or not between:
                 listener.put(item)
@@ -342,3 +341,34 @@ class Link:
                     return
             with contextlib.suppress(ContactFPGAError):  # the next read says so
                 self._send()
+
+
+def timed_out(name: str, timeout: float, said: Conversation, start: int, net: NetCounters | None) -> ReadTimeout:
+    """The error of a port on which no frame came within ``timeout`` seconds; ``start``: bytes that had come before.
+    ``net``: what is counted about the network; None: there is none."""
+    stats = said.stats
+    head = f"{name}: no frame within {timeout:g} s"
+    if net is not None:
+        head += refused(net)
+    if stats.bytes == start:
+        return BoardSilent(
+            f"{head}, not one byte came; is the board powered and its bitstream loaded, is this its port? "
+            f"`contactfpga doctor {name}` checks"
+        )
+    seen = f"{stats.bytes - start} bytes came"
+    if not stats.hellos and (numbers := sorted(said.numbers)):
+        ports = ", ".join(f"{name}#{number}" for number in numbers)
+        return OnlyNoise(f"{name}: this board serves several sheets; open one of them: {ports}")
+    if not stats.frames and not stats.hellos:
+        damaged = ", ".join(f"{count} {reason}" for reason, count in stats.damaged.items()) or "none whole"
+        return OnlyNoise(
+            f"{head}; {seen}, but no valid packet ({damaged}); is the baud rate the Skin's, "
+            "and is this a contactfpga board?"
+        )
+    step = "send less to the board"
+    if net is not None:
+        step = "if there are access rules, let this program write to KEY/ask"
+    return ReadTimeout(
+        f"{head}; {seen}, {stats.hellos} hellos and {stats.frames} frames since the port was opened; "
+        f"give it a longer timeout, or {step}"
+    )

@@ -1,24 +1,28 @@
-"""Files of recorded bytes: which path `replay://` means, and which may be written by `record=`."""
+"""Files of recorded bytes: which may be written by `record=`, and what stands in the place of a board for `replay://`."""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import re
 import stat
+import time
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 from contactfpga.driver import forks
 from contactfpga.driver.address import REPLAY_FORM, Replay
-from contactfpga.driver.mcap_bytes import McapStream
-from contactfpga.driver.mcap_part import files_of
-from contactfpga.driver.mcap_records import MAGIC
-from contactfpga.errors import ContactFPGAError, PortNotFound
+from contactfpga.driver.conversation import Arrival, Conversation
+from contactfpga.driver.mcap import MAGIC, McapStream, files_of
+from contactfpga.driver.transport import Transport, counters_of
+from contactfpga.errors import ContactFPGAError, PortNotFound, ReplayEnded
 from contactfpga.inputs.files import open_regular, told
+from contactfpga.skin.widths import LONGEST_PACKET
 
 if TYPE_CHECKING:
-    from contactfpga.driver.board import Board
+    pass
+
 
 _UNKNOWN = re.compile(r"\?\w+=[^/?]*$")
 """What looks like options that there are not."""
@@ -42,14 +46,6 @@ class Tap(Protocol):
 
     def close(self) -> None:
         """No more will come; may be called twice."""
-
-
-@runtime_checkable
-class Opening(Protocol):
-    """A tap that wants to know whose bytes these are."""
-
-    def opened(self, board: Board) -> None:
-        """Called before the first byte comes."""
 
 
 class FileTap:
@@ -82,6 +78,30 @@ class FileTap:
     def _failed(self, error: OSError) -> ContactFPGAError:
         reason = error.strerror or told(error)
         return ContactFPGAError(f"{self._path} cannot be written: {reason}; make room, then record again")
+
+
+class RecordingTransport:
+    """Passes everything on, and each byte that is read to a tap."""
+
+    def __init__(self, transport: Transport, tap: Tap):
+        self._transport = transport
+        self.name = transport.name
+        self.live, self.threaded = transport.live, transport.threaded
+        self.counters = counters_of(transport)
+        self.write = transport.write
+        self.clock = transport.clock
+        self._tap = tap
+
+    def read(self, timeout_s: float) -> bytes:
+        data = self._transport.read(timeout_s)
+        self._tap.take(data, self._transport.clock())
+        return data
+
+    def close(self) -> None:
+        try:
+            self._tap.close()
+        finally:
+            self._transport.close()
 
 
 def open_recorded(name: str) -> Recorded:
@@ -136,3 +156,75 @@ def create(path: str | Path) -> BinaryIO:
 def _check_empty(path: str | Path, found: os.stat_result) -> None:
     if stat.S_ISREG(found.st_mode) and found.st_size:
         raise ContactFPGAError(f"{path} is there already; name a new file, or remove it first")
+
+
+class ReplayTransport:
+    """A recorded byte stream, as ``open(port, record=FILE)`` and `contactfpga record` write it: ``replay://FILE``, as
+    fast as it is read, or ``replay://FILE?pace=1`` in the time in which it was recorded."""
+
+    live = threaded = False
+
+    def __init__(self, name: str):
+        self.name = name
+        pace = Replay.parse(name).pace
+        self._pace = None if pace is None else _Pace(name, pace)
+        self._file = open_recorded(name)
+
+    def read(self, timeout_s: float) -> bytes:
+        if self._pace is not None:
+            return self._pace.read(self._file, timeout_s)
+        return _more(self._file, 4096, self.name)
+
+    def write(self, data: bytes) -> None:
+        raise ContactFPGAError(f"{self.name} is a recording; it cannot be asked for anything")
+
+    def clock(self) -> float:
+        # A recording has no times of its own, and nothing in it is waited for unless it is paced.
+        return 0.0 if self._pace is None else time.monotonic()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _Pace:
+    """Holds back the packets of a recording until their time has come."""
+
+    def __init__(self, name: str, factor: float):
+        self._name = name
+        self._factor = factor
+        self._conversation = Conversation(name, live=False)
+        self._held = b""
+        self._due_s = -math.inf
+        self._begun: tuple[float, int] | None = None  # a moment, and the frame's time that belongs to it
+        self._last_us = 0
+
+    def read(self, file: Recorded, timeout_s: float) -> bytes:
+        if not self._held:
+            packet = bytearray(_more(file, 1, self._name))
+            while packet[-1] and len(packet) <= LONGEST_PACKET and (more := file.read(1)):
+                packet += more
+            self._held = bytes(packet)
+            for event in self._conversation.receive(self._held, 0.0):
+                if isinstance(event, Arrival):
+                    self._schedule(event.zones.time_us)
+        wait_s = self._due_s - time.monotonic()
+        if wait_s > 0:
+            time.sleep(min(wait_s, max(0.0, timeout_s)))
+        if wait_s > timeout_s:
+            return b""
+        data, self._held = self._held, b""
+        return data
+
+    def _schedule(self, time_us: int) -> None:
+        if self._begun is None or time_us < self._last_us:  # a board that was restarted begins again
+            self._begun = time.monotonic(), time_us
+        moment_s, begun_us = self._begun
+        self._due_s = moment_s + (time_us - begun_us) / 1e6 / self._factor
+        self._last_us = time_us
+
+
+def _more(file: Recorded, count: int, name: str) -> bytes:
+    data = file.read(count)
+    if not data:
+        raise ReplayEnded(f"{name} ends here")
+    return data

@@ -10,7 +10,7 @@ import weakref
 from importlib import import_module
 from typing import Any, Protocol
 
-from contactfpga.driver import forks, recording
+from contactfpga.driver import forks
 from contactfpga.driver.address import Replay, Serial, SheetOf, Sim, parse
 from contactfpga.driver.stats import NetCounters
 from contactfpga.errors import MissingExtra, PortBusy, PortLost, PortNotFound
@@ -19,7 +19,7 @@ from contactfpga.skin import Skin
 
 SCHEMES = {
     "sim": "contactfpga_sim.model.board.virtual:board_at",
-    "replay": "contactfpga.driver.replay:ReplayTransport",
+    "replay": "contactfpga.driver.recording:ReplayTransport",
     "zenoh": "contactfpga.robot.net.port:ZenohPort",
     "sheet": "contactfpga.driver.sheets:share",
 }
@@ -181,33 +181,9 @@ _SIMULATED: weakref.WeakValueDictionary[int, SimTransport] = weakref.WeakValueDi
 forks.in_child(_SIMULATED.clear)
 
 
-class RecordingTransport:
-    """Passes everything on, and each byte that is read to a tap."""
-
-    def __init__(self, transport: Transport, tap: recording.Tap):
-        self._transport = transport
-        self.name = transport.name
-        self.live, self.threaded = transport.live, transport.threaded
-        self.write = transport.write
-        self.clock = transport.clock
-        self._tap = tap
-
-    def read(self, timeout_s: float) -> bytes:
-        data = self._transport.read(timeout_s)
-        self._tap.take(data, self._transport.clock())
-        return data
-
-    def close(self) -> None:
-        try:
-            self._tap.close()
-        finally:
-            self._transport.close()
-
-
 def counters_of(transport: Transport) -> NetCounters | None:
     """The counters of the network between host and board; None if there is no network."""
-    inner = transport._transport if isinstance(transport, RecordingTransport) else transport
-    return getattr(inner, "counters", None)
+    return getattr(transport, "counters", None)
 
 
 def connect(name: str | SimulatedPort, baud: int) -> Transport:

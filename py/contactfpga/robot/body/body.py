@@ -15,7 +15,7 @@ from typing import Any
 
 from contactfpga.choices.choice import trusted
 from contactfpga.driver import forks
-from contactfpga.driver.mcap_part import MAX_LINKS
+from contactfpga.driver.mcap import MAX_LINKS
 from contactfpga.driver.subscription import checked, checked_span
 from contactfpga.errors import BoardClosed, ReadTimeout
 from contactfpga.inputs import tomlfile

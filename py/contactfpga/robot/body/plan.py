@@ -14,8 +14,8 @@ import numpy as np
 from contactfpga import surfaces
 from contactfpga.choices.choice import trusting
 from contactfpga.driver.address import SheetOf, Sim
-from contactfpga.driver.mcap_part import MAX_NAME
-from contactfpga.driver.silence import longest_pause_s
+from contactfpga.driver.events import longest_pause_s
+from contactfpga.driver.mcap import MAX_NAME
 from contactfpga.errors import ContactFPGAError
 from contactfpga.inputs.values import is_finite, shown
 from contactfpga.robot.body.folds import Folds

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactfpga.driver import driver, finding, health, ports
+from contactfpga.driver import driver, finding, health
 from contactfpga.driver.address import SheetOf
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
@@ -112,7 +112,7 @@ def _line(finding: Finding) -> str:
 def _list(args: argparse.Namespace) -> int:
     """All boards; status 1 where there is none."""
     skin = Skin.load(args.skin) if args.skin else None
-    heard = finding.survey(ports.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
+    heard = finding.survey(finding.candidates(), args.baud or (skin.baud if skin else driver.DEFAULT_BAUD))
     boards = [one for one in heard if one.hello is not None]
     if args.json:
         print(json.dumps([_listed(one) for one in heard]), flush=True)
@@ -140,7 +140,7 @@ def _listed(one: finding.Found) -> dict[str, object]:
 def _look(args: argparse.Namespace, report: _Report) -> None:
     port = args.port
     if port is None:
-        found = ports.candidates()
+        found = finding.candidates()
         report.add(Finding("note", f"{candidate} may be a board") for candidate in found)
         if len(found) == 1:
             port = found[0].device

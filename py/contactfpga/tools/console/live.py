@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from contactfpga.driver.board import Board
 from contactfpga.driver.health import Finding
-from contactfpga.driver.silence import Silence, longest_pause_s
+from contactfpga.driver.events import Silence, longest_pause_s
 from contactfpga.errors import PortLost, ReadTimeout, ReplayEnded
 from contactfpga.tools.console import interrupt, terminal
 from contactfpga.zones.zone import Zones

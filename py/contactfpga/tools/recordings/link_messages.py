@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.told import Told
+from contactfpga.driver.events import SideEvent
 from contactfpga.robot.ros import convert
 from contactfpga.robot.ros.cdr import encode
 from contactfpga.robot.ros.feed import Felt
@@ -69,7 +69,7 @@ class LinkMessages:
         self._drawn_s = -1.0
         self._rim = outline(board.sheet, None if mount is None else mount.place)
 
-    def told(self, item: Told, clock_s: float) -> None:
+    def told(self, item: SideEvent, clock_s: float) -> None:
         """What came between frames."""
         time_ns = self._link.time_ns(clock_s)
         if isinstance(item, Faults):

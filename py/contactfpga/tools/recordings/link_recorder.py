@@ -9,7 +9,7 @@ import threading
 import time
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.silence import Silence
+from contactfpga.driver.events import Silence
 from contactfpga.driver.subscription import Events
 from contactfpga.errors import ContactFPGAError, ReadTimeout, ReplayEnded, SkinMismatch, VersionMismatch
 from contactfpga.robot.haptics import WithReadings

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap_part import METADATA, numbered
+from contactfpga.driver.mcap import METADATA, numbered
 from contactfpga.errors import ContactFPGAError
 from contactfpga.tools.recordings import messages
 from contactfpga.tools.recordings.mcap_file import McapFile

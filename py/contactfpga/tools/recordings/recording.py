@@ -11,9 +11,7 @@ from pathlib import Path
 from contactfpga import notebook
 from contactfpga.choices.choice import refuse_modules
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_bytes import McapBytes
-from contactfpga.driver.mcap_part import METADATA
-from contactfpga.driver.mcap_records import RecordingError
+from contactfpga.driver.mcap import METADATA, McapBytes, RecordingError
 from contactfpga.errors import SkinError
 from contactfpga.inputs import tomlfile
 from contactfpga.inputs.values import is_finite

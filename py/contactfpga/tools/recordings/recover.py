@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from contactfpga.driver import mcap_records
-from contactfpga.driver.mcap_part import Summary
-from contactfpga.driver.mcap_records import MAGIC, Cut, RecordingError, Unreadable
+from contactfpga.driver import mcap
+from contactfpga.driver.mcap import MAGIC, Cut, RecordingError, Summary, Unreadable
 from contactfpga.errors import MissingExtra
 from contactfpga.inputs.files import open_regular, replaced, told
 from contactfpga.tools.recordings.mcap_file import McapFile, RecordingFailed
@@ -173,7 +172,7 @@ def _walk(file: BinaryIO, found: RecoveryReport) -> Iterator[tuple[int, int, byt
             found.beyond = os.fstat(file.fileno()).st_size - at
             return
         try:
-            one = mcap_records.record(file)
+            one = mcap.record(file)
         except Cut as cut:
             found.cut = cut.size
             return
@@ -193,8 +192,8 @@ def _inside(kind: int, data: bytes) -> Iterator[Any]:
     from mcap.records import Channel, Chunk, Metadata, Schema
 
     if kind == Opcode.CHUNK:
-        yield from mcap_records.inside(mcap_records.parsed(Chunk, data))
+        yield from mcap.inside(mcap.parsed(Chunk, data))
     elif kind == Opcode.MESSAGE:
-        yield mcap_records.message(data)
+        yield mcap.message(data)
     elif kind in (kinds := {Opcode.METADATA: Metadata, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}):
-        yield mcap_records.parsed(kinds[Opcode(kind)], data)
+        yield mcap.parsed(kinds[Opcode(kind)], data)

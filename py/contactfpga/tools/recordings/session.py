@@ -11,7 +11,7 @@ from types import TracebackType
 
 from contactfpga.driver import driver, forks
 from contactfpga.driver.board import Board
-from contactfpga.driver.mcap_part import SUFFIX
+from contactfpga.driver.mcap import SUFFIX
 from contactfpga.driver.subscription import Events
 from contactfpga.driver.transport import SimulatedPort
 from contactfpga.errors import ContactFPGAError

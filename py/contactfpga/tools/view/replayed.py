@@ -11,8 +11,7 @@ from contactfpga.driver import driver
 from contactfpga.driver.address import REPLAY, Replay
 from contactfpga.driver.board import Board
 from contactfpga.driver.conversation import Arrival, Conversation
-from contactfpga.driver.mcap_part import SUFFIX, files_of
-from contactfpga.driver.mcap_records import MAGIC
+from contactfpga.driver.mcap import MAGIC, SUFFIX, files_of
 from contactfpga.errors import ContactFPGAError, ReplayEnded
 from contactfpga.inputs.files import open_regular
 from contactfpga.skin.sheet import Sheet

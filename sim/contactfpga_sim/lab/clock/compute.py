@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contactfpga.driver.clock_fit import ClockFit
+from contactfpga.driver.clock import ClockFit
 
 SECONDS, SEEDS = 60.0, 8
 """Of device time in each of so many runs."""

@@ -1,0 +1,399 @@
+"""When frames were scanned, on the board's clock and on the host's.
+
+:class:`Timeline` counts frames and finds their times since power-up, from the few bits that frames carry and from
+hellos. :class:`ClockFit` fits the board's clock to the host's, and :class:`HostClock` feeds it with what arrives.
+"""
+
+from __future__ import annotations
+
+import collections
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contactfpga.driver.stats import Stats
+from contactfpga.skin.derived import EPOCH_BITS
+from contactfpga.skin.widths import SEQUENCE_BITS, TIME_BITS, Widths
+from contactfpga.wire.hello import Hello
+from contactfpga.wire.protocol import Frame, may_number
+from contactfpga.zones.host_line import HostLine
+
+_WRAP_US = 1 << TIME_BITS
+_EPOCH_US = 1 << EPOCH_BITS
+_SEQUENCES = 1 << SEQUENCE_BITS
+
+MOST_US = _EPOCH_US
+"""Hellos come twice per second, so that a frame is no later than this after the hello or the frame before it."""
+MOST_S = 8.0
+"""Half the time in which a frame's time wraps: after a longer pause nobody knows how often it did."""
+SETTLED_S = 1.0
+"""This long after a pause in which nobody read, all that waited meanwhile has been read."""
+BEGUN_US = 1 << 21
+"""A board may have been restarted this long ago without a hello that arrived."""
+
+
+class Timeline:
+    """Counts and times since the board's power-up.
+
+    A frame whose time cannot be explained is not passed on before the next hello, so that no time is wrong.
+    """
+
+    def __init__(self, stats: Stats, live: bool):
+        self.before: Frame | None = None
+        """The last frame since power-up that was explained."""
+        self._stats = stats
+        self._live = live
+        self._greeted = self._known = self._forgot = False
+        self._next = 0  # frames sent before the next one
+        self._waiting = 0  # unexplained frames since the last hello
+        self._time_us: int | None = None  # of the last frame; None: a hello has come since
+        self._last_us = -1
+        self._epoch = 0
+        self._now = 0.0
+        self._doubted = -math.inf
+        self._patience_s = MOST_S
+
+    @property
+    def known(self) -> bool:
+        """Whether the next frame's time can be explained, as far as that is known by now."""
+        return self._known
+
+    def doubt(self, now: float) -> None:
+        """Nobody has read for long: what is read now may have waited, with a break before what comes next."""
+        self._known = False
+        self._doubted = now
+
+    def take_hello(self, hello: Hello, now: float, fresh: bool) -> None:
+        """The board says how many frames it has sent, and roughly when this was. ``fresh``: it answers a request sent
+        since :meth:`doubt`."""
+        if self._greeted:
+            self._compare(hello)
+        self._greeted = True
+        self._next, self._epoch, self._time_us = hello.sent, hello.epoch, None
+        self._known = fresh or now >= self._doubted + SETTLED_S
+        self._forgot, self._waiting = False, 0
+        self._now = now
+        longest = Widths(hello.sheet).max_frame_bytes
+        self._patience_s = MOST_S + 2 * longest * 10 / hello.baud
+
+    def _compare(self, hello: Hello) -> None:
+        late_us = self._last_us - BEGUN_US  # the scanner's clock is at most a scan behind the frames
+        first = self._next
+        forgot = self._forgot and not may_number(hello.heard)
+        if forgot or hello.sent < self._next or (hello.epoch + 1) * _EPOCH_US <= late_us:
+            self._stats.restarts += 1
+            self.before, self._last_us, first = None, -1, 0
+        self._stats.lost += max(0, hello.sent - first - self._waiting)
+
+    def take_frame(self, frame: Frame, widths: Widths, now: float) -> int | None:
+        """The frame's time since power-up in us; None where it cannot be explained."""
+        time_us = self._explain(frame, now)
+        if time_us is None:
+            self._known = False
+            self._waiting += 1
+            self._stats.unexplained += 1
+            return None
+        self._stats.frames += 1
+        self._stats.lost += self._gap(frame)
+        if self.before is not None:
+            gap = frame.overwritten - self.before.overwritten
+            self._stats.overwritten += gap % (1 << widths.overwritten_bits)
+        self._next += self._gap(frame) + 1
+        self._time_us = self._last_us = time_us
+        self._now, self.before = now, frame
+        return time_us
+
+    def place(self, time_us: int) -> int | None:
+        """The time since power-up in us of these bits of it, which are of about now; None where that is not known."""
+        if not self._known or self._last_us < 0:
+            return None
+        return self._last_us + (time_us - self._last_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
+
+    def expects(self, heard: int, time_us: int, now: float) -> bool:
+        """Whether a frame that carries these continues the one explained last."""
+        if self.before is None or self._time_us is None or not self._known:
+            return False
+        soon = not self._live or now - self._now <= self._patience_s
+        return soon and heard == self.before.heard and 0 < (time_us - self._time_us) % _WRAP_US <= MOST_US
+
+    def take_run(self, packets: np.ndarray, widths: Widths, last: Frame, now: float) -> np.ndarray:
+        """Times since power-up in us of frames of which :func:`continues` says that each follows from the one before;
+        the first one is expected, or the one before it was explained.
+
+        ``packets``: of :data:`contactfpga.wire.many.FIELDS`; ``last``: the last one of them.
+        """
+        assert self.before is not None
+        assert self._time_us is not None
+        before = self.before
+        lost = int((_steps(packets["sequence"], before.sequence, _SEQUENCES) - 1 & _SEQUENCES - 1).sum())
+        times_us = self._time_us + np.cumsum(_steps(packets["time_us"], before.time_us, _WRAP_US))
+        self._stats.frames += len(packets)
+        self._stats.lost += lost
+        overwritten = _steps(packets["overwritten"], before.overwritten, 1 << widths.overwritten_bits)
+        self._stats.overwritten += int(overwritten.sum())
+        self._next += lost + len(packets)
+        self._time_us = self._last_us = int(times_us[-1])
+        self._now, self.before = now, last
+        return times_us
+
+    def _gap(self, frame: Frame) -> int:
+        return (frame.sequence - self._next) % _SEQUENCES
+
+    def _explain(self, frame: Frame, now: float) -> int | None:
+        if not self._known or (self._live and now - self._now > self._patience_s):
+            return None
+        before = self.before
+        if before is not None:
+            if before.heard and not frame.heard:
+                self._forgot = True
+                return None
+            if self._gap(frame) and frame.time_us < BEGUN_US and frame.heard != before.heard:
+                return None  # a frame was lost, or this is one of the first since a restart
+        if self._time_us is None:  # from one epoch before the hello's to three after it
+            first_us = (self._epoch - 1) * _EPOCH_US
+            time_us = first_us + (frame.time_us - first_us) % _WRAP_US
+            return time_us if time_us > self._last_us else None
+        step_us = (frame.time_us - self._time_us) % _WRAP_US
+        return self._time_us + step_us if 0 < step_us <= MOST_US else None
+
+
+def continues(packets: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether each frame's time follows from the one before it, if that one's is known.
+
+    ``packets``: of :data:`contactfpga.wire.many.FIELDS`, as they came one after the other.
+    """
+    valid, heard, time_us = packets["valid"], packets["heard"], packets["time_us"]
+    found = np.zeros(len(packets), np.bool_)
+    step_us = time_us[1:] - time_us[:-1] & _WRAP_US - 1
+    found[1:] = valid[1:] & valid[:-1] & (heard[1:] == heard[:-1]) & (step_us > 0) & (step_us <= MOST_US)
+    return found
+
+
+def _steps(values: np.ndarray, before: int, modulus: int) -> np.ndarray:
+    """From each value to the next, the first one from ``before``; ``modulus`` is a power of two."""
+    steps = values.copy()
+    steps[1:] -= values[:-1]
+    steps[0] -= before
+    return steps & modulus - 1
+
+
+MOST_PPM, USUAL_PPM = 200.0, 50.0
+"""By how much the two clocks may differ at most, and usually do, in millionths."""
+WINDOW_S = 60.0
+"""Arrivals that are older do not count."""
+PIECE_S = 0.25
+"""The window is cut into pieces of this length, of which the least delayed arrival counts."""
+UNKNOWN_S = 0.02
+"""The least delay may be this long as long as no request was answered."""
+STEP_S = 0.005
+"""What contradicts the bounds by more than this is a step of one of the clocks."""
+QUIET_S = 5.0
+"""After so long without an answered request one is supposed."""
+CAUTION = 1.25
+"""So much more is stated than these lines alone say, as clocks do not keep to a straight line."""
+MOST_ASKED = 64
+"""Answered requests that count."""
+
+_SLOPES = np.arange(-MOST_PPM, MOST_PPM + 1, 4.0) * 1e-6
+
+
+class _Point(NamedTuple):
+    device_s: float
+    excess_s: float
+    """By how much more the host's clock went on than the board's since the first frame, delays included."""
+
+
+class ClockFit:
+    """A running fit of the board's clock to the host's, which knows that delays only add: device and host times in,
+    lines from one to the other out; times of one board since its power-up.
+
+    A frame arrives after it was sampled, never before: the least delayed arrivals, less what their bytes take on the
+    wire, bound the host's clock from above. A frame that answers a request was sampled after the request was sent,
+    which bounds it from below. The truth lies between the two, on a line whose slope is that of crystals.
+    """
+
+    def __init__(self) -> None:
+        self._least_s = self._way_s = UNKNOWN_S  # what the least delay may be at most, now and when last asked
+        self.forget()
+
+    def forget(self) -> None:
+        """The board was restarted, or a clock stepped: what was measured says nothing of what comes, but for the least
+        delay, which is the way's."""
+        self._pieces: collections.deque[_Point] = collections.deque()
+        self._piece = -math.inf  # number of the last one
+        self._asked: collections.deque[_Point] = collections.deque(maxlen=MOST_ASKED)
+        self._newest = _Point(0.0, 0.0)
+        self._base_us, self._base_s = 0, 0.0
+        self._fitted_s = 0.0
+        self._height_s = self._slope = self._variance = 0.0
+
+    def arrived(self, time_us: int, arrived_s: float, wire_s: float) -> None:
+        """A frame of this device time came, whose bytes alone take ``wire_s``; of several at once, the last one."""
+        if not self._pieces:
+            self._base_us, self._base_s = time_us, arrived_s - wire_s
+        point = self._point(time_us, arrived_s - wire_s)
+        below_s = self._bound(point.device_s) - point.excess_s
+        if self._pieces and below_s > self._least_s + STEP_S:
+            self.forget()
+            self.arrived(time_us, arrived_s, wire_s)
+            return
+        self._newest = point
+        piece = math.floor(point.device_s / PIECE_S)
+        if piece > self._piece:
+            self._piece = piece
+            self._pieces.append(point)
+            self._suppose()
+            self._fit()
+        elif below_s > 0:
+            while self._pieces and _hides(point, self._pieces[-1]):
+                self._pieces.pop()
+            self._pieces.append(point)
+            self._height_s -= below_s
+            self._least_s = max(0.0, self._least_s - below_s)
+
+    def answered(self, time_us: int, asked_s: float) -> None:
+        """The frame that :meth:`arrived` was called for last was sampled after that moment of the host's clock."""
+        asked = self._point(time_us, asked_s)
+        if asked.excess_s > self._bound(asked.device_s) + STEP_S:  # arrivals from before a step
+            self._pieces.clear()
+            self._asked.clear()
+            self._pieces.append(self._newest)
+        self._asked.append(asked)
+        self._fit()
+        self._way_s = self._least_s
+
+    def _suppose(self) -> None:
+        """Where nobody has asked for long, that the least delay since then is at most twice what it was."""
+        now_s = self._newest.device_s
+        if now_s - (self._asked[-1].device_s if self._asked else 0.0) > QUIET_S:
+            since = [point for point in self._pieces if point.device_s > now_s - QUIET_S]
+            lowest = min(since, key=lambda point: point.excess_s)
+            self._asked.append(_Point(now_s, lowest.excess_s - 2 * self._way_s))
+
+    def _point(self, time_us: int, host_s: float) -> _Point:
+        device_s = (time_us - self._base_us) / 1e6
+        return _Point(device_s, host_s - self._base_s - device_s)
+
+    def _bound(self, device_s: float) -> float:
+        """What the excess is at most then."""
+        return self._height_s + self._slope * (device_s - self._fitted_s)
+
+    def _fit(self) -> None:
+        """Every line between the bounds is as likely as any other, but for its slope: that of crystals, near that of
+        the least delayed arrivals. The mean of all lines is taken."""
+        for points in (self._pieces, self._asked):
+            while points and points[0].device_s < self._newest.device_s - WINDOW_S:
+                points.popleft()
+        now_s = self._fitted_s = self._newest.device_s
+        above = _least(self._pieces, now_s)  # now, of the lines of each slope
+        if self._asked:
+            gaps = above + _least([_Point(one.device_s, -one.excess_s) for one in self._asked], now_s, -1)
+        else:
+            gaps = np.full(len(_SLOPES), self._least_s)
+        weights = np.maximum(gaps, 1e-9) * self._likely(int(gaps.argmax()), float(gaps.max()))
+        if gaps.max() <= 0:  # by less than a step: no line keeps all bounds
+            weights = np.exp(gaps * 1e9 - gaps.max() * 1e9)
+        weights /= weights.sum()
+        middles = above - np.maximum(gaps, 0.0) / 2
+        middle = float(weights @ middles)
+        self._slope = float(weights @ _SLOPES)
+        self._least_s = max(0.0, float(weights @ gaps))
+        self._height_s = middle + self._least_s / 2
+        self._variance = float(weights @ ((middles - middle) ** 2 + gaps**2 / 12)) * CAUTION**2
+
+    def _likely(self, widest: int, gap_s: float) -> np.ndarray:
+        """Of each slope, from arrivals alone, of which delays hide as much as they vary and as the bounds leave open:
+        where the times of frames and of the bus beat slowly, they go up and down for long. ``widest``: the slope that
+        leaves the widest gap between the bounds."""
+        device_s, excess_s = np.array(self._pieces).T
+        heights = excess_s - _SLOPES[widest] * device_s
+        hidden_s = max(gap_s, 0.0) / 4 + float(np.median(heights) - heights.min()) + 1e-6
+        usual, sharp = USUAL_PPM * 1e-6, hidden_s / max(float(device_s[-1] - device_s[0]), PIECE_S)
+        exponents = (_SLOPES / usual) ** 2 + ((_SLOPES - _middle_slope(list(self._pieces))) / sharp) ** 2
+        likely: np.ndarray = np.exp((exponents.min() - exponents) / 2)
+        return likely
+
+    def line(self, arrived_s: float) -> HostLine | None:
+        """For frames that arrived then; None before the first :meth:`arrived`."""
+        if not self._pieces:
+            return None
+        now_s = self._newest.device_s
+        base_s = self._base_s + now_s + self._bound(now_s) - self._least_s / 2
+        base_us = self._base_us + round(now_s * 1e6)
+        return HostLine(arrived_s, base_us, base_s, 1.0 + self._slope, math.sqrt(self._variance))
+
+
+def _hides(point: _Point, earlier: _Point) -> bool:
+    """Whether a later point of the same piece makes an earlier one redundant: a line below it is below both."""
+    if math.floor(earlier.device_s / PIECE_S) < math.floor(point.device_s / PIECE_S):
+        return False
+    return earlier.excess_s - point.excess_s > MOST_PPM * 1e-6 * (point.device_s - earlier.device_s)
+
+
+def _least(points: collections.deque[_Point] | list[_Point], now_s: float, sign: int = 1) -> np.ndarray:
+    """By slope (times ``sign``), the height now of the highest line below the points."""
+    device_s, excess_s = np.array(points).T
+    least: np.ndarray = (excess_s - sign * _SLOPES[:, None] * (device_s - now_s)).min(axis=1)
+    return least
+
+
+def _middle_slope(points: list[_Point]) -> float:
+    """Of the lower convex hull's edge over the middle of the time that the points span; they are in order of time."""
+    hull: list[_Point] = []
+    for point in points:
+        while len(hull) > 1 and _turns_down(hull[-2], hull[-1], point):
+            hull.pop()
+        hull.append(point)
+    middle_s = (points[0].device_s + points[-1].device_s) / 2
+    for before, after in itertools.pairwise(hull):
+        if after.device_s >= middle_s and after.device_s > before.device_s:
+            return (after.excess_s - before.excess_s) / (after.device_s - before.device_s)
+    return 0.0
+
+
+def _turns_down(first: _Point, second: _Point, third: _Point) -> bool:
+    run, rise = second.device_s - first.device_s, second.excess_s - first.excess_s
+    return rise * (third.device_s - first.device_s) >= run * (third.excess_s - first.excess_s)
+
+
+class HostClock:
+    """A fit of clocks for one conversation; a recording, which is not ``live``, has none."""
+
+    def __init__(self, live: bool):
+        self.byte_s = 0.0
+        """What a byte takes on the wire."""
+        self._fit = ClockFit() if live else None
+        self._line: HostLine | None = None  # for the frames that come now
+        self._latest: tuple[int, int] | None = None  # time and bytes of the last of them
+
+    def begin(self, now: float) -> None:
+        """Packets came."""
+        self._line = None if self._fit is None else self._fit.line(now)
+
+    def take(self, time_us: int, size: int, now: float, asked_s: float | None) -> HostLine | None:
+        """A frame of so many bytes is among them, or the last of a run; ``asked_s``: the request was sent then that it
+        answers first."""
+        if self._fit is None:
+            return None
+        self._latest = time_us, size
+        if self._line is None or asked_s is not None:  # else the last one of those that came at once says the most
+            self.end(now)
+            if asked_s is not None:
+                self._fit.answered(time_us, asked_s)
+            self._line = self._fit.line(now)
+        return self._line
+
+    def end(self, now: float) -> None:
+        """These were all."""
+        if self._fit is not None and self._latest is not None:
+            time_us, size = self._latest
+            self._fit.arrived(time_us, now, size * self.byte_s)
+        self._latest = None
+
+    def forget(self) -> None:
+        """The board was restarted, or is another one."""
+        self._line = self._latest = None
+        if self._fit is not None:
+            self._fit.forget()
